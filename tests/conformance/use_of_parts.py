@@ -144,7 +144,8 @@ def numbers(kind, part, v):
 def _filled(state, v, only_zeros=False):
     """The same state with other numbers in it, so that nothing hides at rest."""
     leaves, tree = jax.tree.flatten(state)
-    moved = [leaf + 0.5 * jnp.resize(v, leaf.shape) for leaf in leaves]
+    counts = lambda leaf: not jnp.issubdtype(leaf.dtype, jnp.floating)
+    moved = [leaf if counts(leaf) else leaf + 0.5 * jnp.resize(v, leaf.shape) for leaf in leaves]
     if only_zeros:
         moved = [jnp.where(leaf == 0, new, leaf) for leaf, new in zip(leaves, moved, strict=True)]
     return jax.tree.unflatten(tree, moved)

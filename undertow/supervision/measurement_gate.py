@@ -15,7 +15,7 @@ from undertow.core import checks
 from undertow.core.contracts import Measurement
 from undertow.core.param import Param, param
 from undertow.numerics.rotations import attitude_error
-from undertow.supervision.motion import Motion, motion_of, path_velocity, predicted, split, with_motion
+from undertow.supervision.motion import Motion, length, motion_of, path_velocity, predicted, split, with_motion
 from undertow.supervision.stuck_readings import StuckReadings, StuckState
 
 Scalar = Float[Array, ""]
@@ -128,7 +128,7 @@ class MeasurementGate(eqx.Module):
         turn = jnp.zeros(0)
         if read.attitude.shape[0]:
             off = attitude_error(read.attitude, expected.attitude)
-            turn = jnp.broadcast_to(jnp.sqrt((off**2).sum()) / self.jump_angle, (4,))
+            turn = jnp.broadcast_to(length(off) / self.jump_angle, (4,))
         return Motion(
             jnp.abs(read.position - expected.position) / self.jump_position,
             turn,

@@ -10,6 +10,8 @@ from undertow.core.measurement import measurement_of_pose
 from undertow.numerics.number import Number
 from undertow.numerics.rotations import Kinematics, quaternion_rate
 
+_LEAST = 1e-30  # far below the square of any length that matters
+
 
 class Motion(NamedTuple):
     """Motion of a vehicle, or the outputs of another plant and their rates."""
@@ -56,6 +58,11 @@ def predicted(y: Measurement, acceleration: Outputs, dt: Number) -> Motion:
         turned = attitude + dt * quaternion_rate(attitude, turning)
         attitude = turned / jnp.sqrt((turned * turned).sum())
     return Motion(motion.position + dt * velocity, attitude, motion.velocity + dt * acceleration)
+
+
+def length(vector: Array) -> Float[Array, ""]:
+    """Length of a vector, with a gradient at zero, too."""
+    return jnp.sqrt((vector * vector).sum() + _LEAST)
 
 
 def split(motion_velocity: Float[Array, " n"]) -> tuple[Array, Array]:

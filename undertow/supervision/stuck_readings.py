@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from undertow.core.param import Param, param
 from undertow.numerics.rotations import attitude_error
-from undertow.supervision.motion import Motion, split
+from undertow.supervision.motion import Motion, length, split
 
 Scalar = Float[Array, ""]
 
@@ -83,7 +83,6 @@ class StuckReadings(eqx.Module):
 
     def _missing(self, anchor: Anchor, read: Motion) -> tuple[Scalar, Scalar]:
         """Missing translation and rotation, relative to their limits; 0 while bits change."""
-        length = lambda vector: jnp.sqrt((vector**2).sum())
         same = anchor.same >= self.readings
         straight = length(read.position - anchor.position - anchor.moved) / self.distance
         turn = jnp.zeros(())

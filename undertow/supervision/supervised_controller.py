@@ -329,8 +329,7 @@ class Supervised(AbstractGatedController):
 
     def _variation(self, z: SupervisedState, view: _View, u: Inputs, step: Scalar) -> Scalar:
         """Average variation of the input, ranges from limit to limit per second."""
-        width = jnp.where(jnp.isfinite(self.high - self.low), self.high - self.low, jnp.inf)
-        now = (jnp.abs(u - z.output) / width).mean() / step
+        now = (jnp.abs(u - z.output) / (self.high - self.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
         return jnp.where(view.controls & ~z.turning, z.variation + share * (now - z.variation), 0.0)
 

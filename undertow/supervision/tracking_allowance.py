@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractCoordinates, Measurement, Target
 from undertow.core.param import Param, param
+from undertow.supervision.motion import length
 
 Scalar = Float[Array, ""]
 
@@ -53,5 +54,4 @@ class TrackingAllowance(eqx.Module):
 def _sizes(coordinates: AbstractCoordinates, difference: Array) -> tuple[Scalar, Scalar]:
     """Lengths of the parts of a difference that are lengths and angles."""
     turns = np.array(coordinates.angles)
-    length = lambda which: jnp.sqrt((difference**2 * jnp.asarray(which, dtype=float)).sum())
-    return length(~turns), length(turns)
+    return tuple(length(difference * jnp.asarray(which, dtype=float)) for which in (~turns, turns))  # pyright: ignore[reportReturnType] - two of them
