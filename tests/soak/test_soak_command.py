@@ -62,6 +62,10 @@ def test_a_failure_is_repeated_alone(here, capsys, monkeypatch):
     [
         (["soak", "controlls"], "`PART` must be a part of a soak, but is controlls. Did you mean `controls`?"),
         (["soak", "--hours", "-1"], "`--hours` must be zero or positive, but is -1"),
+        (
+            ["soak", "inputs", "--inputs", "0"],
+            "`PART` must be a part of which there is more than nothing, but is inputs",
+        ),
         (["soak", "--replay", "x/y"], "`--replay` must be a file soak.json or the identity of a failure, but is x/y"),
         (["soak", "--replay", "inputs/scenario/1"], "`--replay` must be a file soak.json"),
         (["soak", "--replay", "missing.json"], "`--replay` must be a file soak.json"),

@@ -99,13 +99,14 @@ def test_what_must_never_happen_is_found(event, change):
         DONE,
         DONE._replace(err="Advice: a sentence\n" + DONE.err),
         DONE._replace(code=4, err="Error: files could not be read or written: s.yaml\n"),
+        DONE._replace(code=4, err=f"Error: files could not be read or written: too long ({'b' * 150}...\n"),
         DONE._replace(err="Error: No such option: --x. See `undertow check --help`\n"),
         DONE._replace(code=0, err="", left=["out/run.nc"], seconds=(5.0, 5.0)),
         DONE._replace(err="", out="s.yaml: 1 error, 0 pieces of advice\n"),
     ],
 )
 def test_what_may_happen_is_no_failure(done):
-    assert judged("", ["check", "s.yaml"], FILES, done) is None
+    assert judged("", ["check", "s.yaml", "b" * 3000], FILES, done) is None
 
 
 def test_hostile_inputs_of_every_kind_are_refused_or_accepted(tmp_path):

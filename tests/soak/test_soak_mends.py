@@ -4,7 +4,7 @@ import pytest
 
 from undertow.cli.soak import attacked
 from undertow.core.errors import BadInput, printable
-from undertow.soak import specimens
+from undertow.soak import plug_ins, specimens
 from undertow.soak.inputs import BUILD, Attack
 from undertow.soak.trying import try_in_process
 from undertow.soak.verdict import judged
@@ -20,6 +20,7 @@ def table(data):
     return {**specimens.scenario_files(specimens.SCENARIOS["recorded"]), "d.csv": data}
 
 
+OWN = plug_ins._OWN.replace("{init}", "return jnp.zeros(1)").replace("{advance}", "return z")
 LONG = "k" * 1000
 REST = "reference: {kind: setpoint, position: [0]}\n"
 
@@ -47,6 +48,21 @@ FOUND = {
         plugged(specimens.PLUG_IN.replace(LAW, "return type('X', (), {})()")),
         (BUILD, "s.yaml"),
         "which returns a `X` (mine.py)",
+    ),
+    "declarations of signals that are none": (
+        plugged(OWN.format(signals="None", command="return jnp.zeros(1), {}")),
+        ("check", "s.yaml"),
+        "`Mine.signals` must return a mapping of names to `Signal`, but returns None",
+    ),
+    "a declaration that is no Signal": (
+        plugged(OWN.format(signals="{'x': 3}", command="return jnp.zeros(1), {'x': 3}")),
+        (BUILD, "s.yaml"),
+        "`Mine.signals` must return a mapping of names to `Signal`, but returns {'x': 3}",
+    ),
+    "signals that are no mapping": (
+        plugged(OWN.format(signals="{}", command="return jnp.zeros(1), 3")),
+        (BUILD, "s.yaml"),
+        "`Mine.command` must return its signals as a mapping, {} for none, but returns a int",
     ),
     "a key of thousands of characters": (
         {"s.yaml": f"plant: {{kind: double_integrator, {LONG}: 1, l{LONG}: 2, m{LONG}: 3}}\n{REST}".encode()},

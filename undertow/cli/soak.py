@@ -11,6 +11,7 @@ import typer
 
 from undertow.cli import exit_codes
 from undertow.cli.interruptible import interruptible
+from undertow.core.errors import BadInput
 
 _WRITTEN = ("soak.json", "soak.html", "failures")
 _SHOWN = 20  # failures that are printed
@@ -54,6 +55,8 @@ def soak(
     given = {"inputs": inputs, "kills": kills, "hours": hours, "faults": faults}
     amounts = amounts._replace(**{name: _count(name, value) for name, value in given.items() if value is not None})
     asked = [part for part in soaking.check_parts(parts or []) if getattr(amounts, part, 1)]
+    if not asked:
+        raise BadInput("PART", "be a part of which there is more than nothing", ", ".join(parts or []) or None)
     seed = int(time.time()) if seed is None else seed
     limit = float("inf") if minutes is None else _count("minutes", minutes)
     return _soak(asked, amounts, seed, limit, out, overwrite)

@@ -3,6 +3,7 @@
 Only types and shapes are looked at, so that the checks cost nothing in compiled code.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -61,6 +62,8 @@ def check_command(controller: Any, answer: Any, inputs: int) -> None:
     if not says and jnp.shape(answer[0]) != (inputs,):
         due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
         says = f"`{method}` {due}, but returns {form(answer[0])}"
+    if not says and not isinstance(answer[1], Mapping):
+        says = f"`{method}` must return its signals as a mapping, {{}} for none, but returns {form(answer[1])}"
     if says:
         raise BadInput("", "", says, where=place_of(controller, "command"))
 

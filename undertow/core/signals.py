@@ -36,9 +36,12 @@ def check_declared(part: Any, values: Mapping[str, Any], method: str) -> None:
         method: of the part that gives them.
 
     Raises:
-        BadInput: a signal is undeclared, or a declared one is missing.
+        BadInput: a signal is undeclared, or a declared one is missing, or the declarations are none.
     """
     declared, who = part.signals(), type(part).__name__
+    if not (isinstance(declared, Mapping) and all(isinstance(one, Signal) for one in declared.values())):
+        says = f"`{who}.signals` must return a mapping of names to `Signal`, but returns {declared!r}"
+        raise BadInput("", "", says, hint="Return {} where there are none", where=place_of(part, "signals"))
     for name in values:
         if name not in declared:
             says = f"`{who}.{method}` gives a signal `{name}`, which `{who}.signals` does not declare"

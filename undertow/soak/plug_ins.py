@@ -94,6 +94,9 @@ class Mine(AbstractController):
     def init(self, y, r):
         {init}
 
+    def signals(self):
+        return {signals}
+
     def command(self, z, y, r):
         {command}
 
@@ -124,4 +127,5 @@ def plug_in(chance: random.Random) -> str:
     advance = chance.choice(
         (kept, kept, "return None", "return jnp.zeros(9)", "return (z, z)", "return z / 0", "return 'a'")
     )
-    return _OWN.format(init=init, command=chance.choice(_COMMANDS), advance=advance)
+    signals = chance.choice(("{}", "{}", "{}", "None", "3", "{'x': 3}", "{'position': None}"))
+    return _OWN.format(init=init, signals=signals, command=chance.choice(_COMMANDS), advance=advance)

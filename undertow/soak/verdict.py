@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from undertow.core.errors import printable
+
 EVENTS = {
     "N1": "An input that is not finite or beyond its limits reached the plant.",
     "N2": "An uncaught exception or a traceback reached the user, or a process died by a signal that nobody sent.",
@@ -19,6 +21,7 @@ EVENTS = {
 REFUSED = (2, 4)  # exit codes of a command that could not use its input
 _ACCEPTED = (0, 1)
 _LONGEST = 2000  # characters of a line
+_NAMED = 100  # first characters of a name, by which a message may name it: long ones are shortened
 _SLOW, _HANGING = 1.0, 20.0  # s of processor time: for a rejection, and for anything
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
 _COMMAND_LINE = re.compile(r"See `undertow[^`]*--help`")
@@ -97,7 +100,7 @@ def _rejection(
         return "message", f"an error of {len(errors[0])} characters: {errors[0][:80]}..."
     if _UNPRINTABLE.search(errors[0]):
         return "message", f"an error with characters that cannot be printed: {errors[0]!r}"
-    names = [*files, *arguments]
+    names = [printable(name)[:_NAMED] for name in (*files, *arguments)]
     if not (_PLACE.search(errors[0]) or _COMMAND_LINE.search(errors[0]) or any(n and n in errors[0] for n in names)):
         return "message", f"an error that names nothing: {errors[0]}"
     if done.left:
