@@ -13,6 +13,7 @@ from undertow.supervision.fault_tolerant_law import fault_tolerant
 from undertow.thrusters.thruster import PropellerReport
 
 DT = 0.01
+WARM = 2000  # steps, so that the covariance is known
 
 
 def monitor_of(speed_sensor=False, **options):
@@ -62,12 +63,12 @@ def changing(k):
 @pytest.mark.parametrize("share", [0.0, -1.0])
 def test_every_thruster_that_is_off_or_reversed_is_found_and_no_other(share):
     monitor = monitor_of()
-    healthy = followed(monitor, changing, lambda k, f: f, 600)
+    healthy = followed(monitor, changing, lambda k, f: f, WARM)
     assert not healthy[0].lost.any()
 
     def failed(which):
         fails = jnp.arange(8) == which
-        later = lambda k: changing(k + 600)
+        later = lambda k: changing(k + WARM)
         return followed(monitor, later, lambda k, f: jnp.where(fails, share * f, f), 50, start=healthy)[0].lost
 
     np.testing.assert_array_equal(jax.vmap(failed)(jnp.arange(8)), np.eye(8))
@@ -76,12 +77,12 @@ def test_every_thruster_that_is_off_or_reversed_is_found_and_no_other(share):
 def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
     monitor = monitor_of()
     fails = jnp.arange(8) == 2
-    state, nu = followed(monitor, changing, lambda k, f: f, 600)
+    state, nu = followed(monitor, changing, lambda k, f: f, WARM)
     state, nu = followed(monitor, changing, lambda k, f: jnp.where(fails, 0.0, f), 50, start=(state, nu))
     assert state.lost[2] == 1.0
     state, nu = followed(monitor, changing, lambda k, f: jnp.where(fails, 0.0, f), 500, start=(state, nu))
     np.testing.assert_array_equal(state.lost, fails.astype(float))
-    healthy = followed(monitor, changing, lambda k, f: f, 600)
+    healthy = followed(monitor, changing, lambda k, f: f, WARM)
     pushed, _ = followed(monitor, changing, lambda k, f: f, 200, load=jnp.zeros(6).at[2].set(1.0), start=healthy)
     assert not pushed.lost.any()
 

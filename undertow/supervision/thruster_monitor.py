@@ -89,12 +89,15 @@ class ThrusterMonitor(eqx.Module):
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
     threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
     other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=8.0)
+    learning: Float[Param, ""] = param(
+        "s", "time from the start at which both thresholds are still doubled", default=4.0
+    )
     explained: Float[Param, ""] = param("", "least share of the residual that one thruster explains", default=0.8)
     rival: Float[Param, ""] = param("", "largest share that the second best explains of that", default=0.9)
     margin: Float[Param, ""] = param("", "least squared distance to the second best, in variances", default=12.0)
     least: Float[Param, ""] = param("", "smallest force of a fault, as a share of the largest force", default=0.08)
-    likely: Float[Param, ""] = param("", "log-likelihood ratio that is a fault", default=80.0)
-    clearly: Float[Param, ""] = param("", "by which it exceeds that of the second best", default=50.0)
+    likely: Float[Param, ""] = param("", "log-likelihood ratio that is a fault", default=50.0)
+    clearly: Float[Param, ""] = param("", "by which it exceeds that of the second best", default=30.0)
     likely_rival: Float[Param, ""] = param("", "largest ratio of the second best to the best", default=0.7)
     correlation: Float[Param, ""] = param("s", "after which residuals are independent", default=0.3)
     fading: Float[Param, ""] = param("s", "time constant with which the sum fades", default=4.0)
@@ -108,7 +111,7 @@ class ThrusterMonitor(eqx.Module):
             *("likely", "likely_rival", "correlation", "fading"),
         ):
             checks.positive(name, getattr(self, name))
-        for name in ("margin", "least", "other_threshold", "clearly", "persistence", "settling", "pause"):
+        for name in ("margin", "least", "other_threshold", "learning", "clearly", "persistence", "settling", "pause"):
             checks.not_negative(name, getattr(self, name))
 
     def init(self, y: Measurement) -> MonitorState:
@@ -158,7 +161,8 @@ class ThrusterMonitor(eqx.Module):
         inverse, size = self._renewed(state, effect)
         pulled = matvec(inverse, fast)
         weighed = _Weighed(matvec(effect.T, pulled / self.unit), size, (fast * pulled).sum())
-        found, explained = self._isolated(weighed, second, used)
+        raised_by = 1 + self.learning / ((state.steps + 1) * dt)  # while the covariance is that of a short time
+        found, explained = self._isolated(weighed, second, used, raised_by)
         likelihood, likely = self._accumulated(state, weighed, second, used, dt)
         suspicious = jnp.where(state.quiet > 0, 0.0, jnp.maximum(jnp.maximum(found, likely), differs) * used)
         suspected = jnp.where(suspicious > 0, state.suspected + dt, jnp.maximum(state.suspected - dt, 0.0))
@@ -212,7 +216,7 @@ class ThrusterMonitor(eqx.Module):
 
         return jax.lax.cond(state.stale > 0, lambda: (state.inverse, state.size), renewed)
 
-    def _isolated(self, weighed: "_Weighed", forces: PerActuator, used: PerActuator):
+    def _isolated(self, weighed: "_Weighed", forces: PerActuator, used: PerActuator, raised_by: Float[Array, ""]):
         """1 for the actuator whose force explains the residual as a fault can, else 0; and J of the best."""
         along, size, total = weighed
         force, explained = along / size, along * along / size
@@ -224,7 +228,7 @@ class ThrusterMonitor(eqx.Module):
         missing = -force * jnp.sign(forces)
         nominal = jnp.abs(forces)
         off = (missing > _OFF_LEAST * nominal) & (missing < _OFF_MOST * nominal)
-        needed = jnp.where(off, self.threshold, self.other_threshold)
+        needed = raised_by * jnp.where(off, self.threshold, self.other_threshold)
         clear = (
             (best > needed**2)
             & (missing < _REVERSED * nominal)
