@@ -8,7 +8,7 @@ import pytest
 from undertow.core.status import Status
 from undertow.soak import controls, faults_soak, hours_soak
 from undertow.soak.controls import CONTROLS, run_controls
-from undertow.soak.judged_runs import Judged, judged_runs
+from undertow.soak.judged_runs import Judged, judged_groups, judged_runs
 from undertow.soak.watching import Counts
 
 AXIS = {
@@ -89,15 +89,22 @@ def test_a_control_that_does_not_fail_is_a_failure(monkeypatch):
 def test_a_long_run_is_judged_by_its_last_hour():
     squares = np.array([[3600.0], [3600.0], [3600.0 * 1.2]])
     grown = Counts(*[np.zeros(())] * 4, np.full(3, 3600.0), squares, np.array([1.0, 1.0, 1.2]))
-    one = Judged(Status.OK, 10800.0, grown._replace(steps=np.asarray(10.0)), True, 10, "", "simd")
+    one = Judged(Status.OK, "", 10800.0, grown._replace(steps=np.asarray(10.0)), True, 10, "", "simd")
     says = [failure.says for failure in hours_soak.judged_run(one, "hours/0/24/1", whole_day=True)]
     assert len(says) == 2 and "rms of the last hour 1.095 m" in says[0] and "weights grew to 1.2" in says[1]
     assert math.isclose(math.sqrt(1.2), 1.095, rel_tol=1e-3)
     assert hours_soak.judged_run(one, "hours/0/1/1", whole_day=False) == []
 
 
-def test_faulted_runs_are_counted_and_repeated():
-    """With scenarios of the caller's own, here without faults: as many runs, every twentieth once more."""
-    several = [AXIS | {"seed": seed} for seed in range(21)]
-    found = faults_soak.run_faulted(several, 1)
-    assert (found.number, found.repeated, found.endings, found.failures) == (21, 2, {"completed": 21}, [])
+def test_a_faulted_run_has_the_bytes_of_its_scenario():
+    """The numbers of faults that are written into a program are those that its scenario gives: the run says so itself."""
+    several = faults_soak.programs()
+    assert sum(len(one.kinds) for one in several) > 180
+    place = next(k for k, one in enumerate(several) if one.kinds[0].target == "bus")
+    program = several[place]
+    runs = [faults_soak.Sampled(place, program.sample(np.random.default_rng(seed)), seed) for seed in range(3)]
+    together = judged_groups([faults_soak.group(program, runs)])
+    alone = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
+    assert [one.digest for one in together] == [one.digest for one in alone]
+    assert len({one.digest for one in together}) == 3
+    assert all(one.events() == [] for one in together)

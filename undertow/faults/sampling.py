@@ -32,10 +32,11 @@ def random_faults(
     targets = targets_of(plant, navigation)
     every = list_kinds(targets.values())
     chosen = [every[int(place)] for place in rng.integers(len(every), size=number)]
-    return [_entry(rng, kind, targets[kind.target].width, duration) for kind in chosen]
+    return [random_fault(rng, kind, targets[kind.target].width, duration) for kind in chosen]
 
 
-def _entry(rng: np.random.Generator, kind: Kind, width: int, duration: float) -> dict[str, Any]:
+def random_fault(rng: np.random.Generator, kind: Kind, width: int, duration: float) -> dict[str, Any]:
+    """Entry of a random fault of one kind; `width` is the number of thrusters. As of `random_faults`."""
     thruster = kind.target in ("thruster", "input")
     target = f"{kind.target} {rng.integers(1, width + 1)}" if thruster else kind.target
     entry: dict[str, Any] = {"target": target, "mode": kind.mode}

@@ -22,6 +22,8 @@ from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
+from undertow.supervision.conditions import State
+from undertow.supervision.supervised_controller import state_in
 
 # Beyond any limit, in the unit of an input; a plant that takes it has none.
 _LARGE = 1e6
@@ -33,6 +35,7 @@ class Judged(NamedTuple):
 
     Attributes:
         status: how it ended.
+        state: of the supervisor at the end; "" without one.
         ended: s; when it failed, else the duration.
         counts: of `watching.Counts`, of this run.
         finite: whether all states are finite at the end.
@@ -42,6 +45,7 @@ class Judged(NamedTuple):
     """
 
     status: Status
+    state: str
     ended: float
     counts: Counts
     finite: bool
@@ -68,7 +72,9 @@ class Judged(NamedTuple):
         return np.sqrt(np.where(samples > 0, self.counts.squares, np.nan) / np.maximum(samples, 1))
 
 
-class _Group(NamedTuple):
+class Group(NamedTuple):
+    """Runs of one program: the first of them, their plan, precision, places among all, and the arrays of each."""
+
     first: Run
     plan: Plan
     precision: str
@@ -94,8 +100,14 @@ def judged_runs(
         BadInput: a scenario is invalid.
     """
     cache = PartCache()
-    groups = _grouped([_prepared(build(one, cache), windows) for one in scenarios])
-    found: list[Judged | None] = [None] * len(scenarios)
+    return judged_groups(_grouped([prepared(build(one, cache), windows) for one in scenarios]), watch, workers)
+
+
+def judged_groups(
+    groups: Sequence[Group], watch: Callable[[int], None] = lambda done: None, workers: int = 2
+) -> list[Judged]:
+    """The same for runs that are built already, in groups of one program each."""
+    found: list[Judged | None] = [None] * sum(len(group.members) for group in groups)
     outer = max(1, min(workers, len(groups)))
     done = 0
     with ThreadPoolExecutor(outer) as threads:
@@ -107,7 +119,7 @@ def judged_runs(
     return [one for one in found if one is not None]
 
 
-def _all_of(group: "_Group", workers: int) -> tuple["_Group", list[Judged]]:
+def _all_of(group: "Group", workers: int) -> tuple["Group", list[Judged]]:
     """All runs of a group, by so many threads."""
     count = len(group.members)
     with runtime.in_precision(group.precision), runtime.on_processor():
@@ -119,7 +131,8 @@ def _all_of(group: "_Group", workers: int) -> tuple["_Group", list[Judged]]:
 
 
 @in_its_precision
-def _prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
+def prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
+    """A run of a scenario that is watched, its plan and its precision."""
     loop, plant = built.scenario.loop, built.closed_loop.plant
     start = built.closed_loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
     most = jnp.full(plant.inputs(), _LARGE)
@@ -133,16 +146,16 @@ def _prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
     return run, plan, built.scenario.precision
 
 
-def _grouped(prepared: Sequence[tuple[Run, Plan, str]]) -> list[_Group]:
-    groups: dict[Any, _Group] = {}
+def _grouped(prepared: Sequence[tuple[Run, Plan, str]]) -> list[Group]:
+    groups: dict[Any, Group] = {}
     for number, (run, plan, precision) in enumerate(prepared):
-        group = groups.setdefault((structure(run), plan, precision), _Group(run, plan, precision, [], []))
+        group = groups.setdefault((structure(run), plan, precision), Group(run, plan, precision, [], []))
         group.members.append(number)
         group.numbers.append([np.asarray(leaf) for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)])
     return list(groups.values())
 
 
-def _program(group: _Group) -> tuple[Any, list[bool]]:
+def _program(group: Group) -> tuple[Any, list[bool]]:
     """Program of a group, and which of its numbers are equal in all runs."""
     columns = list(zip(*group.numbers, strict=True))
     shared = [len(column) > 1 and all(np.array_equal(column[0], one) for one in column[1:]) for column in columns]
@@ -152,7 +165,7 @@ def _program(group: _Group) -> tuple[Any, list[bool]]:
         return vmap_batch.BatchRunner(group.first, group.plan), shared
 
 
-def _run(group: _Group, program: Any, shared: Sequence[bool], part: np.ndarray) -> list[Judged]:
+def _run(group: Group, program: Any, shared: Sequence[bool], part: np.ndarray) -> list[Judged]:
     tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
     columns = zip(*(group.numbers[place] for place in part), strict=True)
     outcome = program.run(jax.tree.unflatten(tree, [np.stack(column) for column in columns]))
@@ -167,4 +180,6 @@ def _judged(several: Outcome, place: int, steps: int, backend: str) -> Judged:
     final = [np.asarray(leaf) for leaf in jax.tree.leaves(one.final)]
     finite = all(bool(np.isfinite(leaf).all()) for leaf in final if np.issubdtype(leaf.dtype, np.inexact))
     status = Status(int(one.status))
-    return Judged(status, float(one.ended), one.accumulated[0], finite, steps, digest, backend)
+    supervised = state_in(one.final[1])
+    state = "" if supervised is None else State(int(supervised.state)).name
+    return Judged(status, state, float(one.ended), one.accumulated[0], finite, steps, digest, backend)

@@ -88,12 +88,13 @@ def _hours(found: Mapping[str, Any]) -> Html:
 def _faults(found: Mapping[str, Any]) -> Html:
     words = (
         f"{found['number']} runs with random faults were simulated under supervision in {_time(found['seconds'])}; "
-        f"{found['repeated']} of them were repeated in other company, and must have the same bytes."
+        f"{found['repeated']} of them were built and run once more in other company, and must have the same bytes."
     )
+    states = table(("state at the end", "runs"), [(word, str(count)) for word, count in found["states"].items()], (1,))
     ended = table(("how runs ended", "runs"), [(word, str(count)) for word, count in found["endings"].items()], (1,))
     modes = sorted(found["modes"].items(), key=lambda one: (-one[1], one[0]))
     kinds = table(("target and mode", "faults"), [(mode, str(count)) for mode, count in modes], (1,))
-    return section("faults", "Faults", tag("p", words), ended, kinds)
+    return section("faults", "Faults", tag("p", words), ended, states, kinds)
 
 
 def _controls(found: Mapping[str, Any]) -> Html:

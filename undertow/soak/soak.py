@@ -160,15 +160,12 @@ def check_parts(parts: Sequence[str]) -> list[str]:
     """Parts in their order, without repetitions; all of them where none is named.
 
     Raises:
-        BadInput: an unknown part, or `faults` in a version that has none.
+        BadInput: an unknown part.
     """
     for part in parts:
         if part not in PARTS:
             raise BadInput("PART", "be a part of a soak", part, hint=did_you_mean(part, PARTS))
-    if "faults" in parts:
-        faults_soak.check_available()
-    available = [part for part in PARTS if part != "faults" or faults_soak.available()]
-    return [part for part in available if part in parts or not parts]
+    return [part for part in PARTS if part in parts or not parts]
 
 
 Described = tuple[dict[str, Any], list[Failure], list[tuple[Failure, Attack]]]
@@ -197,7 +194,7 @@ def _hours(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, sa
 
 def _faults(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
     shown = _seldom(lambda done, failed: said("faults", f"{done} of {amounts.faults}, {failed} failed"))
-    found = faults_soak.run_faulted(faults_soak.faulted_scenarios(amounts.faults, seed), seed, until, shown)
+    found = faults_soak.run_faulted(amounts.faults, seed, until, shown)
     return _plain(found._asdict()) | {"asked": amounts.faults}, found.failures, []
 
 

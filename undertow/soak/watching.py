@@ -51,7 +51,7 @@ class Watch(AbstractAccumulator):
         margin = _ROUNDING * (jnp.abs(self.least) + jnp.abs(self.largest))
         within = (acting >= self.least - margin) & (acting <= self.largest + margin)
         outputs = jnp.isfinite(signals["position"]).all() & jnp.isfinite(signals["velocity"]).all()
-        finite = jnp.isfinite(acting).all()
+        finite = jnp.isfinite(acting).all() & jnp.isfinite(signals["commanded_input"]).all()
         now = jnp.minimum(jnp.floor(t / self.length + 1e-9), self.windows - 1.0)
         here = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
         largest = jnp.abs(signals["weights_peak"]).max() if "weights_peak" in signals else jnp.zeros(())
