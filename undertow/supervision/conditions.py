@@ -187,7 +187,7 @@ CONDITIONS = (
         "tracking error in position relative to the allowed one",
         "1, of `max_position_error` and what the start and jumps of the reference add",
         0.2,
-        _NEVER,
+        10.0,
         1.0,
         "",
     ),
