@@ -116,3 +116,9 @@ def test_constants_of_parts_follow():
             turned = jax.jit(cross)(jnp.array([1.0, 0.0, 0.0]), jnp.array([0.0, 1.0, 0.0]))
             np.testing.assert_array_equal(turned, [0.0, 0.0, 1.0])
             assert str(turned.dtype) == precision
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_threads_of_a_run_compute_in_its_precision(precision):
+    with runtime.in_precision(precision), runtime.workers(2) as threads:
+        assert {str(kind) for kind in threads.map(lambda _: jnp.zeros(1).dtype, range(4))} == {precision}

@@ -5,6 +5,7 @@ Importing undertow changes no setting of JAX. A part that is made outside of a r
 """
 
 import functools
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -47,8 +48,13 @@ def double_outside_runs(function: Callable[Arguments, Result]) -> Callable[Argum
 def workers(count: int) -> ThreadPoolExecutor:
     """Threads that compute in the precision of the calling thread."""
     double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-    precision = "float64" if double else "float32"
-    return ThreadPoolExecutor(count, initializer=lambda: in_precision(precision).__enter__())
+    precision, kept = "float64" if double else "float32", threading.local()
+
+    def begin() -> None:
+        kept.context = in_precision(precision)  # which ends when nothing refers to it
+        kept.context.__enter__()
+
+    return ThreadPoolExecutor(count, initializer=begin)
 
 
 def on_processor() -> AbstractContextManager[Any]:

@@ -24,6 +24,7 @@ from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
 from undertow.supervision.conditions import State
 from undertow.supervision.supervised_controller import state_in
+from undertow.supervision.transition_log import Transition, transitions
 
 # Beyond any limit, in the unit of an input; a plant that takes it has none.
 _LARGE = 1e6
@@ -36,6 +37,7 @@ class Judged(NamedTuple):
     Attributes:
         status: how it ended.
         state: of the supervisor at the end; "" without one.
+        transitions: of the supervisor, the last ones.
         ended: s; when it failed, else the duration.
         counts: of `watching.Counts`, of this run.
         finite: whether all states are finite at the end.
@@ -46,6 +48,7 @@ class Judged(NamedTuple):
 
     status: Status
     state: str
+    transitions: tuple[Transition, ...]
     ended: float
     counts: Counts
     finite: bool
@@ -182,4 +185,5 @@ def _judged(several: Outcome, place: int, steps: int, backend: str) -> Judged:
     status = Status(int(one.status))
     supervised = state_in(one.final[1])
     state = "" if supervised is None else State(int(supervised.state)).name
-    return Judged(status, state, float(one.ended), one.accumulated[0], finite, steps, digest, backend)
+    changes = () if supervised is None else tuple(transitions(supervised.log))
+    return Judged(status, state, changes, float(one.ended), one.accumulated[0], finite, steps, digest, backend)
