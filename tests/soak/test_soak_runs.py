@@ -89,7 +89,7 @@ def test_a_control_that_does_not_fail_is_a_failure(monkeypatch):
 def test_a_long_run_is_judged_by_its_last_hour():
     squares = np.array([[3600.0], [3600.0], [3600.0 * 1.2]])
     grown = Counts(*[np.zeros(())] * 4, np.full(3, 3600.0), squares, np.array([1.0, 1.0, 1.2]))
-    one = Judged(Status.OK, "", (), 10800.0, grown._replace(steps=np.asarray(10.0)), True, 10, "", "simd")
+    one = Judged(Status.OK, "", (), 0, 10800.0, grown._replace(steps=np.asarray(10.0)), True, 10, "", "simd")
     says = [failure.says for failure in hours_soak.judged_run(one, "hours/0/24/1", whole_day=True)]
     assert len(says) == 2 and "rms of the last hour 1.095 m" in says[0] and "weights grew to 1.2" in says[1]
     assert math.isclose(math.sqrt(1.2), 1.095, rel_tol=1e-3)

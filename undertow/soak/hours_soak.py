@@ -56,7 +56,7 @@ class Hours(NamedTuple):
     Attributes:
         hours: vehicle-hours that were simulated.
         rows: of a table: name of the loop, runs, hours of each, rms of the position in the first and the last hour (m),
-            largest weight in both (m/s^2), and the completed runs.
+            largest weight in both (m/s^2), the completed runs, and the alarms of the supervisor, all of them false.
         failures: never-events, and what grew.
         memory: MB of the process before and after, at their largest.
         seconds: elapsed time.
@@ -72,7 +72,7 @@ class Hours(NamedTuple):
 def scenario(name: str, hours: float, seed: int) -> dict[str, Any]:
     """A long run of the loop of a name, with another realization for every seed."""
     loop = {"kind": "sampled", "dt": 0.01, "duration": 3600.0 * hours, "record": 1.0}
-    return SCENARIOS[name] | {"reference": _HOLD, "disturbance": _SEA, "loop": loop, "seed": seed}
+    return SCENARIOS[name] | {"supervisor": True, "reference": _HOLD, "disturbance": _SEA, "loop": loop, "seed": seed}
 
 
 def simulate_hours(
@@ -142,6 +142,7 @@ def _row(name: str, found: list[Judged], hours: float) -> dict[str, Any]:
         "runs": len(found),
         "hours": hours,
         "completed": sum(one.status is Status.OK for one in found),
+        "alarms": sum(one.alarms for one in found),
         "first_rms": mean(sizes, 0),
         "last_rms": mean(sizes, 1),
         "largest_change": float(max(abs(last / first - 1) for first, last in sizes)),

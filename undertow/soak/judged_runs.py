@@ -28,6 +28,7 @@ from undertow.supervision.transition_log import Transition, transitions
 
 # Beyond any limit, in the unit of an input; a plant that takes it has none.
 _LARGE = 1e6
+_BEGINNING = 2  # transitions to READY and to ACTIVE
 _AT_ONCE = 512  # runs of one call: the memory of their results
 
 
@@ -38,6 +39,7 @@ class Judged(NamedTuple):
         status: how it ended.
         state: of the supervisor at the end; "" without one.
         transitions: of the supervisor, the last ones.
+        alarms: transitions after those with which control begins.
         ended: s; when it failed, else the duration.
         counts: of `watching.Counts`, of this run.
         finite: whether all states are finite at the end.
@@ -49,6 +51,7 @@ class Judged(NamedTuple):
     status: Status
     state: str
     transitions: tuple[Transition, ...]
+    alarms: int
     ended: float
     counts: Counts
     finite: bool
@@ -186,4 +189,5 @@ def _judged(several: Outcome, place: int, steps: int, backend: str) -> Judged:
     supervised = state_in(one.final[1])
     state = "" if supervised is None else State(int(supervised.state)).name
     changes = () if supervised is None else tuple(transitions(supervised.log))
-    return Judged(status, state, changes, float(one.ended), one.accumulated[0], finite, steps, digest, backend)
+    alarms = 0 if supervised is None else max(0, int(supervised.log.number) - _BEGINNING)
+    return Judged(status, state, changes, alarms, float(one.ended), one.accumulated[0], finite, steps, digest, backend)

@@ -67,13 +67,25 @@ def _hours(found: Mapping[str, Any]) -> Html:
         "every control step the input and the states were checked. The first and the last hour of each run are "
         f"compared. The process had {before:.0f} MB before and at most {after:.0f} MB, compilers included."
     )
-    head = ("loop", "runs", "h each", "completed", "rms first, m", "rms last, m", "change, %", "weights first", "last")
+    head = (
+        "loop",
+        "runs",
+        "h each",
+        "completed",
+        "false alarms",
+        "rms first, m",
+        "rms last, m",
+        "change, %",
+        "weights first",
+        "last",
+    )
     rows = [
         (
             one["loop"],
             str(one["runs"]),
             f"{one['hours']:g}",
             str(one["completed"]),
+            str(one["alarms"]),
             f"{one['first_rms']:.4g}",
             f"{one['last_rms']:.4g}",
             f"{100 * one['largest_change']:.2g}",
