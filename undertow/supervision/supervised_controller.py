@@ -1,8 +1,7 @@
 """A supervised controller: gates around a controller, states with reasons, restarts, and a safe output."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +22,7 @@ from undertow.core.contracts import (
 from undertow.core.expected_measurement import all_finite
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
+from undertow.supervision.condition_values import CLOCK_FAULT, RESTART_WINDOW, ConditionValues, Occasion, View
 from undertow.supervision.conditions import (
     CONDITIONS,
     NAMES,
@@ -38,18 +38,13 @@ from undertow.supervision.conditions import (
     none_held,
 )
 from undertow.supervision.fault_tolerant_law import FaultTolerantController
-from undertow.supervision.measurement_gate import GateState, MeasurementGate, Passed
+from undertow.supervision.measurement_gate import GateState, MeasurementGate
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
 from undertow.supervision.transition_log import TransitionLog, empty_log, logged
 
-_OVERRUN = 1.5  # sampling times between two steps
-_CLOCK_FAULT = 10.0  # likewise
 _ADVANCED = 3.0  # sampling times by which a law advances at most
 _PREDICTED = 0.5  # s for which the motion is predicted at most
-_NEAR_VERTICAL = np.deg2rad(75)
-_INFEASIBLE = 0.05  # share of the desired acceleration
-_WINDOW = 600.0  # s in which restarts count
 _AVERAGED = 0.5  # s over which the variation of the input is averaged
 _BELIEVED = 0.1  # share of a jump that the estimate may add to a prediction in a step
 _LONG_AGO = -1e9  # s
@@ -95,19 +90,6 @@ class SupervisedState(NamedTuple):
     log: TransitionLog
 
 
-class _View(NamedTuple):
-    """What a step sees and decides."""
-
-    passed: Passed
-    r: Target
-    rejected: Scalar  # entries of the reference
-    controls: Bool[Array, ""]  # whether the law's command may leave
-    command: Inputs  # of the law
-    signals: dict[str, Array]  # of the law
-    output: Inputs
-    reached: Bool[Array, ""]  # whether the output is the law's command within limits
-
-
 class Supervised(AbstractGatedController):
     """A controller between gates. Where nothing is wrong its input has the bits of the controller's own.
 
@@ -119,19 +101,15 @@ class Supervised(AbstractGatedController):
     fallback: AbstractController | None
     gate: MeasurementGate
     tracking: TrackingAllowance
+    watch: ConditionValues
     model: Model
     sampling_time: Float[Param, ""] = param("s", "between two steps")
-    low: Float[Param, " m"] = param("as input", "smallest input")
-    high: Float[Param, " m"] = param("as input", "largest input")
     safe_output: Float[Param, " m"] = param("as input", "input in all states but ACTIVE and DEGRADED")
     slew: Float[Param, ""] = param("1/s", "fastest change of the input at a transfer, ranges from limit to limit")
-    max_estimate: Float[Param, " n"] = param("as estimated", "largest plausible estimate of the uncertainty")
-    max_variation: Float[Param, ""] = param("1/s", "variation of the input that counts as chattering, ranges")
     stop_after: Float[Param, ""] = param("s", "time in SAFE after which the state is STOPPED")
-    restarts: int = eqx.field(static=True, default=3)
 
     def __check_init__(self):
-        for name in ("sampling_time", "slew", "max_estimate", "max_variation", "stop_after"):
+        for name in ("sampling_time", "slew", "stop_after"):
             checks.positive(name, getattr(self, name), finite=False)
         checks.finite("safe_output", self.safe_output)
 
@@ -161,7 +139,7 @@ class Supervised(AbstractGatedController):
             output=self.safe_output,
             turning=jnp.logical_not(usable),
             variation=zero,
-            restarts=jnp.full(self.restarts + 1, _LONG_AGO),
+            restarts=jnp.full(self.watch.restarts + 1, _LONG_AGO),
             restarted=none,
             fallback_controls=jnp.asarray(False),
             request=jnp.asarray(int(Request.RUN)),
@@ -185,21 +163,22 @@ class Supervised(AbstractGatedController):
         view, nominal = self._view(z, y, r), self.sampling_time
         runs = jnp.isfinite(dt) & (dt > 0)
         elapsed = jnp.where(runs, jnp.minimum(dt, _PREDICTED), nominal)
-        step = jnp.where(runs & (dt <= _CLOCK_FAULT * nominal), jnp.minimum(dt, _ADVANCED * nominal), nominal)
+        step = jnp.where(runs & (dt <= CLOCK_FAULT * nominal), jnp.minimum(dt, _ADVANCED * nominal), nominal)
         u = jnp.where(jnp.isfinite(u_applied), u_applied, self.safe_output)
         laws = self._advanced(z, view, u, step)
         broken = ~all_finite(laws)
         allowance = self._allowance(z, view, elapsed)
         variation = self._variation(z, view, u, step)
 
-        found = self._values(z, view, u, allowance, variation) | {
-            "estimator_diverged": jnp.where(broken, jnp.inf, self._estimate_ratio(view)),
-            "overrun": jnp.where(runs, dt / nominal, 0.0),
-            "clock_fault": jnp.where(runs & (dt <= _CLOCK_FAULT * nominal), 0.0, 1.0),
-        }
-        values, limits = (
-            jnp.stack([jnp.asarray(given[name], dtype=float) for name in NAMES]) for given in (found, self._limits())
+        occasion = Occasion(
+            u=u,
+            errors=self.tracking.ratios(allowance, self.model.coordinates, view.passed.measurement, view.r),
+            variation=variation,
+            restarts=(z.time - z.restarts < RESTART_WINDOW).sum(dtype=float),
+            broken=broken,
+            elapsed=jnp.where(runs, dt / nominal, jnp.nan),
         )
+        values, limits = self.watch.values(view, occasion, self.model.coordinates), self.watch.limits()
         holds = ~(values <= limits)  # NaN is beyond every limit
         conditions = held_for(z.conditions, holds, elapsed, self._tolerated(z))
 
@@ -249,7 +228,7 @@ class Supervised(AbstractGatedController):
     def signals(self):
         return self.law.signals() | SIGNALS
 
-    def _view(self, z: SupervisedState, y: Measurement, r: Target) -> _View:
+    def _view(self, z: SupervisedState, y: Measurement, r: Target) -> View:
         controls = _controls(z.state)
         passed = self.gate.pass_through(z.gate, y, ~controls)
         r, rejected = self._checked(z.reference, r)
@@ -258,15 +237,15 @@ class Supervised(AbstractGatedController):
             command, signals = own()
         else:
             command, signals = jax.lax.cond(z.fallback_controls, lambda: self._by_fallback(z, y, r), own)
-        most = self.slew * (self.high - self.low) * self.sampling_time
-        within = jnp.clip(command, self.low, self.high)
+        most = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
+        within = jnp.clip(command, self.watch.low, self.watch.high)
         towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
         output = jnp.where(z.turning, towards(within), within)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
-        return _View(passed, r, rejected, controls, command, signals, output, (output == within).all())
+        return View(passed, r, rejected, controls, command, signals, output, (output == within).all())
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
         """Command of the fallback; of the signals those that it declares, too, the others are zero."""
@@ -288,7 +267,7 @@ class Supervised(AbstractGatedController):
         held = (before.position, jnp.zeros_like(before.velocity), jnp.zeros_like(before.acceleration))
         return Target(*(jnp.where(wrong > 0, kept, new) for kept, new in zip(held, r, strict=True))), wrong
 
-    def _advanced(self, z: SupervisedState, view: _View, u: Inputs, step: Scalar) -> tuple[PyTree, PyTree]:
+    def _advanced(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> tuple[PyTree, PyTree]:
         """States of law and fallback one step later; only the one that controls advances."""
         y, r = view.passed.measurement, view.r
         by_law = lambda: (self.law.advance(z.law, y, r, u, step), z.fallback)
@@ -297,7 +276,7 @@ class Supervised(AbstractGatedController):
         by_fallback = lambda: (z.law, fallback.advance(z.fallback, y, r, u, step))
         return jax.lax.cond(z.fallback_controls, by_fallback, by_law)
 
-    def _continued(self, z: SupervisedState, view: _View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
+    def _continued(self, z: SupervisedState, view: View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
         """States of law and fallback: begun again from the present measurement, advanced, or held."""
         y, r = view.passed.measurement, view.r
 
@@ -320,73 +299,18 @@ class Supervised(AbstractGatedController):
         own = self.fallback.knowledge(z.fallback)
         return jax.tree.map(lambda a, b: jnp.where(z.fallback_controls, a, b), own, known)
 
-    def _allowance(self, z: SupervisedState, view: _View, elapsed: Scalar) -> AllowanceState:
+    def _allowance(self, z: SupervisedState, view: View, elapsed: Scalar) -> AllowanceState:
         """Allowed tracking error; where nobody controls, it is the present one."""
         coordinates = self.model.coordinates
         here = self.tracking.start(coordinates, view.passed.measurement, view.r)
         later = self.tracking.after(z.allowance, coordinates, z.reference, view.r, elapsed)
         return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, here, strict=True)))
 
-    def _variation(self, z: SupervisedState, view: _View, u: Inputs, step: Scalar) -> Scalar:
+    def _variation(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> Scalar:
         """Average variation of the input, ranges from limit to limit per second."""
-        now = (jnp.abs(u - z.output) / (self.high - self.low)).mean() / step
+        now = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
         return jnp.where(view.controls & ~z.turning, z.variation + share * (now - z.variation), 0.0)
-
-    def _estimate_ratio(self, view: _View) -> Scalar:
-        """Estimated uncertainty relative to the largest plausible one."""
-        if "estimate" not in view.signals:
-            return jnp.zeros(())
-        ratio = (jnp.abs(view.signals["estimate"]) / self.max_estimate).max()
-        return jnp.where(view.controls, ratio, 0.0)
-
-    def _values(
-        self, z: SupervisedState, view: _View, u: Inputs, allowance: AllowanceState, variation: Scalar
-    ) -> dict[str, Scalar]:
-        """Values of the conditions that do not depend on the clock."""
-        passed, signals = view.passed, view.signals
-        position, angle = self.tracking.ratios(allowance, self.model.coordinates, passed.measurement, view.r)
-        # An actuator of one direction rests at its limit of zero.
-        at_limit = ((u <= self.low) & (self.low < 0)) | ((u >= self.high) & (self.high > 0))
-        controlled = {
-            "output_not_finite": (~jnp.isfinite(view.command)).sum(dtype=float),
-            "saturated": at_limit.sum(dtype=float),
-            "chattering": variation,
-            "reference_infeasible": 1 - signals.get("attained_share", jnp.ones(())),
-            "position_error": position,
-            "attitude_error": angle,
-        }
-        found = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
-        euler = passed.measurement.body is not None and not self.model.coordinates.axes
-        pitch = jnp.abs(passed.measurement.position[4]) if euler else jnp.zeros(())
-        lost = lambda name: jnp.asarray(signals.get(name, jnp.zeros(1)), dtype=float).sum()
-        return found | {
-            "measurement_not_finite": passed.not_finite,
-            "measurement_implausible": passed.implausible,
-            "measurement_jump": passed.jump,
-            "measurement_stuck": passed.missing,
-            "reference_rejected": view.rejected,
-            "restarts_exhausted": (z.time - z.restarts < _WINDOW).sum(dtype=float),
-            "thruster_lost": lost("lost_thrusters"),
-            "axes_lost": lost("lost_axes"),
-            "near_vertical": pitch,
-        }
-
-    def _limits(self) -> dict[str, Any]:
-        """Limits of the conditions."""
-        counted = ("measurement_not_finite", "reference_rejected", "output_not_finite", "saturated")
-        zero = dict.fromkeys((*counted, "thruster_lost", "axes_lost", "clock_fault"), 0.0)
-        return (
-            dict.fromkeys(NAMES, 1.0)
-            | zero
-            | {
-                "restarts_exhausted": float(self.restarts),
-                "chattering": self.max_variation,
-                "reference_infeasible": _INFEASIBLE,
-                "near_vertical": _NEAR_VERTICAL,
-                "overrun": _OVERRUN,
-            }
-        )
 
     def _tolerated(self, z: SupervisedState) -> Bool[Array, " conditions"]:
         """Conditions that do not lead to SAFE now: the law has failed, but there is a fallback."""
@@ -402,7 +326,7 @@ class Supervised(AbstractGatedController):
         asked = lambda request: z.request == int(request)
         return (fails | asked(Request.FALLBACK)) & ~asked(Request.LAW)
 
-    def _next(self, z: SupervisedState, view: _View, asked, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
+    def _next(self, z: SupervisedState, view: View, asked, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
         """State and reason of the next step, from what the conditions and the operator ask for."""
         code = lambda state: jnp.asarray(int(state))
         usable = (view.passed.not_finite == 0) & (view.passed.implausible <= 1)
@@ -417,7 +341,7 @@ class Supervised(AbstractGatedController):
         stopped = z.state == int(State.STOPPED)
         return jnp.where(stopped, z.state, state), jnp.where(stopped, z.reason, reason)
 
-    def _rate(self, z: SupervisedState, view: _View, u: Inputs) -> Array:
+    def _rate(self, z: SupervisedState, view: View, u: Inputs) -> Array:
         """Rate of the velocity by the model and the law's estimate of the uncertainty, m/s^2 and rad/s^2."""
         y = view.passed.measurement
         known = known_acceleration(self.law, z.law, y, u)
@@ -425,7 +349,7 @@ class Supervised(AbstractGatedController):
         if "estimate" in view.signals:
             # One that has diverged would make a jump of every reading.
             most = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
-            most = jnp.minimum(most, self.max_estimate)
+            most = jnp.minimum(most, self.watch.max_estimate)
             acceleration = known + jnp.clip(view.signals["estimate"], -most, most)
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 

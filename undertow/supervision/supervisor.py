@@ -10,6 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import force_of
 from undertow.core.contracts import AbstractController, AbstractPlant, Inputs, Measurement, Model, Outputs
 from undertow.core.errors import BadInput
+from undertow.supervision.condition_values import ConditionValues
 from undertow.supervision.fault_tolerant_law import fault_tolerant
 from undertow.supervision.measurement_gate import MeasurementGate
 from undertow.supervision.stuck_readings import StuckReadings
@@ -107,21 +108,19 @@ def supervisor(
     if thruster_faults and vehicle:
         law = fault_tolerant(law, sampling_time, (low, high))
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
+    estimate = _plausible_estimate(law.model, start, (low, high)) if max_estimate is None else max_estimate
+    least, largest = jnp.maximum(low, -_BEYOND), jnp.minimum(high, _BEYOND)
     return Supervised(
         law=law,
         fallback=fallback,
         gate=gate,
         tracking=TrackingAllowance(max_position_error, max_angle_error, _DECAY),
+        watch=ConditionValues(least, largest, estimate, max_variation, restarts),
         model=law.model,
         sampling_time=sampling_time,
-        low=jnp.maximum(low, -_BEYOND),
-        high=jnp.minimum(high, _BEYOND),
         safe_output=jnp.broadcast_to(jnp.asarray(safe_output, dtype=float), (count,)),
         slew=slew,
-        max_estimate=_plausible_estimate(law.model, start, (low, high)) if max_estimate is None else max_estimate,
-        max_variation=max_variation,
         stop_after=stop_after,
-        restarts=restarts,
     )
 
 
