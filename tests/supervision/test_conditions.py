@@ -17,7 +17,7 @@ from undertow.core.measurement import with_outputs
 from undertow.core.signals import Signal
 from undertow.loop.sampled import moved
 from undertow.numerics.integrators import METHODS
-from undertow.supervision.conditions import CONDITIONS, HEAD, NAMES, State, code_of, reason_of
+from undertow.supervision.conditions import CONDITIONS, HEAD, NAMES, State, code_of, reason_of, state_of
 from undertow.supervision.supervisor import supervisor
 from undertow.supervision.transition_log import transitions
 
@@ -220,6 +220,26 @@ def test_the_table_of_the_documentation_has_a_line_for_each_condition():
     assert lines[NAMES.index("saturated")][3:6] == ("1 s", "never", "1 s")
 
 
-@pytest.mark.parametrize("reason", ["", *NAMES, "operator"])
+@pytest.mark.parametrize("reason", ["", *NAMES, "operator", "memory_damaged"])
 def test_codes_of_reasons(reason):
     assert reason_of(code_of(reason)) == reason
+
+
+def test_codes_of_a_damaged_memory():
+    assert (reason_of(1234), reason_of(-7), state_of(99)) == ("", "", State.INIT)
+
+
+@pytest.mark.parametrize(
+    "field", ["time", "output", "variation", "restarts", "cause", "safe_for", "gate", "conditions", "law"]
+)
+def test_damage_to_the_memory_never_leaves_and_is_mended(field):
+    run = stepped()
+    run.restart()
+    run.steps(0.2)
+    spoilt = jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan) if leaf.dtype == float else leaf, run.z)
+    run.z = run.z._replace(**{field: getattr(spoilt, field)})
+    run.steps(0.2)
+    assert np.isfinite(run.outputs).all()
+    assert run.states[-1] == (State.ACTIVE, "")
+    assert "memory_damaged" in {one.reason for one in transitions(run.z.log)}
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(run.z))

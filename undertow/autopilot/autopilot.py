@@ -27,7 +27,7 @@ from undertow.loop.stepped import put
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
-from undertow.supervision.conditions import Request, State, reason_of
+from undertow.supervision.conditions import Request, reason_of, state_of
 from undertow.supervision.supervised_controller import SupervisedState, state_in
 from undertow.supervision.transition_log import Transition, transitions
 
@@ -314,7 +314,7 @@ class Autopilot:
         """
         self._check_started("state")
         z = self._supervised("state")
-        return State(int(z.state)).name, reason_of(int(z.reason))
+        return state_of(int(z.state)).name, reason_of(int(z.reason))
 
     def transitions(self) -> Sequence[Transition]:
         """The last transitions of the supervisor, oldest first.

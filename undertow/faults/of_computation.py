@@ -100,14 +100,6 @@ class Computed(_AbstractComputed):
     faults: tuple[ComputationFault, ...]
 
 
-class ComputedGated(_AbstractComputed, AbstractGatedController):
-    """The same of a controller that gets readings which are not finite."""
-
-    model: Model
-    law: AbstractController
-    faults: tuple[ComputationFault, ...]
-
-
 class ComputedInformed(_AbstractComputed, AbstractInformedController):
     """The same of a law that models more of the acceleration."""
 
@@ -119,8 +111,8 @@ class ComputedInformed(_AbstractComputed, AbstractInformedController):
         return known_acceleration(self.law, z.law, y, u_applied)
 
 
-class ComputedGatedInformed(_AbstractComputed, AbstractGatedController, AbstractInformedController):
-    """The same of a controller that is both."""
+class ComputedGated(_AbstractComputed, AbstractGatedController):
+    """The same of a controller that gets readings which are not finite."""
 
     model: Model
     law: AbstractController
@@ -134,14 +126,10 @@ def computed(law: AbstractController, faults: tuple[ComputationFault, ...]) -> A
     """The controller on a computer with these faults, which act in their order; itself without any."""
     if not faults:
         return law
-    gated, informed = isinstance(law, AbstractGatedController), isinstance(law, AbstractInformedController)
-    kinds = {
-        (False, False): Computed,
-        (True, False): ComputedGated,
-        (False, True): ComputedInformed,
-        (True, True): ComputedGatedInformed,
-    }
-    return kinds[gated, informed](law.model, law, faults)
+    if isinstance(law, AbstractGatedController):
+        return ComputedGated(law.model, law, faults)
+    kind = ComputedInformed if isinstance(law, AbstractInformedController) else Computed
+    return kind(law.model, law, faults)
 
 
 def law_of_computed(controller: AbstractController) -> AbstractController:

@@ -22,7 +22,7 @@ from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
-from undertow.supervision.conditions import State
+from undertow.supervision.conditions import state_of
 from undertow.supervision.supervised_controller import state_in
 from undertow.supervision.transition_log import Transition, transitions
 
@@ -187,7 +187,7 @@ def _judged(several: Outcome, place: int, steps: int, backend: str) -> Judged:
     finite = all(bool(np.isfinite(leaf).all()) for leaf in final if np.issubdtype(leaf.dtype, np.inexact))
     status = Status(int(one.status))
     supervised = state_in(one.final[1])
-    state = "" if supervised is None else State(int(supervised.state)).name
+    state = "" if supervised is None else state_of(int(supervised.state)).name
     changes = () if supervised is None else tuple(transitions(supervised.log))
     alarms = 0 if supervised is None else max(0, int(supervised.log.number) - _BEGINNING)
     return Judged(status, state, changes, alarms, float(one.ended), one.accumulated[0], finite, steps, digest, backend)

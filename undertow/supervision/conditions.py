@@ -218,12 +218,18 @@ NAMES = tuple(condition.name for condition in CONDITIONS)
 NUMBER = {name: k for k, name in enumerate(NAMES)}
 
 OPERATOR = "operator"  # the reason of a state that was asked for
-_REASONS = ("", *NAMES, OPERATOR)
+MEMORY = "memory_damaged"  # the reason of a start in the middle of a run: a number of the supervisor was not finite
+_REASONS = ("", *NAMES, OPERATOR, MEMORY)
+
+
+def state_of(code: int) -> State:
+    """State of a code; INIT, in which nobody controls, for one of a damaged memory."""
+    return State(code) if code in set(State) else State.INIT
 
 
 def reason_of(code: int) -> str:
-    """Reason of a code as it is recorded: "" for none."""
-    return _REASONS[int(code)]
+    """Reason of a code as it is recorded: "" for none. Codes of a damaged memory have no reason."""
+    return dict(enumerate(_REASONS)).get(int(code), "")
 
 
 def code_of(reason: str) -> int:

@@ -25,6 +25,7 @@ from undertow.core.signals import Signal
 from undertow.supervision.condition_values import CLOCK_FAULT, RESTART_WINDOW, ConditionValues, Occasion, View
 from undertow.supervision.conditions import (
     CONDITIONS,
+    MEMORY,
     NAMES,
     NUMBER,
     OPERATOR,
@@ -78,6 +79,7 @@ class SupervisedState(NamedTuple):
     state: Int[Array, ""]
     reason: Int[Array, ""]
     cause: Float[Array, "2"]  # value and limit of the reason
+    exceeding: PerCondition  # last value of each condition beyond its limit
     time: Float[Array, ""]  # s since the start
     safe_for: Float[Array, ""]  # s in SAFE
     output: Inputs  # applied last
@@ -116,34 +118,43 @@ class Supervised(AbstractGatedController):
     def init(self, y: Measurement, r: Target) -> SupervisedState:
         gate = self.gate.init(y)
         passed = self.gate.pass_through(gate, y, jnp.asarray(True))
-        target, _ = self._checked(Target(jnp.zeros_like(r.position), *map(jnp.zeros_like, r[1:])), r)
+        target, _ = self._checked(Target(*map(jnp.zeros_like, r)), r)
         usable = (passed.not_finite == 0) & (passed.implausible <= 1)
-        state = jnp.where(usable, int(State.ACTIVE), int(State.INIT)).astype(int)
-        zero, none = jnp.zeros(()), jnp.zeros((), dtype=int)
-        log = empty_log()
+        known = passed.measurement
+        law, fallback = self.law.init(known, target), () if self.fallback is None else self.fallback.init(known, target)
+        new = self._fresh(law, fallback, gate, self.tracking.start(self.model.coordinates, known, target), target)
+        log, zero, none = new.log, jnp.zeros(()), jnp.zeros((), dtype=int)
         for entered in (State.READY, State.ACTIVE):
             log = logged(log, usable, (zero, jnp.asarray(int(entered)), none, zero, zero))
-        known = passed.measurement
+        state = jnp.where(usable, int(State.ACTIVE), int(State.INIT)).astype(int)
+        return new._replace(state=state, turning=jnp.logical_not(usable), log=log)
+
+    def _fresh(
+        self, law: PyTree, fallback: PyTree, gate: GateState, allowance: AllowanceState, r: Target
+    ) -> SupervisedState:
+        """A state in which nothing has happened yet, in INIT."""
+        zero, none = jnp.zeros(()), jnp.zeros((), dtype=int)
         return SupervisedState(
-            law=self.law.init(known, target),
-            fallback=() if self.fallback is None else self.fallback.init(known, target),
+            law=law,
+            fallback=fallback,
             gate=gate,
-            reference=target,
-            allowance=self.tracking.start(self.model.coordinates, known, target),
+            reference=r,
+            allowance=allowance,
             conditions=none_held(),
-            state=state,
+            state=jnp.asarray(int(State.INIT)),
             reason=none,
             cause=jnp.zeros(2),
+            exceeding=jnp.zeros(len(NAMES)),
             time=zero,
             safe_for=zero,
             output=self.safe_output,
-            turning=jnp.logical_not(usable),
+            turning=jnp.asarray(True),
             variation=zero,
             restarts=jnp.full(self.watch.restarts + 1, _LONG_AGO),
             restarted=none,
             fallback_controls=jnp.asarray(False),
             request=jnp.asarray(int(Request.RUN)),
-            log=log,
+            log=empty_log(),
         )
 
     def command(self, z: SupervisedState, y: Measurement, r: Target):
@@ -191,16 +202,19 @@ class Supervised(AbstractGatedController):
         )
         by_fallback = self._by_whom(z, conditions)
         switches = by_fallback != z.fallback_controls
-        again = begins | diverged | switches
+        damaged = ~all_finite(z)
+        again = begins | diverged | switches | damaged
         counted = (begins & (z.state == int(State.SAFE))) | diverged
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
         # What has begun again gets its time before it is judged.
         judged_anew = jnp.arange(len(NAMES)) == wrong
         conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
         time, changed = z.time + elapsed, (state != z.state) | (reason != z.reason)
-        cause = jnp.where(changed, _cause(values, limits, reason), z.cause)
+        # A condition may be named after it has held: its value is the last one beyond the limit.
+        exceeding = jnp.where(holds, jnp.where(jnp.isfinite(values), values, _BIG), z.exceeding)
+        cause = jnp.where(changed, _cause(exceeding, limits, reason), z.cause)
         law, fallback = self._continued(z, view, laws, again, broken)
-        return SupervisedState(
+        after = SupervisedState(
             law=law,
             fallback=fallback,
             gate=self.gate.after(view.passed, self._rate(z, view, u), elapsed),
@@ -210,6 +224,7 @@ class Supervised(AbstractGatedController):
             state=state,
             reason=reason,
             cause=cause,
+            exceeding=exceeding,
             time=time,
             safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
             output=u,
@@ -221,6 +236,15 @@ class Supervised(AbstractGatedController):
             request=z.request,
             log=logged(z.log, changed, (time, state, reason, cause[0], cause[1])),
         )
+        return jax.lax.cond(damaged, lambda: self._mended(after, z, y), lambda: after)
+
+    def _mended(self, after: SupervisedState, z: SupervisedState, y: Measurement) -> SupervisedState:
+        """The state after damage to the memory: as at the start, with what can still be read of the old log."""
+        none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
+        new = self._fresh(after.law, after.fallback, self.gate.init(y), none, _readable(after.reference))
+        time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
+        entry = (time, new.state, jnp.asarray(code_of(MEMORY)), *new.cause)
+        return new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
 
     def known_acceleration(self, z: SupervisedState, y: Measurement, u_applied: Inputs) -> Outputs:
         return known_acceleration(self.law, z.law, y, u_applied)
@@ -245,6 +269,7 @@ class Supervised(AbstractGatedController):
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
+        output = jnp.where(jnp.isfinite(output), output, self.safe_output)  # whatever the memory holds
         return View(passed, r, rejected, controls, command, signals, output, (output == within).all())
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
@@ -293,10 +318,10 @@ class Supervised(AbstractGatedController):
         """What law and fallback know and must not lose: of the one that controls; () where they know nothing."""
         if not isinstance(self.law, AbstractRestartable):
             return ()
-        known = self.law.knowledge(z.law)
+        known = _readable(self.law.knowledge(z.law))
         if not isinstance(self.fallback, AbstractRestartable):
             return known
-        own = self.fallback.knowledge(z.fallback)
+        own = _readable(self.fallback.knowledge(z.fallback))
         return jax.tree.map(lambda a, b: jnp.where(z.fallback_controls, a, b), own, known)
 
     def _allowance(self, z: SupervisedState, view: View, elapsed: Scalar) -> AllowanceState:
@@ -332,6 +357,8 @@ class Supervised(AbstractGatedController):
         usable = (view.passed.not_finite == 0) & (view.passed.implausible <= 1)
         ready = jnp.where(asked == int(State.SAFE), code(State.READY), asked)
         state = jnp.where(z.state == int(State.READY), ready, asked)
+        unknown = (z.state < int(State.INIT)) | (z.state > int(State.STOPPED))
+        state = jnp.where(unknown, code(State.INIT), state)
         state = jnp.where(z.state == int(State.INIT), jnp.where(usable, code(State.READY), code(State.INIT)), state)
         state = jnp.where(z.safe_for > self.stop_after, code(State.STOPPED), state)
         hold = (z.request == int(Request.HOLD)) & (state != int(State.INIT)) & (state != int(State.STOPPED))
@@ -354,6 +381,11 @@ class Supervised(AbstractGatedController):
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 
 
+def _readable(tree: PyTree) -> PyTree:
+    """A tree with zeros for what is not finite."""
+    return jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, jnp.zeros_like(leaf)), tree)
+
+
 def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
     """Whether the command of a law leaves in this state."""
     return (state == int(State.ACTIVE)) | (state == int(State.DEGRADED))
@@ -367,9 +399,7 @@ def _begun(law: AbstractController, knowledge: PyTree, y: Measurement, r: Target
 def _cause(values: PerCondition, limits: PerCondition, reason: Int[Array, ""]) -> Float[Array, "2"]:
     """Value and limit of the condition that is the reason."""
     row = jnp.arange(len(NAMES)) == reason - 1
-    return jnp.stack(
-        [jnp.where(row, numbers, 0.0).sum() for numbers in (jnp.where(jnp.isfinite(values), values, _BIG), limits)]
-    )
+    return jnp.stack([jnp.where(row, numbers, 0.0).sum() for numbers in (values, limits)])
 
 
 def unsupervised(controller: AbstractController) -> AbstractController:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from undertow.supervision.conditions import NAMES, State, reason_of
+from undertow.supervision.conditions import NAMES, State, reason_of, state_of
 
 KEPT = 16  # the last ones
 
@@ -63,4 +63,4 @@ def transitions(log: Any) -> Sequence[Transition]:
     count, *columns = jax.tree.map(np.asarray, tuple(log))
     slots = [k % KEPT for k in range(max(0, int(count) - KEPT), int(count))]
     rows = ([column[slot] for column in columns] for slot in slots)
-    return [Transition(float(t), State(int(s)), reason_of(c), float(v), float(limit)) for t, s, c, v, limit in rows]
+    return [Transition(float(t), state_of(int(s)), reason_of(c), float(v), float(limit)) for t, s, c, v, limit in rows]
