@@ -51,7 +51,7 @@ def sealed(body):
         ("foreign", lambda data: sealed(data[:5] + b"\2" + data[6:-4])),
         ("foreign", lambda data: sealed(data[:6] + b"\4" + data[7:-4])),
         ("foreign", lambda data: sealed(data[:7] + b"\6" + data[8:-4])),
-        ("invalid", lambda data: sealed(data[:28] + struct.pack("<d", np.nan) + data[36:-4])),
+        ("invalid", lambda data: sealed(data[:28] + struct.pack("<d", np.inf) + data[36:-4])),
         ("invalid", lambda data: sealed(data[:28] + struct.pack("<d", -np.inf) + data[36:-4])),
         ("invalid", lambda data: sealed(data[:28] + struct.pack("<d", 1e300) + data[36:-4])),
         ("invalid", lambda data: sealed(data[:52] + struct.pack("<d", 0.0) + data[60:-4])),  # w of the quaternion

@@ -38,6 +38,7 @@ class Tampering(NamedTuple):
     thrusters: float = 0.0  # that it says to be lost
     axes: float = 0.0
     target: np.ndarray = np.zeros(6)  # added to the target
+    report: float = 0.0  # added to the reported speeds of the propellers
     dt: float = T  # that the controller is told
 
 
@@ -47,7 +48,7 @@ UNTOUCHED = Tampering()
 def _of_law(how: Tampering) -> Tampering:
     """What the state of the law holds: only finite numbers."""
     zero = jnp.zeros(6)
-    return how._replace(add_position=zero, add_velocity=zero, target=zero)
+    return how._replace(add_position=zero, add_velocity=zero, target=zero, report=jnp.zeros(()))
 
 
 class Tampered(AbstractInformedController):
@@ -82,8 +83,10 @@ class Tampered(AbstractInformedController):
 class Stepped:
     """A supervised law that watches a vehicle which another law moves; what it is told can be tampered with."""
 
-    def __init__(self, euler: bool = False, **options):
-        self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200())
+    def __init__(self, name: str = "", **options):
+        euler, reporting = name == "near_vertical", name == "report_lost"
+        thruster = ut.thrusters.paper_table3(fidelity="shaft") if reporting else ut.thrusters.t200()
+        self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
         self.mover = ut.controllers.pid(self.plant.model(), sampling_time=T)
         law = ut.controllers.pid(self.plant.model(), sampling_time=T)
         made = supervisor(Tampered(law, law.model), self.plant, sampling_time=T, thruster_faults=False, **options)
@@ -127,6 +130,7 @@ def _step(parts, t, now, how):
         truth, truth.position * how.scale_position + how.add_position, truth.velocity + how.add_velocity
     )
     y = jax.tree.map(lambda kept, new: jnp.where(how.hold > 0, kept, new), first, read)
+    y = y._replace(actuator=jax.tree.map(lambda speed: speed + how.report, y.actuator))
     z = z._replace(law=(z.law[0], _of_law(how)))
     output, _ = supervised.command(z, y, r)
     z = supervised.advance(z, y, r, plant.admissible(x, output), how.dt)
@@ -147,6 +151,7 @@ CAUSES = {
     "measurement_implausible": Tampering(add_velocity=_only(2, 40.0)),
     "measurement_jump": Tampering(add_position=_only(0, 5.0)),
     "measurement_stuck": Tampering(hold=1.0),
+    "report_lost": Tampering(report=np.nan),
     "reference_rejected": Tampering(target=_only(3, np.inf)),
     "output_not_finite": Tampering(spoil=1.0),
     "estimator_diverged": Tampering(estimate=1e3),
@@ -168,8 +173,8 @@ BUILT_UP |= {"near_vertical": 0.6, "restarts_exhausted": 1.0}
 
 
 @functools.cache
-def stepped(euler: bool = False) -> Stepped:
-    return Stepped(euler)
+def stepped(name: str = "") -> Stepped:
+    return Stepped(name)
 
 
 def test_every_line_of_the_table_has_a_cause():
@@ -178,7 +183,7 @@ def test_every_line_of_the_table_has_a_cause():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_condition_leads_to_its_state_in_its_time(name):
-    line, run = CONDITIONS[NAMES.index(name)], stepped(name == "near_vertical")
+    line, run = CONDITIONS[NAMES.index(name)], stepped(name if name in ("near_vertical", "report_lost") else "")
     run.restart()
     run.steps(0.2)
     assert set(run.states) == {(State.ACTIVE, "")}

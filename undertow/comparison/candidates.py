@@ -75,8 +75,9 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candi
     different = [key for key in keys if any(each.get(key) != whole[0].get(key) for each in whole)]
     alike = [path.stem for path in paths]
     names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
+    # A scenario may be without metrics of its own, faults and a supervisor.
     found = [
-        Candidate(name, {key: each.get(key, []) for key in different}, path)  # `metrics` alone may be missing
+        Candidate(name, {key: each.get(key, None if key == "supervisor" else []) for key in different}, path)
         for name, each, path in zip(names, whole, paths, strict=True)
     ]
     return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(found), _differing(texts)

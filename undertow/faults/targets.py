@@ -76,6 +76,8 @@ def targets_of(plant: AbstractPlant, navigation: AbstractNavigation) -> dict[str
     ]
     if isinstance(navigation, SensorNavigation):
         names = [_name_of(sensor) for sensor in navigation.filter.sensors]
+        if "propeller_speed" not in names:  # then the controller gets none
+            found = [one for one in found if one.name != "propeller_speed"]
         for name in dict.fromkeys(names):
             places = tuple(place for place, other in enumerate(names) if other == name)
             sensor = navigation.filter.sensors[places[0]]

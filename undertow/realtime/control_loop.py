@@ -104,7 +104,7 @@ class RealTimeLoop:
         return LinkMeasurement(unknown(names.position), unknown(names.velocity), unknown(names.attitude))
 
     def run(self, steps: float = math.inf) -> Reason:
-        """Take steps until their number is reached, the link ends or is silent for too long, or `stop` says so.
+        """Take steps until so many periods are over, the link ends or is silent for too long, or `stop` says so.
 
         Whatever happens, the last thing sent is the safe output.
         """
@@ -133,7 +133,7 @@ class RealTimeLoop:
             seen.longest_stale = max(seen.longest_stale, waited)
             if seen.steps > 1 and started - last < 1.5 * period:
                 seen.jitter.add(abs(started - last - period))
-            if seen.steps >= steps:
+            if planned + 1 >= steps:
                 return Reason.COMPLETED
 
             planned, last = following, started

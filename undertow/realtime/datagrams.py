@@ -82,8 +82,8 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
     """A datagram of a kind from its bytes, whatever they are.
 
     Raises:
-        Refused: wrong size; damaged; foreign (another format, version or kind); invalid (a number that is not finite,
-            far beyond any vehicle, or a quaternion that is none).
+        Refused: wrong size; damaged; foreign (another format, version or kind); invalid (a number that is infinite or
+            far beyond any vehicle, NaN in anything but a measurement, or a quaternion that is none).
     """
     if len(data) != size_of(kind, actuators):
         raise Refused("wrong size")
@@ -94,9 +94,10 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
     if (magic, version, found, count) != (_MAGIC, _VERSION, kind, actuators) or flags not in (0, FLAG):
         raise Refused("foreign")
     values = np.frombuffer(whole, dtype="<f8", offset=_HEADER.size).astype(float)
-    if not (np.abs(values) < _LARGEST).all():  # false for NaN, too
+    unknown = np.isnan(values) & (kind == MEASUREMENT)  # what was not measured
+    if not (unknown | (np.abs(values) < _LARGEST)).all():
         raise Refused("invalid")
-    if kind == MEASUREMENT and abs((values[3:7] ** 2).sum() - 1) > _UNIT:
+    if kind == MEASUREMENT and abs((values[3:7] ** 2).sum() - 1) > _UNIT:  # false for NaN
         raise Refused("invalid")
     return Datagram(kind, bool(flags), session, sequence, time, answered, values)
 

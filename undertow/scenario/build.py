@@ -97,6 +97,11 @@ class Built(NamedTuple):
                 if entry["target"].endswith("propeller_speed"):
                     says = f"`faults[{place}]` has no effect: the controller does not use measured propeller speeds"
                     yield advice(f"faults[{place}]", says, hint="Write `model: {speed_sensor: true}`")
+        for place, entry in enumerate(self.resolved.get("faults", ())):
+            first = min(entry["onset"]) if isinstance(entry["onset"], list) else entry["onset"]
+            if first >= end:
+                says = f"the fault begins at {first:g} s, and the run ends at {end:g} s: it has no effect"
+                yield advice(f"faults[{place}].onset", says)
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
 
     def of_the_law(self) -> "Built":
@@ -190,6 +195,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         if "fallback" in options:
             given = options.pop("fallback")
             given = {"kind": given} if isinstance(given, str) else given
+        if "fallback" in part.model_dump() and given not in (None, {"kind": "none"}):
             if not (isinstance(given, Mapping) and isinstance(given.get("kind"), str)):
                 raise BadInput("supervisor.fallback", "be a controller by name, or a mapping with `kind`", given)
             fallback, found = one("controller", "supervisor.fallback", Part(**given), (model,))

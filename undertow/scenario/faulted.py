@@ -24,6 +24,13 @@ from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario import factory
 from undertow.scenario.schema import Fault
 
+# Words for keys of a fault that other programs use.
+_OTHER_WORDS = dict.fromkeys(("start", "start_time", "begin", "time", "from", "t"), "onset")
+_OTHER_WORDS |= dict.fromkeys(("kind", "type", "fault"), "mode") | dict.fromkeys(
+    ("size", "value", "amount"), "severity"
+)
+_OTHER_WORDS |= dict.fromkeys(("length", "lasts"), "duration") | {"where": "target", "thruster": "number"}
+
 
 def faulted(
     loop: ClosedLoop,
@@ -93,7 +100,8 @@ def _made(entry: Fault, folder: Path, sampling_time: float) -> tuple[AbstractFau
     own = [name for name in inspect.signature(function).parameters if name not in context]
     for key in options:
         if key not in own:
-            hint = known_key(str(key), [*type(entry).model_fields, *own])
+            other = _OTHER_WORDS.get(str(key).lower())
+            hint = f"Did you mean `{other}`?" if other else known_key(str(key), [*type(entry).model_fields, *own])
             raise BadInput(str(key), f"be a key of a fault, or an option of `{entry.mode}`", "unknown", hint=hint)
     with within(written=lambda key: "mode" if key == "kind" else key):
         fault, described = factory.make("faults", {"kind": entry.mode, **options}, folder, (), context)

@@ -21,11 +21,18 @@ def _named(default: str | None = None) -> BeforeValidator:
     def complete(value: Any) -> Any:
         if isinstance(value, str):
             return {"kind": value}
-        if default and value is True:
-            return {"kind": default}
         return {"kind": default, **value} if default and isinstance(value, dict) else value
 
     return BeforeValidator(complete)
+
+
+_YES, _NO = ("true", "yes", "on"), ("false", "no", "off", "none")
+
+
+def _switched(value: Any) -> Any:
+    """The supervisor with its defaults for true, none for false; YAML 1.2 reads `yes` and `on` as words."""
+    word = str(value).lower() if isinstance(value, bool | str) else ""
+    return {"kind": "supervisor"} if word in _YES else None if word in _NO else value
 
 
 class Part(BaseModel):
@@ -198,7 +205,7 @@ class Scenario(Strict):
     navigation: NamedPart = Field(
         Part(kind="perfect"), description="the navigation filter, which computes the measurement of the controller"
     )
-    supervisor: Annotated[Part, _named("supervisor")] | None = Field(
+    supervisor: Annotated[Annotated[Part, _named("supervisor")] | None, BeforeValidator(_switched)] = Field(
         None,
         description="supervision of the controller: true, or options of the supervisor; `fallback` is a controller "
         "that takes over when the law fails",

@@ -85,6 +85,7 @@ class ConditionValues(eqx.Module):
             "measurement_implausible": passed.implausible,
             "measurement_jump": passed.jump,
             "measurement_stuck": passed.missing,
+            "report_lost": passed.unreported,
             "reference_rejected": view.rejected,
             "estimator_diverged": jnp.where(what.broken, jnp.inf, self._estimate_ratio(view)),
             "restarts_exhausted": what.restarts,
@@ -98,7 +99,7 @@ class ConditionValues(eqx.Module):
 
     def limits(self) -> PerCondition:
         """Limits of all conditions: 0 of what is counted, 1 of what is relative to a limit, and a few others."""
-        counted = ("measurement_not_finite", "reference_rejected", "output_not_finite", "saturated")
+        counted = ("measurement_not_finite", "report_lost", "reference_rejected", "output_not_finite", "saturated")
         found = dict.fromkeys(NAMES, 1.0) | dict.fromkeys((*counted, "thruster_lost", "axes_lost", "clock_fault"), 0.0)
         found |= {
             "restarts_exhausted": float(self.restarts),

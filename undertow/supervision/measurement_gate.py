@@ -15,17 +15,20 @@ from undertow.core import checks
 from undertow.core.contracts import Measurement
 from undertow.core.param import Param, param
 from undertow.numerics.rotations import attitude_error
-from undertow.supervision.motion import Motion, length, motion_of, path_velocity, predicted, split, with_motion
+from undertow.supervision.motion import Motion, length, motion_of, predicted, split, with_motion
 from undertow.supervision.stuck_readings import StuckReadings, StuckState
 
 Scalar = Float[Array, ""]
+
+# Larger reports of the actuators are none of a propeller, rad/s and rad/s^2.
+_FASTEST = 1e5
 
 
 class GateState(NamedTuple):
     """State of the gate."""
 
     expected: Motion  # at this instant
-    path: tuple[Array, Array]  # believed velocity of position and attitude, m/s and rad/s
+    rates: Array  # believed rates of the outputs, m/s and rad/s
     stuck: StuckState
     since: Scalar  # time since the last step, s
     actuator: Any  # last finite report of the actuators
@@ -40,6 +43,7 @@ class Passed(NamedTuple):
     implausible: Scalar  # largest size relative to its limit
     jump: Scalar  # largest difference from the prediction relative to its limit
     missing: Scalar  # motion missing from stuck readings relative to its limit
+    unreported: Scalar  # entries of the report of the actuators that are not finite, or no speed of a propeller
 
 
 class MeasurementGate(eqx.Module):
@@ -69,8 +73,8 @@ class MeasurementGate(eqx.Module):
         level = jnp.eye(4)[0] if read.attitude.shape[0] else read.attitude
         attitude = jnp.where(jnp.isfinite(read.attitude).all(), read.attitude, level)
         expected = Motion(zero(read.position), attitude, zero(read.velocity))
-        path = path_velocity(with_motion(y, expected))
-        return GateState(expected, path, self.stuck.init(read), jnp.zeros(()), jax.tree.map(zero, y.actuator))
+        believed, actuator = with_motion(y, expected), jax.tree.map(zero, y.actuator)
+        return GateState(expected, believed.velocity, self.stuck.init(y), jnp.zeros(()), actuator)
 
     def pass_through(self, state: GateState, y: Measurement, believe: Bool[Array, ""]) -> Passed:
         """The measurement, with predictions in place of readings that cannot be true.
@@ -83,9 +87,9 @@ class MeasurementGate(eqx.Module):
         read, expected = motion_of(y), state.expected
         finite = Motion(*map(jnp.isfinite, read))
         of_size, of_jump = self._sizes(read), self._jumps(read, expected)
-        stuck_state = self.stuck.after(state.stuck, read, state.path, state.since)
+        stuck_state = self.stuck.after(state.stuck, y, state.rates, state.since)
         stuck = self.stuck.found(stuck_state)
-        held = Motion(stuck.position, stuck.attitude, _each(read.velocity, stuck.velocity, stuck.rates))
+        held = Motion(*(part > 0 for part in _of_motion(read, stuck.position, stuck.velocity)))
         known = lambda ratios, which: Motion(*(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True)))
         sizes = known(of_size, finite)
         # What is stuck departs from its prediction, of course.
@@ -98,7 +102,9 @@ class MeasurementGate(eqx.Module):
         )
         # A quaternion is good as a whole, or not at all.
         good = good._replace(attitude=jnp.broadcast_to(good.attitude.all(), good.attitude.shape))
-        reported = jax.tree.map(lambda now, kept: jnp.where(jnp.isfinite(now), now, kept), y.actuator, state.actuator)
+        usable = jax.tree.map(lambda now: jnp.abs(now) <= _FASTEST, y.actuator)  # false for NaN
+        reported = jax.tree.map(lambda good, now, kept: jnp.where(good, now, kept), usable, y.actuator, state.actuator)
+        unreported = sum((~good).sum(dtype=float) for good in jax.tree.leaves(usable))
         y = y._replace(actuator=reported)
 
         def mended() -> Measurement:
@@ -109,12 +115,13 @@ class MeasurementGate(eqx.Module):
         missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
         largest = lambda ratios: jnp.stack([one.max(initial=0.0) for one in ratios]).max()
         measurement = jax.lax.cond(all_good, lambda: y, mended)
-        return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing)
+        lost = jnp.asarray(unreported, dtype=float)
+        return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing, lost)
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:
         """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s)."""
         y = passed.measurement
-        return GateState(predicted(y, rate, dt), path_velocity(y), passed.stuck, jnp.asarray(dt), y.actuator)
+        return GateState(predicted(y, rate, dt), y.velocity, passed.stuck, jnp.asarray(dt), y.actuator)
 
     def _sizes(self, read: Motion) -> Motion:
         """Sizes of readings relative to their limits."""
@@ -134,6 +141,13 @@ class MeasurementGate(eqx.Module):
             turn,
             jnp.abs(read.velocity - expected.velocity) / _each(read.velocity, self.jump_velocity, self.jump_rate),
         )
+
+
+def _of_motion(read: Motion, outputs: Array, velocity: Array) -> Motion:
+    """Flags of outputs and velocities, as those of a motion: an attitude as a whole."""
+    if not read.attitude.shape[0]:
+        return Motion(outputs, read.attitude, velocity)
+    return Motion(outputs[:3], jnp.broadcast_to(outputs[3:].max(), (4,)), velocity)
 
 
 def _each(velocity: Array, linear: Any, angular: Any) -> Array:

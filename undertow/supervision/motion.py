@@ -35,13 +35,6 @@ def with_motion(y: Measurement, motion: Motion) -> Measurement:
     return measurement_of_pose(*motion, y.actuator)._replace(health=y.health)
 
 
-def path_velocity(y: Measurement) -> tuple[Array, Array]:
-    """Velocity of `Motion.position`, and angular velocity of the attitude in body axes (of no length without one)."""
-    if y.body is None:
-        return y.velocity, jnp.zeros(0)
-    return y.velocity[:3], y.body.nu[3:]
-
-
 def rate_of_velocity(y: Measurement, coordinates: AbstractCoordinates, acceleration: Outputs) -> Outputs:
     """Rate of `Motion.velocity` for an acceleration in the coordinates of a model."""
     if y.body is None or coordinates.axes:
@@ -52,12 +45,14 @@ def rate_of_velocity(y: Measurement, coordinates: AbstractCoordinates, accelerat
 
 def predicted(y: Measurement, acceleration: Outputs, dt: Number) -> Motion:
     """Motion dt (s) after a measurement, for a rate of `Motion.velocity`."""
-    motion, (velocity, turning) = motion_of(y), path_velocity(y)
+    motion = motion_of(y)
     attitude = motion.attitude
     if y.body is not None:
-        turned = attitude + dt * quaternion_rate(attitude, turning)
+        turned = attitude + dt * quaternion_rate(attitude, y.body.nu[3:])
         attitude = turned / jnp.sqrt((turned * turned).sum())
-    return Motion(motion.position + dt * velocity, attitude, motion.velocity + dt * acceleration)
+    return Motion(
+        motion.position + dt * y.velocity[: motion.position.shape[0]], attitude, motion.velocity + dt * acceleration
+    )
 
 
 def length(vector: Array) -> Float[Array, ""]:

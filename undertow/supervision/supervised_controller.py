@@ -48,6 +48,9 @@ _ADVANCED = 3.0  # sampling times by which a law advances at most
 _PREDICTED = 0.5  # s for which the motion is predicted at most
 _AVERAGED = 0.5  # s over which the variation of the input is averaged
 _BELIEVED = 0.1  # share of a jump that the estimate may add to a prediction in a step
+_SHORTEST = 1e-3  # sampling times between two steps of a clock that runs
+_TURNS = 1e5  # rad, of a reference
+_SUDDEN = 0.05  # s in which no vehicle reaches its largest speed
 _LONG_AGO = -1e9  # s
 _BIG = 1e30  # stands for what is not finite in the log
 
@@ -172,10 +175,10 @@ class Supervised(AbstractGatedController):
 
     def advance(self, z: SupervisedState, y: Measurement, r: Target, u_applied: Inputs, dt) -> SupervisedState:
         view, nominal = self._view(z, y, r), self.sampling_time
-        runs = jnp.isfinite(dt) & (dt > 0)
+        runs = jnp.isfinite(dt) & (dt > _SHORTEST * nominal)
         elapsed = jnp.where(runs, jnp.minimum(dt, _PREDICTED), nominal)
         step = jnp.where(runs & (dt <= CLOCK_FAULT * nominal), jnp.minimum(dt, _ADVANCED * nominal), nominal)
-        u = jnp.where(jnp.isfinite(u_applied), u_applied, self.safe_output)
+        u = jnp.where(jnp.isfinite(u_applied), jnp.clip(u_applied, self.watch.low, self.watch.high), self.safe_output)
         laws = self._advanced(z, view, u, step)
         broken = ~all_finite(laws)
         allowance = self._allowance(z, view, elapsed)
@@ -193,10 +196,12 @@ class Supervised(AbstractGatedController):
         holds = ~(values <= limits)  # NaN is beyond every limit
         conditions = held_for(z.conditions, holds, elapsed, self._tolerated(z))
 
+        wrong = NUMBER["estimator_diverged"]
+        at_once = (jnp.arange(len(NAMES)) == wrong) & broken & view.controls
+        conditions = conditions._replace(level=jnp.where(at_once, jnp.maximum(conditions.level, 1.0), conditions.level))
         asked, reason = judged(conditions.level)
         state, reason = self._next(z, view, asked, reason)
         begins = _controls(state) & ~view.controls
-        wrong = NUMBER["estimator_diverged"]
         diverged = view.controls & (
             broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
         )
@@ -204,7 +209,7 @@ class Supervised(AbstractGatedController):
         switches = by_fallback != z.fallback_controls
         damaged = ~all_finite(z)
         again = begins | diverged | switches | damaged
-        counted = (begins & (z.state == int(State.SAFE))) | diverged
+        counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
         # What has begun again gets its time before it is judged.
         judged_anew = jnp.arange(len(NAMES)) == wrong
@@ -269,7 +274,8 @@ class Supervised(AbstractGatedController):
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
-        output = jnp.where(jnp.isfinite(output), output, self.safe_output)  # whatever the memory holds
+        # Whatever the memory holds.
+        output = jnp.where(jnp.isfinite(output), jnp.clip(output, self.watch.low, self.watch.high), self.safe_output)
         return View(passed, r, rejected, controls, command, signals, output, (output == within).all())
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
@@ -287,7 +293,10 @@ class Supervised(AbstractGatedController):
     def _checked(self, before: Target, r: Target) -> tuple[Target, Scalar]:
         """The reference, or the last valid one at rest; and the number of entries that cannot be used."""
         lengths = ~jnp.asarray(np.array(self.model.coordinates.angles))
-        far = lengths & (jnp.abs(r.position) > self.gate.max_distance)
+        speed = jnp.where(lengths, self.gate.max_speed, self.gate.max_rate)
+        far = jnp.abs(r.position) > jnp.where(lengths, self.gate.max_distance, _TURNS)
+        far = far | (jnp.abs(r.velocity) > speed)
+        far = far | (jnp.abs(r.acceleration) > speed / _SUDDEN)
         wrong = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + far.sum(dtype=float)
         held = (before.position, jnp.zeros_like(before.velocity), jnp.zeros_like(before.acceleration))
         return Target(*(jnp.where(wrong > 0, kept, new) for kept, new in zip(held, r, strict=True))), wrong
@@ -328,7 +337,8 @@ class Supervised(AbstractGatedController):
         """Allowed tracking error; where nobody controls, it is the present one."""
         coordinates = self.model.coordinates
         here = self.tracking.start(coordinates, view.passed.measurement, view.r)
-        later = self.tracking.after(z.allowance, coordinates, z.reference, view.r, elapsed)
+        targets = z.reference, view.r
+        later = self.tracking.after(z.allowance, coordinates, view.passed.measurement, targets, elapsed)
         return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, here, strict=True)))
 
     def _variation(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> Scalar:
@@ -355,13 +365,12 @@ class Supervised(AbstractGatedController):
         """State and reason of the next step, from what the conditions and the operator ask for."""
         code = lambda state: jnp.asarray(int(state))
         usable = (view.passed.not_finite == 0) & (view.passed.implausible <= 1)
-        ready = jnp.where(asked == int(State.SAFE), code(State.READY), asked)
-        state = jnp.where(z.state == int(State.READY), ready, asked)
+        state = asked
         unknown = (z.state < int(State.INIT)) | (z.state > int(State.STOPPED))
         state = jnp.where(unknown, code(State.INIT), state)
         state = jnp.where(z.state == int(State.INIT), jnp.where(usable, code(State.READY), code(State.INIT)), state)
         state = jnp.where(z.safe_for > self.stop_after, code(State.STOPPED), state)
-        hold = (z.request == int(Request.HOLD)) & (state != int(State.INIT)) & (state != int(State.STOPPED))
+        hold = (z.request == int(Request.HOLD)) & _controls(state)
         stop = z.request == int(Request.STOP)
         state = jnp.where(hold, code(State.READY), jnp.where(stop, code(State.STOPPED), state))
         reason = jnp.where(hold | stop, code_of(OPERATOR), reason)

@@ -92,11 +92,15 @@ def supervisor(
     count = low.shape[0]
     if np.shape(safe_output) not in ((), (count,)):
         raise BadInput("safe_output", f"be one number or {count}, one per actuator", safe_output)
+    beyond = lambda safe, low, high: ((safe >= low) & (safe <= high)).all()
+    if not checks.assumed(beyond, safe_output, low, high):
+        limits = f"{float(low.min()):g} to {float(high.max()):g} {plant.input_unit}"
+        raise BadInput("safe_output", f"be within the limits of the input, {limits}", safe_output)
     vehicle = start.body is not None
     of_vehicle = lambda limit: limit if vehicle else np.inf
     readings = max(_EQUAL, int(np.ceil(_PERIODS * update_period / sampling_time)))
     gate = MeasurementGate(
-        StuckReadings(stuck_distance, stuck_angle, float(readings) if vehicle else np.inf),
+        StuckReadings(stuck_distance, stuck_angle, float(readings), law.model.coordinates.angles),
         max_distance=of_vehicle(max_distance),
         max_speed=of_vehicle(max_speed),
         max_rate=of_vehicle(max_rate),
