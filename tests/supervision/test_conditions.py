@@ -31,6 +31,7 @@ class Tampering(NamedTuple):
     add_velocity: np.ndarray = np.zeros(6)
     scale_position: float = 1.0
     hold: float = 0.0  # 1: the measurement keeps the bits of the first one
+    hold_north: float = 0.0  # 1: the measured north does
     command: float = 0.0  # added to the command of the law
     spoil: float = 0.0  # 1: the command is NaN
     estimate: float = 0.0  # added to its estimate
@@ -129,6 +130,8 @@ def _step(parts, t, now, how):
     read = with_outputs(
         truth, truth.position * how.scale_position + how.add_position, truth.velocity + how.add_velocity
     )
+    north = jnp.where(how.hold_north > 0, first.position[0], read.position[0])
+    read = with_outputs(read, read.position.at[0].set(north), read.velocity)
     y = jax.tree.map(lambda kept, new: jnp.where(how.hold > 0, kept, new), first, read)
     y = y._replace(actuator=jax.tree.map(lambda speed: speed + how.report, y.actuator))
     z = z._replace(law=(z.law[0], _of_law(how)))
@@ -228,6 +231,38 @@ def test_the_table_of_the_documentation_has_a_line_for_each_condition():
 @pytest.mark.parametrize("reason", ["", *NAMES, "operator", "memory_damaged"])
 def test_codes_of_reasons(reason):
     assert reason_of(code_of(reason)) == reason
+
+
+def test_one_stuck_entry_is_found():
+    run = stepped()
+    run.restart()
+    run.steps(0.6, Tampering(hold_north=1.0))
+    assert run.states[-1] == (State.DEGRADED, "measurement_stuck")
+    assert set(run.states[:8]) == {(State.ACTIVE, "")}
+
+
+def test_a_reference_that_nothing_can_follow_is_rejected():
+    """A target 9999 m away for one step leaves no allowance behind; one beyond 10 km is rejected."""
+    run = stepped()
+    run.restart()
+    run.steps(0.2)
+    run.step(Tampering(target=_only(1, 9999.0)))
+    run.steps(0.2)
+    assert float(run.z.allowance.position) < 0.1
+    run.step(Tampering(target=_only(1, 1e5)))
+    assert run.states[-1] == (State.DEGRADED, "reference_rejected")
+
+
+def test_whatever_was_applied_the_output_keeps_to_its_limits():
+    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(supply=16.0))
+    law = ut.controllers.pid(plant.model(), sampling_time=T)
+    supervised = supervisor(law, plant, sampling_time=T, thruster_faults=False)
+    y, r, dt = plant.output(jnp.zeros(()), plant.initial_state()), _target(jnp.zeros(()), UNTOUCHED), jnp.asarray(T)
+    z = supervised.init(y, r)
+    for request, applied in ((0, 1e6), (1, 1e6), (1, -1e300), (0, np.inf), (0, np.nan), (0, 1e30)):
+        z = supervised.advance(z._replace(request=jnp.asarray(request)), y, r, jnp.full(8, applied), dt)
+        output, _ = supervised.command(z, y, r)
+        assert (np.abs(output) <= 16.0).all()
 
 
 def test_codes_of_a_damaged_memory():

@@ -28,7 +28,7 @@ from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
 from undertow.supervision.conditions import Request, reason_of, state_of
-from undertow.supervision.supervised_controller import SupervisedState, state_in
+from undertow.supervision.supervised_controller import SupervisedState, state_in, transfer
 from undertow.supervision.transition_log import Transition, transitions
 
 _NO_ROTATION = 1e-6  # length of a quaternion that is none
@@ -164,7 +164,7 @@ class Autopilot:
             target: outputs to reach, or (outputs, rates, accelerations); None for the scenario's reference, which then
                 begins here.
             applied: input that has been applied so far, in the unit of the plant's input: the output begins there, and
-                turns into the law's. None for the law's at once.
+                turns into the law's: within `blend`, or as fast as a supervisor allows. None for the law's at once.
             propellers: speeds, rad/s, or (speeds, accelerations), of thrusters that report them; None at rest.
             health: per actuator, 1, or 0 where it announced that it has failed, in a scenario with such faults; None
                 where none has.
@@ -196,8 +196,12 @@ class Autopilot:
                 "start", "lead to a finite command of the law", "one that is not", hint="Check the measurement"
             )
         put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+        supervised = state_in(self._go_on.state)
+        if supervised is not None and applied is not None:
+            self._turn_from(before, supervised)
         self._command[...] = before
-        self._before[...], self._blended[...], self._started[...] = before, applied is not None, True
+        blended = applied is not None and supervised is None
+        self._before[...], self._blended[...], self._started[...] = before, blended, True
         return self._answered()
 
     def step(
@@ -407,6 +411,13 @@ class Autopilot:
         found = numbers("applied", applied, self._command.shape)
         checks.finite("applied", found)
         return found
+
+    def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
+        """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
+        low, high, most = transfer(self._loop.controller)
+        begun, command = np.clip(applied, low, high), self._go_on.outputs.command
+        supervised.output[...], supervised.turning[...] = begun, True
+        command[...] = np.clip(command, begun - most, begun + most)
 
     def _answered(self) -> np.ndarray:
         """The output for the law's command; a command that is not finite leaves the output as it was."""

@@ -20,7 +20,7 @@ def numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
         if np.asarray(value).dtype.kind in "SU":  # NumPy takes "10" for a number
             raise TypeError
         found = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput(name, "be numbers" if shape else "be a number", repr(value)) from None
     if found.shape != shape:
         raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")

@@ -8,6 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.contracts import AbstractController, Load, Measurement, Pose, Target
+from undertow.core.errors import BadInput
+from undertow.core.returned import difference, form, not_two
+from undertow.core.user_code import place_of
 from undertow.numerics.number import Number
 
 # What a mode can be a mode of: a quantity that the controller receives, the readings of a sensor before the navigation
@@ -146,3 +149,22 @@ class AbstractComputationFault(AbstractFault):
     @abc.abstractmethod
     def state(self, instant: Instant, law: AbstractController, z: PyTree, y: Measurement, r: Target) -> PyTree:
         """State of the law with which the step begins."""
+
+
+def altered_by(mode: AbstractMode, memory: PyTree, moment: Moment, value: Signal) -> tuple[Altered, PyTree]:
+    """What a mode makes of a signal, and its memory afterwards.
+
+    Raises:
+        BadInput: its `apply` does not return both in the form that is due.
+    """
+    answer = mode.apply(memory, moment, value)
+    says = not_two("apply", answer, "the altered signal and the memory")
+    if not says and not isinstance(answer[0], Altered):
+        says = f"`apply` must return an Altered first, but returns {form(answer[0])}"
+    if not says and jnp.shape(answer[0].value) != value.shape:
+        says = f"`apply` must return a signal of shape {value.shape}, but returns {form(answer[0].value)}"
+    if not says and (what := difference(answer[1], memory)):
+        says = f"`apply` must return the memory in the form that `init` gives it, but returns {what}"
+    if says:
+        raise BadInput("", "", f"{type(mode).__name__}: {says}", where=place_of(mode, "apply"))
+    return answer

@@ -1,6 +1,6 @@
 """A supervised controller: gates around a controller, states with reasons, restarts, and a safe output."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -422,3 +422,10 @@ def state_in(tree: PyTree) -> SupervisedState | None:
     """The state of a supervised controller somewhere in a tree; None where there is none."""
     is_state = lambda node: isinstance(node, SupervisedState)
     return next((leaf for leaf in jax.tree.leaves(tree, is_leaf=is_state) if is_state(leaf)), None)
+
+
+def transfer(controller: AbstractController) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Limits of the input of a supervised controller, and its largest change in a step of a transfer."""
+    found: Any = controller if isinstance(controller, Supervised) else getattr(controller, "law", controller)
+    low, high = np.asarray(found.watch.low), np.asarray(found.watch.high)
+    return low, high, np.asarray(found.slew * (high - low) * found.sampling_time)
