@@ -96,7 +96,7 @@ def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
 def test_a_restarted_law_knows_what_is_lost():
     law, z, y, target = stepped()
     z = knowing(z, [2])
-    again = law.restarted(z, y, target)
+    again = law.restarted(law.knowledge(z), y, target)
     u, signals = law.command(again, y, target)
     assert u[2] == 0.0 and signals["lost_thrusters"][2] == 1.0
     first = law.init(y, target).law

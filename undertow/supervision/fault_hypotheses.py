@@ -18,6 +18,8 @@ _SLACK, _EXCESS, _MOST = 0.05, 2.5, 1.3
 _OFF_LEAST, _OFF_MOST, _REVERSED = 0.35, 1.15, 1.9
 # Part of what the best hypothesis leaves unexplained by which it is at least ahead of the second best.
 _AHEAD = 0.5
+# Factor by which a pair must explain more, and be further ahead, than a single thruster.
+_PAIR = 2.0
 # Determinant of two directions, relative to their squares, from which on they are told apart.
 _APART = 1e-3
 
@@ -124,10 +126,10 @@ def two_thrusters(
         is_best = explained >= best
         second = jnp.where(is_best, 0.0, explained).max()
         clear = (
-            (best > bounds.off)
+            (best > _PAIR * bounds.off)
             & (best > bounds.explained * seen.total)
             & (best - single > bounds.off)
-            & (best - second > jnp.maximum(bounds.margin, _AHEAD * (seen.total - best)))
+            & (best - second > jnp.maximum(_PAIR * bounds.margin, seen.total - best))
         )
         return jnp.where(is_best & clear, 1.0, 0.0).max(1)
 

@@ -107,8 +107,8 @@ class ThrusterMonitor(eqx.Module):
     interval: Float[Param, ""] = param("s", "between two examinations, at least the sampling time", default=0.05)
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
     mismatch: Float[Param, ""] = param("", "share of a change of force that the model may miss", default=0.04)
-    threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=5.0)
-    other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=7.0)
+    threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
+    other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=8.0)
     learning: Float[Param, ""] = param(
         "s", "time from the start at which both thresholds are still doubled", default=1.0
     )
@@ -181,6 +181,7 @@ class ThrusterMonitor(eqx.Module):
         residual = state.residual + share * (share / dt * away - state.residual)
         second = state.forces[1] + share * (state.forces[0] - state.forces[1])
         first = state.forces[0] + share * (force - state.forces[0])
+        velocity = state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away
         elapsed = jnp.maximum(self.interval, dt)
         findings = jax.lax.cond(
             state.wait < dt / 2,
@@ -190,7 +191,7 @@ class ThrusterMonitor(eqx.Module):
         return MonitorState(
             actuators=after,
             unreported=unreported,
-            velocity=state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away,
+            velocity=jnp.where(jnp.isfinite(velocity), velocity, state.velocity),
             residual=residual,
             forces=jnp.stack([first, second]),
             wait=jnp.where(state.wait < dt / 2, elapsed, state.wait) - dt,
@@ -221,7 +222,7 @@ class ThrusterMonitor(eqx.Module):
         surprise = (residual - 2 * past.residuals[_LAG - 1] + past.residuals[-1]) / self.unit
         changes = forces - 2 * past.forces[_LAG - 1] + past.forces[-1]
         scaled = effect / self.unit[:, None]
-        doubted = jnp.where(used > 0, self.mismatch, _UNUSED) * changes * scaled
+        doubted = (jnp.where(used > 0, self.mismatch, _UNUSED) * changes)[None, :] * scaled
         unknown = (doubted[:, None, :] * doubted[None, :, :]).sum(-1)
         seen = weighed(scaled, past.covariance + _FLOOR * jnp.eye(len(surprise)) + unknown, surprise)
         raised_by = 1 + self.learning / ((past.count + 1) * elapsed)  # while the covariance is that of a short time
