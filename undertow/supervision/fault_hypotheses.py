@@ -136,14 +136,17 @@ def two_thrusters(
     return jax.lax.cond(seen.total - single > bounds.off, solved, lambda: jnp.zeros_like(forces))
 
 
-def missing_effect(seen: Weighed, changes: PerActuator) -> PerActuator:
-    """Log-likelihood ratio of "off" to "healthy" by one residual, where nominal forces changed.
+def missing_effect(seen: Weighed, changes: PerActuator) -> Float[Array, "m m"]:
+    """Log-likelihood ratio of "off" to "healthy" by one residual: of each thruster (diagonal) and of each pair.
 
     Args:
         seen: residual and directions.
         changes: what the residual would contain of the nominal forces if they had no effect, N, with its sign reversed.
     """
-    return -2 * changes * seen.along - changes * changes * seen.size
+    single = -2 * changes * seen.along - changes * changes * seen.size
+    together = -2 * changes[:, None] * changes[None, :] * seen.products
+    diagonal = jnp.eye(len(changes))
+    return (single[:, None] + single[None, :] + together) * (1 - diagonal) + single[:, None] * diagonal
 
 
 def _is_off(missing, nominal):

@@ -38,7 +38,7 @@ class Findings(NamedTuple):
     residuals: Float[Array, "10 n"]  # of the last examinations, the latest first, m/s^2, rad/s^2
     forces: Float[Array, "10 m"]  # nominal forces behind the same low-passes, N
     covariance: Float[Array, "n n"]  # of the second difference without faults, in squares of `unit`
-    likelihood: PerActuator  # log-likelihood ratio of "off" to "healthy", of the last seconds
+    likelihood: Float[Array, "m m"]  # log-likelihood ratios of "off" to "healthy", of the last seconds; pairs beside
     suspected: PerActuator  # for how long each actuator has been suspected, s
     in_pair: PerActuator  # for how long each has been suspected together with another, s
     lost: PerActuator  # 1 for an actuator that has failed
@@ -94,7 +94,8 @@ class ThrusterMonitor(eqx.Module):
     by what does not happen afterwards: the second difference phi of the nominal force has no effect, D = -E_i phi_i.
     Its log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual,
     is summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
-    that of every other by `clearly` and by the factor 1 / `likely_rival`.
+    that of every other by `clearly` and by the factor 1 / `likely_rival`. The same ratio of a pair, with the effect of
+    both missing, finds two thrusters that stopped at once at little thrust, where no single one explains what follows.
 
     Raises:
         BadInput: a value that is not positive.
@@ -144,7 +145,7 @@ class ThrusterMonitor(eqx.Module):
             residuals=jnp.zeros((2 * _LAG, *velocity.shape)),
             forces=jnp.zeros((2 * _LAG, *none.shape)),
             covariance=_START * jnp.eye(velocity.shape[0]),
-            likelihood=none,
+            likelihood=jnp.zeros((none.shape[0], none.shape[0])),
             suspected=none,
             in_pair=none,
             lost=none,
@@ -235,11 +236,12 @@ class ThrusterMonitor(eqx.Module):
         )
         awake = past.quiet <= 0
         found, explained = one_thruster(seen, forces, self.largest, used, bounds)
-        likelihood, likely = self._accumulated(past, seen, changes, used, elapsed)
+        likelihood, likely, likely_pair = self._accumulated(past, seen, changes, used, elapsed)
         suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
-        both = jnp.where(awake, two_thrusters(seen, forces, self.largest, used, bounds, explained), 0.0)
+        both = two_thrusters(seen, forces, self.largest, used, bounds, explained)
+        both = jnp.where(awake, jnp.where(both.max() > 0, both, likely_pair), 0.0)
         in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
         both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
         alarm = jnp.where(alarm.any(), alarm, both_alarm)
@@ -277,12 +279,17 @@ class ThrusterMonitor(eqx.Module):
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
     def _accumulated(self, past: Findings, seen: Weighed, changes: PerActuator, used: PerActuator, elapsed):
-        """Log-likelihood ratios one examination later, and 1 for an actuator whose ratio stands out, else 0."""
+        """Log-likelihood ratios one examination later, and 1 for the actuator, and for the pair, that stands out."""
         ratio = jnp.clip(missing_effect(seen, changes), -_CHANGE, _CHANGE) * (elapsed / self.correlation)
         summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)
-        summed = jnp.where((used > 0) & (past.quiet <= 0), summed, 0.0)
-        best = summed.max()
-        is_best = summed >= best
-        second = jnp.where(is_best, 0.0, summed).max()
+        in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
+        summed = summed * in_use[:, None] * in_use[None, :]
+        own = jnp.eye(len(used))
+        single, pair = (summed * own).max(1), summed * (1 - own)
+        best, best_pair = single.max(), pair.max()
+        is_best, is_best_pair = single >= best, (pair >= best_pair) & (best_pair > 0)
+        second = jnp.where(is_best, 0.0, single).max()
+        second_pair = jnp.maximum(jnp.where(is_best_pair, 0.0, pair).max(), best)
         clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
-        return summed, jnp.where(is_best & clear, 1.0, 0.0)
+        clear_pair = (best_pair > self.likely) & (second_pair < self.likely_rival * best_pair)
+        return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.where(is_best_pair & clear_pair, 1.0, 0.0).max(1)
