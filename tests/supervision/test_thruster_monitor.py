@@ -74,6 +74,18 @@ def test_every_thruster_that_is_off_or_reversed_is_found_and_no_other(share):
     np.testing.assert_array_equal(jax.vmap(failed)(jnp.arange(8)), np.eye(8))
 
 
+def test_two_thrusters_that_are_off_at_once_are_both_found():
+    monitor = monitor_of()
+    healthy = followed(monitor, changing, lambda k, f: f, WARM)
+
+    def failed(off):
+        later = lambda k: changing(k + WARM)
+        return followed(monitor, later, lambda k, f: f * (1 - off), 50, start=healthy)[0].lost
+
+    pairs = jnp.asarray([[1.0, 0, 1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 1, 0, 0, 1]])
+    np.testing.assert_array_equal(jax.vmap(failed)(pairs), pairs)
+
+
 def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
     monitor = monitor_of()
     fails = jnp.arange(8) == 2

@@ -121,7 +121,8 @@ def two_thrusters(
         explained = explained + explained.T
         nominal, missing = jnp.abs(forces)[:, None], -force * jnp.sign(forces)[:, None]
         fits = _is_off(missing, nominal) & (jnp.abs(force) > bounds.least * largest[:, None]) & (used > 0)[:, None]
-        explained = jnp.where(apart & fits & fits.T, explained, 0.0)
+        once = jnp.triu(jnp.ones_like(explained), 1) > 0  # rounding may differ between (i, j) and (j, i)
+        explained = jnp.where(apart & fits & fits.T & once, explained, 0.0)
         best = explained.max()
         is_best = explained >= best
         second = jnp.where(is_best, 0.0, explained).max()
@@ -131,7 +132,8 @@ def two_thrusters(
             & (best - single > bounds.off)
             & (best - second > jnp.maximum(_PAIR * bounds.margin, seen.total - best))
         )
-        return jnp.where(is_best & clear, 1.0, 0.0).max(1)
+        found = jnp.where(is_best & clear, 1.0, 0.0)
+        return jnp.maximum(found.max(0), found.max(1))
 
     return jax.lax.cond(seen.total - single > bounds.off, solved, lambda: jnp.zeros_like(forces))
 
@@ -139,14 +141,19 @@ def two_thrusters(
 def missing_effect(seen: Weighed, changes: PerActuator) -> Float[Array, "m m"]:
     """Log-likelihood ratio of "off" to "healthy" by one residual: of each thruster (diagonal) and of each pair.
 
+    That of a pair is smaller by half the square of its effect, and is thus positive where more than three quarters of
+    the effect are missing, not half: errors of the masses look like part of the effect of a pair.
+
     Args:
         seen: residual and directions.
         changes: what the residual would contain of the nominal forces if they had no effect, N, with its sign reversed.
     """
     single = -2 * changes * seen.along - changes * changes * seen.size
-    together = -2 * changes[:, None] * changes[None, :] * seen.products
+    together = 2 * changes[:, None] * changes[None, :] * seen.products
+    square = changes * changes * seen.size
+    pair = single[:, None] + single[None, :] - together - (square[:, None] + square[None, :] + together) / 2
     diagonal = jnp.eye(len(changes))
-    return (single[:, None] + single[None, :] + together) * (1 - diagonal) + single[:, None] * diagonal
+    return jnp.where(diagonal > 0, single[:, None] * diagonal, pair)
 
 
 def _is_off(missing, nominal):

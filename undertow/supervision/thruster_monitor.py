@@ -28,6 +28,8 @@ _START, _FIRST = 25.0, 4.0
 _UNUSED = 2.0
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
+# Largest ratio of a single thruster to that of a pair that stands out.
+_ALONE = 0.1
 # Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
 _CHANGE = 20.0
 
@@ -285,11 +287,13 @@ class ThrusterMonitor(eqx.Module):
         in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
         summed = summed * in_use[:, None] * in_use[None, :]
         own = jnp.eye(len(used))
-        single, pair = (summed * own).max(1), summed * (1 - own)
+        single, pair = (summed * own).max(1), summed * jnp.triu(jnp.ones_like(own), 1)
         best, best_pair = single.max(), pair.max()
         is_best, is_best_pair = single >= best, (pair >= best_pair) & (best_pair > 0)
         second = jnp.where(is_best, 0.0, single).max()
         second_pair = jnp.maximum(jnp.where(is_best_pair, 0.0, pair).max(), best)
         clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
-        clear_pair = (best_pair > self.likely) & (second_pair < self.likely_rival * best_pair)
-        return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.where(is_best_pair & clear_pair, 1.0, 0.0).max(1)
+        clear_pair = (best_pair > self.likely / 2) & (second_pair < self.likely_rival * best_pair)
+        clear_pair = clear_pair & (best < _ALONE * best_pair)
+        in_pair = jnp.where(is_best_pair & clear_pair, 1.0, 0.0)
+        return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.maximum(in_pair.max(0), in_pair.max(1))
