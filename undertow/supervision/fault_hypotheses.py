@@ -19,7 +19,7 @@ _OFF_LEAST, _OFF_MOST, _REVERSED = 0.35, 1.15, 1.9
 # Part of what the best hypothesis leaves unexplained by which it is at least ahead of the second best.
 _AHEAD = 0.5
 # Factor by which a pair must explain more, and be further ahead, than a single thruster.
-_PAIR = 2.0
+_PAIR = 4.0
 # Determinant of two directions, relative to their squares, from which on they are told apart.
 _APART = 1e-3
 

@@ -28,6 +28,10 @@ _START, _FIRST = 25.0, 4.0
 _UNUSED = 2.0
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
+# Share of the largest force to which a law drives thrusters whose effect is missing, without success.
+_STRAINED = 0.75
+# Log-likelihood ratio of a pair that is a fault, relative to that of a single thruster.
+_TOGETHER = 0.7
 # Largest ratio of a single thruster to that of a pair that stands out.
 _ALONE = 0.1
 # Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
@@ -239,11 +243,12 @@ class ThrusterMonitor(eqx.Module):
         awake = past.quiet <= 0
         found, explained = one_thruster(seen, forces, self.largest, used, bounds)
         likelihood, likely, likely_pair = self._accumulated(past, seen, changes, used, elapsed)
+        strained = jnp.where(jnp.abs(forces) > _STRAINED * self.largest, likely_pair, 0.0)
         suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
         both = two_thrusters(seen, forces, self.largest, used, bounds, explained)
-        both = jnp.where(awake, jnp.where(both.max() > 0, both, likely_pair), 0.0)
+        both = jnp.where(awake, jnp.where(both.max() > 0, both, strained), 0.0)
         in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
         both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
         alarm = jnp.where(alarm.any(), alarm, both_alarm)
@@ -293,7 +298,7 @@ class ThrusterMonitor(eqx.Module):
         second = jnp.where(is_best, 0.0, single).max()
         second_pair = jnp.maximum(jnp.where(is_best_pair, 0.0, pair).max(), best)
         clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
-        clear_pair = (best_pair > self.likely / 2) & (second_pair < self.likely_rival * best_pair)
+        clear_pair = (best_pair > _TOGETHER * self.likely) & (second_pair < self.likely_rival * best_pair)
         clear_pair = clear_pair & (best < _ALONE * best_pair)
         in_pair = jnp.where(is_best_pair & clear_pair, 1.0, 0.0)
         return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.maximum(in_pair.max(0), in_pair.max(1))
