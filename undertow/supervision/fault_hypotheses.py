@@ -141,17 +141,13 @@ def two_thrusters(
 def missing_effect(seen: Weighed, changes: PerActuator) -> Float[Array, "m m"]:
     """Log-likelihood ratio of "off" to "healthy" by one residual: of each thruster (diagonal) and of each pair.
 
-    That of a pair is smaller by half the square of its effect, and is thus positive where more than three quarters of
-    the effect are missing, not half: errors of the masses look like part of the effect of a pair.
-
     Args:
         seen: residual and directions.
         changes: what the residual would contain of the nominal forces if they had no effect, N, with its sign reversed.
     """
     single = -2 * changes * seen.along - changes * changes * seen.size
     together = 2 * changes[:, None] * changes[None, :] * seen.products
-    square = changes * changes * seen.size
-    pair = single[:, None] + single[None, :] - together - (square[:, None] + square[None, :] + together) / 2
+    pair = single[:, None] + single[None, :] - together
     diagonal = jnp.eye(len(changes))
     return jnp.where(diagonal > 0, single[:, None] * diagonal, pair)
 

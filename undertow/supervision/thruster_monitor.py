@@ -29,11 +29,7 @@ _UNUSED = 2.0
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
 # Share of the largest force to which a law drives thrusters whose effect is missing, without success.
-_STRAINED = 0.75
-# Log-likelihood ratio of a pair that is a fault, relative to that of a single thruster.
-_TOGETHER = 0.7
-# Largest ratio of a single thruster to that of a pair that stands out.
-_ALONE = 0.1
+_STRAINED = 0.9
 # Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
 _CHANGE = 20.0
 
@@ -49,7 +45,7 @@ class Findings(NamedTuple):
     in_pair: PerActuator  # for how long each has been suspected together with another, s
     lost: PerActuator  # 1 for an actuator that has failed
     quiet: Float[Array, ""]  # time until an alarm is possible, s
-    count: Float[Array, ""]  # examinations so far
+    examinations: Float[Array, ""]  # examinations so far
     evidence: Float[Array, ""]  # that one actuator has failed, relative to the threshold
 
 
@@ -156,7 +152,7 @@ class ThrusterMonitor(eqx.Module):
             in_pair=none,
             lost=none,
             quiet=self.settling,
-            count=zero,
+            examinations=zero,
             evidence=zero,
         )
         return MonitorState(
@@ -232,7 +228,9 @@ class ThrusterMonitor(eqx.Module):
         doubted = (jnp.where(used > 0, self.mismatch, _UNUSED) * changes)[None, :] * scaled
         unknown = (doubted[:, None, :] * doubted[None, :, :]).sum(-1)
         seen = weighed(scaled, past.covariance + _FLOOR * jnp.eye(len(surprise)) + unknown, surprise)
-        raised_by = 1 + self.learning / ((past.count + 1) * elapsed)  # while the covariance is that of a short time
+        raised_by = 1 + self.learning / (
+            (past.examinations + 1) * elapsed
+        )  # while the covariance is that of a short time
         bounds = Bounds(
             (raised_by * self.threshold) ** 2,
             (raised_by * self.other_threshold) ** 2,
@@ -253,8 +251,8 @@ class ThrusterMonitor(eqx.Module):
         both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
         alarm = jnp.where(alarm.any(), alarm, both_alarm)
         raised = alarm.any()
-        known = past.count >= 2 * _LAG  # the differences are those of residuals
-        steady = jnp.maximum(elapsed / self.memory, 1 / (jnp.maximum(past.count - 2 * _LAG, 0.0) + _FIRST))
+        known = past.examinations >= 2 * _LAG  # the differences are those of residuals
+        steady = jnp.maximum(elapsed / self.memory, 1 / (jnp.maximum(past.examinations - 2 * _LAG, 0.0) + _FIRST))
         large = _CLIP * len(surprise)
         weight = steady * jnp.minimum(1.0, large / jnp.where(seen.total > 0, seen.total, 1.0))
         learned = past.covariance * (1 - steady) + weight * surprise[:, None] * surprise[None, :]
@@ -267,7 +265,7 @@ class ThrusterMonitor(eqx.Module):
             in_pair=jnp.where(raised, 0.0, in_pair),
             lost=jnp.where(alarm, 1.0, past.lost),
             quiet=jnp.where(raised, self.pause, jnp.maximum(past.quiet - elapsed, 0.0)),
-            count=past.count + 1,
+            examinations=past.examinations + 1,
             evidence=jnp.maximum(jnp.sqrt(explained) / self.threshold, likelihood.max() / self.likely),
         )
 
@@ -298,7 +296,6 @@ class ThrusterMonitor(eqx.Module):
         second = jnp.where(is_best, 0.0, single).max()
         second_pair = jnp.maximum(jnp.where(is_best_pair, 0.0, pair).max(), best)
         clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
-        clear_pair = (best_pair > _TOGETHER * self.likely) & (second_pair < self.likely_rival * best_pair)
-        clear_pair = clear_pair & (best < _ALONE * best_pair)
+        clear_pair = (best_pair > self.likely) & (second_pair < self.likely_rival * best_pair)
         in_pair = jnp.where(is_best_pair & clear_pair, 1.0, 0.0)
         return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.maximum(in_pair.max(0), in_pair.max(1))
