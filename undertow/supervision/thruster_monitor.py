@@ -11,7 +11,7 @@ from undertow.core import checks
 from undertow.core.contracts import Inputs, Measurement, Model
 from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
-from undertow.supervision.fault_hypotheses import Bounds, Weighed, missing_effect, one_thruster, two_thrusters, weighed
+from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters, weighed
 
 PerActuator = Float[Array, " m"]
 PerAxis = Float[Array, " n"]
@@ -40,6 +40,9 @@ class Findings(NamedTuple):
     residuals: Float[Array, "10 n"]  # of the last examinations, the latest first, m/s^2, rad/s^2
     forces: Float[Array, "10 m"]  # nominal forces behind the same low-passes, N
     covariance: Float[Array, "n n"]  # of the second difference without faults, in squares of `unit`
+    background: PerAxis  # slow part of the residual: loads and errors of the model, m/s^2, rad/s^2
+    slow_forces: PerActuator  # slow part of the nominal forces, N
+    slow_covariance: Float[Array, "n n"]  # of the residual without its background, in squares of `unit`
     likelihood: Float[Array, "m m"]  # log-likelihood ratios of "off" to "healthy", of the last seconds; pairs beside
     suspected: PerActuator  # for how long each actuator has been suspected, s
     in_pair: PerActuator  # for how long each has been suspected together with another, s
@@ -93,7 +96,8 @@ class ThrusterMonitor(eqx.Module):
     suspected as well.
 
     This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
-    by what does not happen afterwards: the second difference phi of the nominal force has no effect, D = -E_i phi_i.
+    by what does not happen afterwards: the nominal force without its slow part, phi, has no effect on the residual
+    without its slow part (`background_time`), which is then D = -E_i phi_i, weighed by a covariance of its own.
     Its log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual,
     is summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
     that of every other by `clearly` and by the factor 1 / `likely_rival`. The same ratio of a pair, with the effect of
@@ -108,6 +112,7 @@ class ThrusterMonitor(eqx.Module):
     largest: Float[Param, " m"] = param("N", "largest force of each actuator")
     bandwidth: Float[Param, ""] = param("rad/s", "of each low-pass", symbol="w", default=15.0)
     interval: Float[Param, ""] = param("s", "between two examinations, at least the sampling time", default=0.05)
+    background_time: Float[Param, ""] = param("s", "time constant of the slow part of the residual", default=0.7)
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
     mismatch: Float[Param, ""] = param("", "share of a change of force that the model may miss", default=0.04)
     threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
@@ -129,7 +134,7 @@ class ThrusterMonitor(eqx.Module):
 
     def __check_init__(self):
         for name in (
-            *("unit", "largest", "bandwidth", "interval", "memory", "threshold", "explained"),
+            *("unit", "largest", "bandwidth", "interval", "background_time", "memory", "threshold", "explained"),
             *("likely", "likely_rival", "correlation", "fading"),
         ):
             checks.positive(name, getattr(self, name))
@@ -147,6 +152,9 @@ class ThrusterMonitor(eqx.Module):
             residuals=jnp.zeros((2 * _LAG, *velocity.shape)),
             forces=jnp.zeros((2 * _LAG, *none.shape)),
             covariance=_START * jnp.eye(velocity.shape[0]),
+            background=jnp.zeros_like(velocity),
+            slow_forces=none,
+            slow_covariance=_START * jnp.eye(velocity.shape[0]),
             likelihood=jnp.zeros((none.shape[0], none.shape[0])),
             suspected=none,
             in_pair=none,
@@ -240,7 +248,11 @@ class ThrusterMonitor(eqx.Module):
         )
         awake = past.quiet <= 0
         found, explained = one_thruster(seen, forces, self.largest, used, bounds)
-        likelihood, likely, likely_pair = self._accumulated(past, seen, changes, used, elapsed)
+        slow = (residual - past.background) / self.unit
+        seen_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
+        diagonal = jnp.eye(len(used)) > 0
+        ratio = jnp.where(diagonal, missing_effect(seen_slow, forces - past.slow_forces), missing_effect(seen, changes))
+        likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
         strained = jnp.where(jnp.abs(forces) > _STRAINED * self.largest, likely_pair, 0.0)
         suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
@@ -255,11 +267,17 @@ class ThrusterMonitor(eqx.Module):
         steady = jnp.maximum(elapsed / self.memory, 1 / (jnp.maximum(past.examinations - 2 * _LAG, 0.0) + _FIRST))
         large = _CLIP * len(surprise)
         weight = steady * jnp.minimum(1.0, large / jnp.where(seen.total > 0, seen.total, 1.0))
+        forgotten = -jnp.expm1(-elapsed / self.background_time)
+        steady_slow = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
+        weight_slow = steady_slow * jnp.minimum(1.0, large / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
         learned = past.covariance * (1 - steady) + weight * surprise[:, None] * surprise[None, :]
         return Findings(
             residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
             forces=jnp.concatenate([forces[None], past.forces[:-1]]),
             covariance=jnp.where(known, learned, past.covariance),
+            background=past.background + forgotten * (residual - past.background),
+            slow_forces=past.slow_forces + forgotten * (forces - past.slow_forces),
+            slow_covariance=past.slow_covariance * (1 - steady_slow) + weight_slow * slow[:, None] * slow[None, :],
             likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
             in_pair=jnp.where(raised, 0.0, in_pair),
@@ -283,9 +301,9 @@ class ThrusterMonitor(eqx.Module):
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
-    def _accumulated(self, past: Findings, seen: Weighed, changes: PerActuator, used: PerActuator, elapsed):
+    def _accumulated(self, past: Findings, ratio: Float[Array, "m m"], used: PerActuator, elapsed):
         """Log-likelihood ratios one examination later, and 1 for the actuator, and for the pair, that stands out."""
-        ratio = jnp.clip(missing_effect(seen, changes), -_CHANGE, _CHANGE) * (elapsed / self.correlation)
+        ratio = jnp.clip(ratio, -_CHANGE, _CHANGE) * (elapsed / self.correlation)
         summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)
         in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
         summed = summed * in_use[:, None] * in_use[None, :]
