@@ -324,7 +324,7 @@ def cost(seeds: int) -> None:
         for name, one in steps.items():
             lost = name == "tolerant" and block >= 100
             if lost:
-                one.state.monitor.lost[2] = 1.0
+                one.state.monitor.findings.lost[2] = 1.0
             taken = np.empty(200)
             for k in range(200):
                 for place, value in zip(one.inputs, 0.1 * chance.normal(size=(2, 6)), strict=True):

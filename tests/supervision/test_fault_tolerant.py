@@ -76,6 +76,12 @@ def stepped(y_of=lambda y: y):
     return law, law.init(y, target), y, target
 
 
+def knowing(z, lost):
+    """The state of a law whose monitor has found some actuators lost."""
+    findings = z.monitor.findings._replace(lost=jnp.asarray(np.isin(np.arange(8), lost).astype(float)))
+    return z._replace(monitor=z.monitor._replace(findings=findings))
+
+
 def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
     law, z, y, target = stepped()
     failed = y._replace(health=jnp.ones(8).at[jnp.asarray([1, 4])].set(0.0))
@@ -89,8 +95,8 @@ def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
 
 def test_a_restarted_law_knows_what_is_lost():
     law, z, y, target = stepped()
-    z = z._replace(monitor=z.monitor._replace(lost=z.monitor.lost.at[2].set(1.0)))
-    again = law.restarted(z, y, target)
+    z = knowing(z, [2])
+    again = law.restarted(law.knowledge(z), y, target)
     u, signals = law.command(again, y, target)
     assert u[2] == 0.0 and signals["lost_thrusters"][2] == 1.0
     first = law.init(y, target).law
@@ -99,6 +105,6 @@ def test_a_restarted_law_knows_what_is_lost():
 
 def test_axes_that_are_lost_are_announced():
     law, z, y, target = stepped()
-    alone = z._replace(monitor=z.monitor._replace(lost=jnp.ones(8).at[jnp.asarray([0, 2])].set(0.0)))
+    alone = knowing(z, [1, 3, 4, 5, 6, 7])
     _, signals = jax.jit(lambda z: law.command(z, y, target))(alone)
     assert signals["lost_axes"].sum() >= 4

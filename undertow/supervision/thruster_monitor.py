@@ -10,28 +10,46 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.contracts import Inputs, Measurement, Model
 from undertow.core.param import Param, param
-from undertow.numerics.linear_algebra import inverse_symmetric, matvec
+from undertow.numerics.linear_algebra import matvec
+from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters, weighed
 
 PerActuator = Float[Array, " m"]
 PerAxis = Float[Array, " n"]
 
+# Examinations between the samples of the second difference.
+_LAG = 5
 # Largest squared size of a residual, relative to its mean, with which it enters its covariance.
 _CLIP = 9.0
-# Steps after which the first residuals no longer decide the covariance, and its first value in squares of `unit`.
-_FIRST, _START = 20.0, 25.0
-# Force beyond the nominal one times 2.5 (a reversed thruster differs by 2) that a fault may have, as a share of the
-# largest force; and the largest force of a failed thruster, as a multiple of the nominal largest one.
-_SLACK, _EXCESS, _MOST = 0.05, 2.5, 1.3
-# Share of the nominal force that is missing in D where a thruster is off: measured 0.55 to 0.85 from 0.1 to 0.5 s after
-# the onset, because of the low-passes, the background and the motor. Above the second one, up to the third, it is
-# reversed; below the first, part of the thrust is left.
-_OFF_LEAST, _OFF_MOST, _REVERSED = 0.45, 0.95, 1.9
+# Variance of the residual that is always there, in squares of `unit`.
+_FLOOR = 0.25
+# First value of the covariance, in squares of `unit`, and the residuals that it counts for.
+_START, _FIRST = 25.0, 4.0
+# Part of the change of the nominal force of an unused thruster that its direction is not trusted to show.
+_UNUSED = 2.0
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
 _REPORTED, _RELATIVE = 0.15, 0.3
-# Time after which the inverse covariance is renewed, s.
-_RENEWED = 0.1
+# Share of the largest force to which a law drives thrusters whose effect is missing, without success.
+_STRAINED = 0.9
 # Largest change of the log-likelihood ratio by one independent residual, so that no single one decides.
 _CHANGE = 20.0
+
+
+class Findings(NamedTuple):
+    """What the examinations keep."""
+
+    residuals: Float[Array, "10 n"]  # of the last examinations, the latest first, m/s^2, rad/s^2
+    forces: Float[Array, "10 m"]  # nominal forces behind the same low-passes, N
+    covariance: Float[Array, "n n"]  # of the second difference without faults, in squares of `unit`
+    background: PerAxis  # slow part of the residual: loads and errors of the model, m/s^2, rad/s^2
+    slow_forces: PerActuator  # slow part of the nominal forces, N
+    slow_covariance: Float[Array, "n n"]  # of the residual without its background, in squares of `unit`
+    likelihood: Float[Array, "m m"]  # log-likelihood ratios of "off" to "healthy", of the last seconds; pairs beside
+    suspected: PerActuator  # for how long each actuator has been suspected, s
+    in_pair: PerActuator  # for how long each has been suspected together with another, s
+    lost: PerActuator  # 1 for an actuator that has failed
+    quiet: Float[Array, ""]  # time until an alarm is possible, s
+    examinations: Float[Array, ""]  # examinations so far
+    evidence: Float[Array, ""]  # that one actuator has failed, relative to the threshold
 
 
 class MonitorState(NamedTuple):
@@ -40,42 +58,50 @@ class MonitorState(NamedTuple):
     actuators: Any  # nominal ones, corrected by their report
     unreported: Any  # the same without the report; () where nothing is reported
     velocity: PerAxis  # p of the identification model, m/s, rad/s
-    residual: PerAxis  # rho, m/s^2, rad/s^2
-    background: PerAxis  # its slow part: loads and errors of the model
-    covariance: Float[Array, "n n"]  # of the fast part without faults, in squares of `unit`
-    inverse: Float[Array, "n n"]  # P, of the covariance and 1 in every direction, renewed from time to time
-    size: PerActuator  # E_i . P E_i, likewise
-    stale: Float[Array, ""]  # time until they are renewed, s
-    forces: Float[Array, "3 m"]  # nominal forces behind one and two low-passes, and their slow part, N
-    likelihood: PerActuator  # log-likelihood ratio of "off" to "healthy", of the last seconds
-    suspected: PerActuator  # for how long each actuator has been suspected, s
-    lost: PerActuator  # 1 for an actuator that has failed
-    quiet: Float[Array, ""]  # time until an alarm is possible, s
-    steps: Float[Array, ""]  # so far
-    evidence: Float[Array, ""]  # that one actuator has failed, relative to the threshold
+    residual: PerAxis  # rho behind the second low-pass, m/s^2, rad/s^2
+    forces: Float[Array, "2 m"]  # nominal forces behind one and two low-passes, N
+    wait: Float[Array, ""]  # time until the next examination, s
+    findings: Findings
+
+    @property
+    def lost(self) -> PerActuator:
+        """1 for an actuator that has failed."""
+        return self.findings.lost
+
+    @property
+    def evidence(self) -> Float[Array, ""]:
+        """Evidence that one actuator has failed, relative to the threshold."""
+        return self.findings.evidence
 
 
 class ThrusterMonitor(eqx.Module):
-    """Watches the acceleration that the model does not explain, for the direction of a single thruster.
+    """Watches the acceleration that the model does not explain, for the directions of failed thrusters.
 
     In body axes, with E the acceleration per force and f the forces of the applied input, p_dot = F + E f + rho with
     rho = w (nu - p) is the paper's series-parallel identification model, and rho is nu_dot - F - E f behind a low-pass
-    of bandwidth w; a second one suppresses noise. A fault of thruster i adds E_i a_i. The fast part D of rho, without
-    its slow background, is weighed by its own covariance without faults, which sea, noise and errors of the model
-    raise: J_i = (E_i . P D)^2 / (E_i . P E_i), P the inverse covariance, is the part of D . P D that direction i
-    explains, and a_i = E_i . P D / (E_i . P E_i) its force.
+    of bandwidth w; a second one suppresses noise. A fault of thruster i adds E_i a_i.
 
-    Thruster i is suspected while J_i is above `threshold`^2 (`other_threshold`^2 unless a_i is that of a thruster that
-    is off) and explains the share `explained` of D; the second best thruster explains `margin` less, and less than the
-    share `rival` of it; and a_i is a force that a fault can have: against the nominal force, and not above the largest.
-    A suspicion that persists is an alarm. Where actuators report their speed, one whose reported force differs from
-    that predicted of its command is suspected as well.
+    Every `interval` the residual is examined. D = rho(t) - 2 rho(t - L) + rho(t - 2 L), L five intervals, is what a
+    linear extrapolation of the residual does not foresee: loads, waves and errors of the model change slowly and
+    disappear in it, a thruster that stops does not, until 2 L later. D is weighed by its own covariance without faults,
+    which sea, noise and errors of the model raise, and by what errors of the thruster model add to it when forces
+    change (`mismatch`). `fault_hypotheses` compares thrusters, and pairs of them, with it.
+
+    A thruster is suspected where it explains D as a fault can: J_i = (E_i . P D)^2 / (E_i . P E_i), P the inverse
+    covariance, is the part of D . P D that direction i explains, and a_i = E_i . P D / (E_i . P E_i) its force. J_i
+    must be above `threshold`^2 (`other_threshold`^2 unless a_i is that of a thruster that is off), explain the share
+    `explained` of D, and be above that of the second best thruster by `margin` and by half of what it leaves. Two
+    thrusters are suspected where both are off and explain what no single one does. A suspicion that persists is an
+    alarm. Where actuators report their speed, one whose reported force differs from that predicted of its command is
+    suspected as well.
 
     This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
-    by what does not happen afterwards: the fast part of the nominal force, phi, has no effect, D = -E_i phi_i. Its
-    log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual, is
-    summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
-    that of every other by `clearly` and by the factor 1 / `likely_rival`.
+    by what does not happen afterwards: the nominal force without its slow part, phi, has no effect on the residual
+    without its slow part (`background_time`), which is then D = -E_i phi_i, weighed by a covariance of its own.
+    Its log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual,
+    is summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
+    that of every other by `clearly` and by the factor 1 / `likely_rival`. The same ratio of a pair, with the effect of
+    both missing, finds two thrusters that stopped at once at little thrust, where no single one explains what follows.
 
     Raises:
         BadInput: a value that is not positive.
@@ -85,15 +111,16 @@ class ThrusterMonitor(eqx.Module):
     unit: Float[Param, " n"] = param("m/s^2, rad/s^2", "residual that is not worth attention")
     largest: Float[Param, " m"] = param("N", "largest force of each actuator")
     bandwidth: Float[Param, ""] = param("rad/s", "of each low-pass", symbol="w", default=15.0)
+    interval: Float[Param, ""] = param("s", "between two examinations, at least the sampling time", default=0.05)
     background_time: Float[Param, ""] = param("s", "time constant of the slow part of the residual", default=0.7)
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
+    mismatch: Float[Param, ""] = param("", "share of a change of force that the model may miss", default=0.04)
     threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
     other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=8.0)
     learning: Float[Param, ""] = param(
-        "s", "time from the start at which both thresholds are still doubled", default=4.0
+        "s", "time from the start at which both thresholds are still doubled", default=1.0
     )
     explained: Float[Param, ""] = param("", "least share of the residual that one thruster explains", default=0.8)
-    rival: Float[Param, ""] = param("", "largest share that the second best explains of that", default=0.9)
     margin: Float[Param, ""] = param("", "least squared distance to the second best, in variances", default=12.0)
     least: Float[Param, ""] = param("", "smallest force of a fault, as a share of the largest force", default=0.08)
     likely: Float[Param, ""] = param("", "log-likelihood ratio that is a fault", default=50.0)
@@ -107,34 +134,43 @@ class ThrusterMonitor(eqx.Module):
 
     def __check_init__(self):
         for name in (
-            *("unit", "largest", "bandwidth", "background_time", "memory", "threshold", "explained", "rival"),
+            *("unit", "largest", "bandwidth", "interval", "background_time", "memory", "threshold", "explained"),
             *("likely", "likely_rival", "correlation", "fading"),
         ):
             checks.positive(name, getattr(self, name))
-        for name in ("margin", "least", "other_threshold", "learning", "clearly", "persistence", "settling", "pause"):
+        for name in (
+            *("margin", "least", "other_threshold", "learning", "clearly", "persistence", "settling", "pause"),
+            "mismatch",
+        ):
             checks.not_negative(name, getattr(self, name))
 
     def init(self, y: Measurement) -> MonitorState:
         """State before the first step: nothing is lost."""
         actuators, zero, none = self.model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
         velocity = self.model.coordinates.velocity(y)
+        findings = Findings(
+            residuals=jnp.zeros((2 * _LAG, *velocity.shape)),
+            forces=jnp.zeros((2 * _LAG, *none.shape)),
+            covariance=_START * jnp.eye(velocity.shape[0]),
+            background=jnp.zeros_like(velocity),
+            slow_forces=none,
+            slow_covariance=_START * jnp.eye(velocity.shape[0]),
+            likelihood=jnp.zeros((none.shape[0], none.shape[0])),
+            suspected=none,
+            in_pair=none,
+            lost=none,
+            quiet=self.settling,
+            examinations=zero,
+            evidence=zero,
+        )
         return MonitorState(
             actuators=actuators,
             unreported=() if y.actuator is None else actuators,
             velocity=velocity,
             residual=jnp.zeros_like(velocity),
-            background=jnp.zeros_like(velocity),
-            covariance=_START * jnp.eye(velocity.shape[0]),
-            inverse=jnp.eye(velocity.shape[0]) / (_START + 1),
-            size=jnp.ones_like(none),
-            stale=zero,
-            forces=jnp.zeros((3, *none.shape)),
-            likelihood=none,
-            suspected=none,
-            lost=none,
-            quiet=self.settling,
-            steps=zero,
-            evidence=zero,
+            forces=jnp.zeros((2, *none.shape)),
+            wait=zero,
+            findings=findings,
         )
 
     def advance(self, state: MonitorState, y: Measurement, u_applied: Inputs, used: PerActuator, dt) -> MonitorState:
@@ -147,7 +183,7 @@ class ThrusterMonitor(eqx.Module):
             used: 1 for an actuator that is in use, else 0.
             dt: sampling time, s.
         """
-        share, slow = -jnp.expm1(-self.bandwidth * dt), -jnp.expm1(-dt / self.background_time)
+        share = -jnp.expm1(-self.bandwidth * dt)
         dynamics = self.model.dynamics
         after, force, unreported, differs = self._forces(state, y, u_applied, dt)
         away = self.model.coordinates.velocity(y) - state.velocity
@@ -156,38 +192,98 @@ class ThrusterMonitor(eqx.Module):
         residual = state.residual + share * (share / dt * away - state.residual)
         second = state.forces[1] + share * (state.forces[0] - state.forces[1])
         first = state.forces[0] + share * (force - state.forces[0])
-
-        fast = (residual - state.background) / self.unit
-        inverse, size = self._renewed(state, effect)
-        pulled = matvec(inverse, fast)
-        weighed = _Weighed(matvec(effect.T, pulled / self.unit), size, (fast * pulled).sum())
-        raised_by = 1 + self.learning / ((state.steps + 1) * dt)  # while the covariance is that of a short time
-        found, explained = self._isolated(weighed, second, used, raised_by)
-        likelihood, likely = self._accumulated(state, weighed, second, used, dt)
-        suspicious = jnp.where(state.quiet > 0, 0.0, jnp.maximum(jnp.maximum(found, likely), differs) * used)
-        suspected = jnp.where(suspicious > 0, state.suspected + dt, jnp.maximum(state.suspected - dt, 0.0))
-        alarm = (suspected >= self.persistence) & (suspected >= suspected.max()) & (used > 0)
-        raised = alarm.any()
-        # What the alarm explains is no longer news: the rest may be the next fault.
-        known = matvec(effect, jnp.where(alarm, weighed.along / weighed.size, 0.0))
-        steady = jnp.maximum(dt / self.memory, 1 / (state.steps + _FIRST))
-        weight = steady * jnp.minimum(1.0, _CLIP * fast.shape[0] / jnp.where(weighed.total > 0, weighed.total, 1.0))
+        velocity = state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away
+        elapsed = jnp.maximum(self.interval, dt)
+        findings = jax.lax.cond(
+            state.wait < dt / 2,
+            lambda: self.examined(state.findings, effect, residual, second, differs, used, elapsed),
+            lambda: state.findings,
+        )
         return MonitorState(
             actuators=after,
             unreported=unreported,
-            velocity=state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away,
+            velocity=jnp.where(jnp.isfinite(velocity), velocity, state.velocity),
             residual=residual,
-            background=state.background + slow * (residual - state.background) + known,
-            covariance=state.covariance * (1 - steady) + weight * fast[:, None] * fast[None, :],
-            inverse=inverse,
-            size=size,
-            stale=jnp.where(state.stale > 0, state.stale - dt, _RENEWED),
-            forces=jnp.stack([first, second, state.forces[2] + slow * (second - state.forces[2])]),
+            forces=jnp.stack([first, second]),
+            wait=jnp.where(state.wait < dt / 2, elapsed, state.wait) - dt,
+            findings=findings,
+        )
+
+    def examined(
+        self,
+        past: Findings,
+        effect: Float[Array, "n m"],
+        residual: PerAxis,
+        forces: PerActuator,
+        differs: PerActuator,
+        used: PerActuator,
+        elapsed: Float[Array, ""],
+    ) -> Findings:
+        """Findings with one more residual.
+
+        Args:
+            past: findings until now.
+            effect: acceleration per force.
+            residual: of now, m/s^2, rad/s^2.
+            forces: nominal ones behind the same low-passes, N.
+            differs: 1 for an actuator whose report differs from its command, else 0.
+            used: 1 for an actuator that is in use, else 0.
+            elapsed: time since the examination before, s.
+        """
+        surprise = (residual - 2 * past.residuals[_LAG - 1] + past.residuals[-1]) / self.unit
+        changes = forces - 2 * past.forces[_LAG - 1] + past.forces[-1]
+        scaled = effect / self.unit[:, None]
+        doubted = (jnp.where(used > 0, self.mismatch, _UNUSED) * changes)[None, :] * scaled
+        unknown = (doubted[:, None, :] * doubted[None, :, :]).sum(-1)
+        seen = weighed(scaled, past.covariance + _FLOOR * jnp.eye(len(surprise)) + unknown, surprise)
+        raised_by = 1 + self.learning / (
+            (past.examinations + 1) * elapsed
+        )  # while the covariance is that of a short time
+        bounds = Bounds(
+            (raised_by * self.threshold) ** 2,
+            (raised_by * self.other_threshold) ** 2,
+            self.margin,
+            self.explained,
+            self.least,
+        )
+        awake = past.quiet <= 0
+        found, explained = one_thruster(seen, forces, self.largest, used, bounds)
+        slow = (residual - past.background) / self.unit
+        seen_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
+        diagonal = jnp.eye(len(used)) > 0
+        ratio = jnp.where(diagonal, missing_effect(seen_slow, forces - past.slow_forces), missing_effect(seen, changes))
+        likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
+        strained = jnp.where(jnp.abs(forces) > _STRAINED * self.largest, likely_pair, 0.0)
+        suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
+        suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
+        alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
+        both = two_thrusters(seen, forces, self.largest, used, bounds, explained)
+        both = jnp.where(awake, jnp.where(both.max() > 0, both, strained), 0.0)
+        in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
+        both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
+        alarm = jnp.where(alarm.any(), alarm, both_alarm)
+        raised = alarm.any()
+        known = past.examinations >= 2 * _LAG  # the differences are those of residuals
+        steady = jnp.maximum(elapsed / self.memory, 1 / (jnp.maximum(past.examinations - 2 * _LAG, 0.0) + _FIRST))
+        large = _CLIP * len(surprise)
+        weight = steady * jnp.minimum(1.0, large / jnp.where(seen.total > 0, seen.total, 1.0))
+        forgotten = -jnp.expm1(-elapsed / self.background_time)
+        steady_slow = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
+        weight_slow = steady_slow * jnp.minimum(1.0, large / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
+        learned = past.covariance * (1 - steady) + weight * surprise[:, None] * surprise[None, :]
+        return Findings(
+            residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
+            forces=jnp.concatenate([forces[None], past.forces[:-1]]),
+            covariance=jnp.where(known, learned, past.covariance),
+            background=past.background + forgotten * (residual - past.background),
+            slow_forces=past.slow_forces + forgotten * (forces - past.slow_forces),
+            slow_covariance=past.slow_covariance * (1 - steady_slow) + weight_slow * slow[:, None] * slow[None, :],
             likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
-            lost=jnp.where(alarm, 1.0, state.lost),
-            quiet=jnp.where(raised, self.pause, jnp.maximum(state.quiet - dt, 0.0)),
-            steps=state.steps + 1,
+            in_pair=jnp.where(raised, 0.0, in_pair),
+            lost=jnp.where(alarm, 1.0, past.lost),
+            quiet=jnp.where(raised, self.pause, jnp.maximum(past.quiet - elapsed, 0.0)),
+            examinations=past.examinations + 1,
             evidence=jnp.maximum(jnp.sqrt(explained) / self.threshold, likelihood.max() / self.likely),
         )
 
@@ -205,57 +301,19 @@ class ThrusterMonitor(eqx.Module):
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
-    def _renewed(self, state: MonitorState, effect: Float[Array, "n m"]):
-        """P and E_i . P E_i, which change slowly and are renewed every tenth of a second."""
-
-        def renewed():
-            scaled = effect / self.unit[:, None]
-            inverse = inverse_symmetric(state.covariance + jnp.eye(effect.shape[0]))
-            size = (scaled * (inverse[:, :, None] * scaled[None, :, :]).sum(1)).sum(0)
-            return inverse, jnp.where(size > 0, size, 1.0)
-
-        return jax.lax.cond(state.stale > 0, lambda: (state.inverse, state.size), renewed)
-
-    def _isolated(self, weighed: "_Weighed", forces: PerActuator, used: PerActuator, raised_by: Float[Array, ""]):
-        """1 for the actuator whose force explains the residual as a fault can, else 0; and J of the best."""
-        along, size, total = weighed
-        force, explained = along / size, along * along / size
-        possible = (force * forces < 0) & (jnp.abs(force) < _EXCESS * jnp.abs(forces) + _SLACK * self.largest)
-        explained = jnp.where(possible | (used < 1), explained, 0.0)
-        best = explained.max()
-        is_best = explained >= best
-        second = jnp.where(is_best, 0.0, explained).max()
-        missing = -force * jnp.sign(forces)
-        nominal = jnp.abs(forces)
-        off = (missing > _OFF_LEAST * nominal) & (missing < _OFF_MOST * nominal)
-        needed = raised_by * jnp.where(off, self.threshold, self.other_threshold)
-        clear = (
-            (best > needed**2)
-            & (missing < _REVERSED * nominal)
-            & (best > self.explained * total)
-            & (second < self.rival * best)
-            & (second < best - self.margin)
-        )
-        believable = (jnp.abs(force) > self.least * self.largest) & (jnp.abs(forces + force) < _MOST * self.largest)
-        return jnp.where(is_best & believable & clear, 1.0, 0.0), best
-
-    def _accumulated(self, state: MonitorState, weighed: "_Weighed", forces: PerActuator, used: PerActuator, dt):
-        """Log-likelihood ratios one step later, and 1 for an actuator whose ratio stands out, else 0."""
-        fast = forces - state.forces[2]
-        change = -2 * fast * weighed.along - fast * fast * weighed.size
-        change = jnp.clip(change, -_CHANGE, _CHANGE) * (dt / self.correlation)
-        summed = jnp.maximum(state.likelihood * (1 - dt / self.fading) + change, 0.0)
-        summed = jnp.where((used > 0) & (state.quiet <= 0), summed, 0.0)
-        best = summed.max()
-        is_best = summed >= best
-        second = jnp.where(is_best, 0.0, summed).max()
+    def _accumulated(self, past: Findings, ratio: Float[Array, "m m"], used: PerActuator, elapsed):
+        """Log-likelihood ratios one examination later, and 1 for the actuator, and for the pair, that stands out."""
+        ratio = jnp.clip(ratio, -_CHANGE, _CHANGE) * (elapsed / self.correlation)
+        summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)
+        in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
+        summed = summed * in_use[:, None] * in_use[None, :]
+        own = jnp.eye(len(used))
+        single, pair = (summed * own).max(1), summed * jnp.triu(jnp.ones_like(own), 1)
+        best, best_pair = single.max(), pair.max()
+        is_best, is_best_pair = single >= best, (pair >= best_pair) & (best_pair > 0)
+        second = jnp.where(is_best, 0.0, single).max()
+        second_pair = jnp.maximum(jnp.where(is_best_pair, 0.0, pair).max(), best)
         clear = (best > self.likely) & (second < best - self.clearly) & (second < self.likely_rival * best)
-        return summed, jnp.where(is_best & clear, 1.0, 0.0)
-
-
-class _Weighed(NamedTuple):
-    """Residual and thrusters weighed by the inverse covariance P, in squares of `unit`."""
-
-    along: PerActuator  # E_i . P D
-    size: PerActuator  # E_i . P E_i
-    total: Float[Array, ""]  # D . P D
+        clear_pair = (best_pair > self.likely) & (second_pair < self.likely_rival * best_pair)
+        in_pair = jnp.where(is_best_pair & clear_pair, 1.0, 0.0)
+        return summed, jnp.where(is_best & clear, 1.0, 0.0), jnp.maximum(in_pair.max(0), in_pair.max(1))
