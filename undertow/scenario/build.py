@@ -192,10 +192,9 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     def supervised(part: Part, law: AbstractController) -> AbstractController:
         """The law under supervision, with the fallback that takes its place."""
         options, fallback, described = part.model_dump(), None, {}
-        if "fallback" in options:
-            given = options.pop("fallback")
-            given = {"kind": given} if isinstance(given, str) else given
-        if "fallback" in part.model_dump() and given not in (None, {"kind": "none"}):
+        given = options.pop("fallback", None)
+        given = {"kind": given} if isinstance(given, str) else given
+        if given not in (None, {"kind": "none"}):
             if not (isinstance(given, Mapping) and isinstance(given.get("kind"), str)):
                 raise BadInput("supervisor.fallback", "be a controller by name, or a mapping with `kind`", given)
             fallback, found = one("controller", "supervisor.fallback", Part(**given), (model,))

@@ -25,11 +25,10 @@ from undertow.scenario import factory
 from undertow.scenario.schema import Fault
 
 # Words for keys of a fault that other programs use.
-_OTHER_WORDS = dict.fromkeys(("start", "start_time", "begin", "time", "from", "t"), "onset")
-_OTHER_WORDS |= dict.fromkeys(("kind", "type", "fault"), "mode") | dict.fromkeys(
-    ("size", "value", "amount"), "severity"
-)
-_OTHER_WORDS |= dict.fromkeys(("length", "lasts"), "duration") | {"where": "target", "thruster": "number"}
+_OTHER_WORDS: dict[str, str] = dict.fromkeys(("start", "start_time", "begin", "time", "from", "t"), "onset")
+_OTHER_WORDS |= dict.fromkeys(("kind", "type", "fault"), "mode")
+_OTHER_WORDS |= dict.fromkeys(("size", "value", "amount"), "severity")
+_OTHER_WORDS |= {"length": "duration", "lasts": "duration", "where": "target", "thruster": "number"}
 
 
 def faulted(
