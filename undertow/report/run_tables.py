@@ -68,6 +68,19 @@ def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float]
     return RunTable("Certificate: hypotheses of the stability proof", head, rows, _consequences(certificate))
 
 
+def fault_rows(faults: Sequence[Mapping[str, Any]]) -> RunTable:
+    """Faults of a run, as its scenario has them."""
+    seconds = lambda value: f"{value:g} s" if isinstance(value, int | float) else f"{value[0]:g} to {value[1]:g} s"
+    rows: list[tuple[str | float, ...]] = []
+    for one in faults:
+        target = f"{one['target']} {one['number']}" if "number" in one else one["target"]
+        severity, lasts = one.get("severity", "-"), one.get("duration")
+        rows.append(
+            (target, one["mode"], str(severity), seconds(one["onset"]), seconds(lasts) if lasts else "to the end")
+        )
+    return RunTable("Faults", ("target", "mode", "severity", "onset", "duration"), rows)
+
+
 def transition_rows(transitions: Sequence[Transition]) -> RunTable:
     """Transitions of the supervisor: when, to which state, and why."""
     rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]

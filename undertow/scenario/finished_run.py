@@ -137,6 +137,13 @@ def transitions_of(dataset: xr.Dataset) -> list[Transition] | None:
     return [Transition(**one | {"state": State(one["state"])}) for one in json.loads(dataset.attrs["transitions"])]
 
 
+def faults_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Entries of the faults of a run, from its scenario; none for a run that was made from objects."""
+    if not dataset.attrs.get("scenario"):
+        return []
+    return list(parse(dataset.attrs["scenario"], "scenario", Path(), "scenario").data.get("faults", ()))
+
+
 def window_of(dataset: xr.Dataset) -> tuple[float, float] | None:
     """Start and stop of the steady window of a run, s, from its scenario; None for a run that was made from objects."""
     if not dataset.attrs.get("scenario"):

@@ -1,0 +1,23 @@
+"""A run's page lists its faults and the transitions of its supervisor."""
+
+from undertow.report.run_tables import fault_rows, transition_rows
+from undertow.supervision.conditions import State
+from undertow.supervision.transition_log import Transition
+
+
+def test_rows_of_faults():
+    entries = [
+        {"target": "thruster", "number": 3, "mode": "scale", "severity": 0.5, "onset": 20.0},
+        {"target": "position", "mode": "nan", "onset": [1.0, 2.0], "duration": 3.0},
+    ]
+    assert fault_rows(entries).rows == [
+        ("thruster 3", "scale", "0.5", "20 s", "to the end"),
+        ("position", "nan", "-", "1 to 2 s", "3 s"),
+    ]
+
+
+def test_rows_of_transitions():
+    rows = transition_rows(
+        [Transition(10.05, State.DEGRADED, "saturated", 2.0, 0.0), Transition(11, State.ACTIVE, "", 0, 0)]
+    )
+    assert rows.rows == [("10.05 s", "DEGRADED", "saturated: 2, limit 0"), ("11 s", "ACTIVE", "")]
