@@ -14,8 +14,8 @@ from undertow.report.page import Html, bullets, document, figure, join, section,
 from undertow.report.plotting import Plotted
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
-from undertow.report.run_tables import RunTable, certificate_rows, metrics_rows, transition_rows
-from undertow.scenario.finished_run import certificate_of, metrics_of, transitions_of, window_of
+from undertow.report.run_tables import RunTable, certificate_rows, fault_rows, metrics_rows, transition_rows
+from undertow.scenario.finished_run import certificate_of, faults_of, metrics_of, transitions_of, window_of
 
 _DIGITS = 4
 
@@ -79,6 +79,8 @@ def _page(
     measured = metrics_rows(metrics["steady"], metrics["whole"], window, metrics_of(run), predicted)
     certificate = certificate_of(run)
     sections = [replay, section("metrics", measured.title, _table(measured), _meanings(measured))]
+    if faults := faults_of(run):
+        sections.append(section("faults", "Faults", _table(fault_rows(faults))))
     if (transitions := transitions_of(run)) is not None:
         sections.append(section("supervision", "Supervision", _table(transition_rows(transitions))))
     if certificate is not None:
