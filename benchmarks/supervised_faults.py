@@ -91,9 +91,9 @@ def single(seeds: int) -> None:
         cases = [(thruster, seed) for thruster in range(1, count + 1) for seed in range(seeds)]
         runs = judged_runs([scenario(vehicle, [entry(k, mode)], seed) for k, seed in cases], WINDOWS)
         well = [error(one, 3, 4) < 2 * error(healthy[seed], 3, 4) for one, (_, seed) in zip(runs, cases, strict=True)]
-        told = [good or announced(one) for good, one in zip(well, runs, strict=True)]
+        or_said = [good or announced(one) for good, one in zip(well, runs, strict=True)]
         median = np.median([found_after(one) for one in runs])
-        print(f"{vehicle:16}{mode:10}{len(runs):6}{sum(well):11}{sum(told):14}{median:25.2f}", flush=True)
+        print(f"{vehicle:16}{mode:10}{len(runs):6}{sum(well):11}{sum(or_said):14}{median:25.2f}", flush=True)
 
 
 def pairs(seeds: int) -> None:

@@ -33,6 +33,7 @@ HEAVY = {
     ("disturbances", "random_suite"),
     ("disturbances", "gauss_markov_current"),
     ("disturbances", "waves"),
+    ("supervision", "supervisor"),
 }
 
 # Operation by operation these take longest: without compilation they are met by the slow tests only.

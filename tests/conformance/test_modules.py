@@ -32,7 +32,8 @@ def classes():
 
 def is_abstract(cls):
     """Whether something is left open: it cannot be made."""
-    return bool(cls.__abstractmethods__ or getattr(cls, "__abstractvars__", ()))
+    left = (getattr(cls, name, ()) for name in ("__abstractmethods__", "__abstractvars__", "__abstractclassvars__"))
+    return any(left)
 
 
 def test_every_module_imports():

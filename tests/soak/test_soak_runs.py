@@ -61,7 +61,7 @@ def counts(**changes):
     ],
 )
 def test_never_events_of_a_run(events, change):
-    one = Judged(Status.OK, 1.0, counts(), True, 10, "", "simd")._replace(**change)
+    one = Judged(Status.OK, "", (), 0, 1.0, counts(), True, 10, "", "simd")._replace(**change)
     assert [event for event, _ in one.events()] == events
 
 

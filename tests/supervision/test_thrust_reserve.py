@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.analysis.thrust_reserve import attainable_wrench, controlled_axes, reference_reserve
 from undertow.core.errors import BadInput
-from undertow.supervision.thrust_reserve import attainable_wrench, controlled_axes, reference_reserve
 
 LOW, HIGH = -40.0, 50.0  # N
 ODIN = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.t200())

@@ -136,7 +136,7 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
             say = (lambda line: None) if options.json else typer.echo
             say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
             with stop.listening(), scheduled(options.priority, options.cpu):
-                reason = loop.run(steps)
+                reason = loop.run(periods=steps)
         if loop.statistics.steps:
             found = _data(loop.statistics, link, autopilot, reason, options)
             (folder / "statistics.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")

@@ -72,8 +72,8 @@ class Altered(NamedTuple):
 class AbstractFault(eqx.Module):
     """One way to fail: its parameters. Where and when is said beside it."""
 
-    targets: ClassVar[tuple[str, ...]]  # of ROLES
-    severity: ClassVar[Severity]
+    targets: eqx.AbstractClassVar[tuple[str, ...]]  # of ROLES
+    severity: eqx.AbstractClassVar[Severity]
 
 
 class AbstractMode(AbstractFault):

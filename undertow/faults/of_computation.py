@@ -36,7 +36,7 @@ class ComputedState(NamedTuple):
     counts: tuple[Int[Array, ""], ...]  # control steps so far in which each fault was present
 
 
-class _AbstractComputed(AbstractController):
+class AbstractComputed(AbstractController):
     """A controller on a computer that fails: it is computed late, twice, not at all, or its memory is altered.
 
     While it is not computed, the last input is held. The signals of such a step are those that the law would give.
@@ -92,7 +92,7 @@ class _AbstractComputed(AbstractController):
         return law, runs, dt, twice
 
 
-class Computed(_AbstractComputed):
+class Computed(AbstractComputed):
     """A law on a computer that fails."""
 
     model: Model
@@ -100,7 +100,7 @@ class Computed(_AbstractComputed):
     faults: tuple[ComputationFault, ...]
 
 
-class ComputedInformed(_AbstractComputed, AbstractInformedController):
+class ComputedInformed(AbstractComputed, AbstractInformedController):
     """The same of a law that models more of the acceleration."""
 
     model: Model
@@ -111,7 +111,7 @@ class ComputedInformed(_AbstractComputed, AbstractInformedController):
         return known_acceleration(self.law, z.law, y, u_applied)
 
 
-class ComputedGated(_AbstractComputed, AbstractGatedController):
+class ComputedGated(AbstractComputed, AbstractGatedController):
     """The same of a controller that gets readings which are not finite."""
 
     model: Model
@@ -134,7 +134,7 @@ def computed(law: AbstractController, faults: tuple[ComputationFault, ...]) -> A
 
 def law_of_computed(controller: AbstractController) -> AbstractController:
     """The controller on a computer without faults."""
-    return controller.law if isinstance(controller, _AbstractComputed) else controller
+    return controller.law if isinstance(controller, AbstractComputed) else controller
 
 
 def _where(condition, new, old):

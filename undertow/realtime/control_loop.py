@@ -103,18 +103,18 @@ class RealTimeLoop:
         names, unknown = form.columns(), lambda columns: np.full(len(columns), np.nan)
         return LinkMeasurement(unknown(names.position), unknown(names.velocity), unknown(names.attitude))
 
-    def run(self, steps: float = math.inf) -> Reason:
-        """Take steps until so many periods are over, the link ends or is silent for too long, or `stop` says so.
+    def run(self, steps: float = math.inf, periods: float = math.inf) -> Reason:
+        """Take steps until so many are taken, so many periods are over, the link ends or is silent, or `stop` says so.
 
         Whatever happens, the last thing sent is the safe output.
         """
         try:
             with _without_collection():
-                return self._run(steps)
+                return self._run(steps, periods)
         finally:
             self._link.finish(self._safe)
 
-    def _run(self, steps: float) -> Reason:
+    def _run(self, steps: float, periods: float) -> Reason:
         received = self._first_measurement()
         if received is None:
             return self._why_no_start()
@@ -133,7 +133,7 @@ class RealTimeLoop:
             seen.longest_stale = max(seen.longest_stale, waited)
             if seen.steps > 1 and started - last < 1.5 * period:
                 seen.jitter.add(abs(started - last - period))
-            if planned + 1 >= steps:
+            if seen.steps >= steps or planned + 1 >= periods:
                 return Reason.COMPLETED
 
             planned, last = following, started

@@ -20,7 +20,7 @@ _OFF_LEAST, _OFF_MOST, _REVERSED = 0.35, 1.15, 1.9
 _AHEAD = 0.5
 # Factor by which a pair must explain more, and be further ahead, than a single thruster.
 _PAIR = 4.0
-# Determinant of two directions, relative to their squares, from which on they are told apart.
+# Determinant of two directions, relative to their squares, from which on they are distinguished.
 _APART = 1e-3
 
 

@@ -82,7 +82,7 @@ class ThrusterMonitor(eqx.Module):
     of bandwidth w; a second one suppresses noise. A fault of thruster i adds E_i a_i.
 
     Every `interval` the residual is examined. D = rho(t) - 2 rho(t - L) + rho(t - 2 L), L five intervals, is what a
-    linear extrapolation of the residual does not foresee: loads, waves and errors of the model change slowly and
+    linear extrapolation of the residual does not predict: loads, waves and errors of the model change slowly and
     disappear in it, a thruster that stops does not, until 2 L later. D is weighed by its own covariance without faults,
     which sea, noise and errors of the model raise, and by what errors of the thruster model add to it when forces
     change (`mismatch`). `fault_hypotheses` compares thrusters, and pairs of them, with it.
