@@ -1,7 +1,7 @@
 """Contracts of modes: how a signal, the thrust, the plant or the computation of a controller fails."""
 
 import abc
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,6 +12,11 @@ from undertow.core.errors import BadInput
 from undertow.core.returned import difference, form, not_two
 from undertow.core.user_code import place_of
 from undertow.numerics.number import Number
+
+if TYPE_CHECKING:  # pyright knows no abstract class variables
+    from typing import ClassVar as AbstractClassVar
+else:
+    from equinox import AbstractClassVar
 
 # What a mode can be a mode of: a quantity that the controller receives, the readings of a sensor before the navigation
 # filter, one input of the plant, all inputs together, the plant and its surroundings, the computer.
@@ -72,8 +77,8 @@ class Altered(NamedTuple):
 class AbstractFault(eqx.Module):
     """One way to fail: its parameters. Where and when is said beside it."""
 
-    targets: eqx.AbstractClassVar[tuple[str, ...]]  # of ROLES
-    severity: eqx.AbstractClassVar[Severity]
+    targets: AbstractClassVar[tuple[str, ...]]  # of ROLES
+    severity: AbstractClassVar[Severity]
 
 
 class AbstractMode(AbstractFault):
