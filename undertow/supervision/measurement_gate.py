@@ -115,7 +115,9 @@ class MeasurementGate(eqx.Module):
         missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
         largest = lambda ratios: jnp.stack([one.max(initial=0.0) for one in ratios]).max()
         measurement = jax.lax.cond(all_good, lambda: y, mended)
-        lost = jnp.asarray(unreported, dtype=float)
+        # Actuators of which nobody has ever reported anything but rest are not lost.
+        before = jnp.stack([jnp.zeros(()), *(jnp.abs(one).max() for one in jax.tree.leaves(state.actuator))]).max()
+        lost = jnp.where(before > 0, jnp.asarray(unreported, dtype=float), 0.0)
         return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing, lost)
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:

@@ -86,11 +86,11 @@ class SupervisedState(NamedTuple):
     time: Float[Array, ""]  # s since the start
     safe_for: Float[Array, ""]  # s in SAFE
     output: Inputs  # applied last
-    turning: Bool[Array, ""]  # whether the output turns into that of the law, no faster than `slew`
+    turning: Int[Array, ""]  # whether the output turns into that of the law, no faster than `slew`
     variation: Float[Array, ""]  # of the input, ranges per second, averaged
     restarts: Float[Array, " kept"]  # times of the last restarts, s, the latest first
     restarted: Int[Array, ""]  # how often
-    fallback_controls: Bool[Array, ""]
+    fallback_controls: Int[Array, ""]
     request: Int[Array, ""]
     log: TransitionLog
 
@@ -130,7 +130,7 @@ class Supervised(AbstractGatedController):
         for entered in (State.READY, State.ACTIVE):
             log = logged(log, usable, (zero, jnp.asarray(int(entered)), none, zero, zero))
         state = jnp.where(usable, int(State.ACTIVE), int(State.INIT)).astype(int)
-        return new._replace(state=state, turning=jnp.logical_not(usable), log=log)
+        return new._replace(state=state, turning=jnp.where(usable, 0, 1).astype(int), log=log)
 
     def _fresh(
         self, law: PyTree, fallback: PyTree, gate: GateState, allowance: AllowanceState, r: Target
@@ -151,11 +151,11 @@ class Supervised(AbstractGatedController):
             time=zero,
             safe_for=zero,
             output=self.safe_output,
-            turning=jnp.asarray(True),
+            turning=jnp.ones((), dtype=int),
             variation=zero,
             restarts=jnp.full(self.watch.restarts + 1, _LONG_AGO),
             restarted=none,
-            fallback_controls=jnp.asarray(False),
+            fallback_controls=none,
             request=jnp.asarray(int(Request.RUN)),
             log=empty_log(),
         )
@@ -169,7 +169,7 @@ class Supervised(AbstractGatedController):
             "supervisor_limit": z.cause[1],
             "supervisor_transitions": z.log.number,
             "supervisor_restarts": z.restarted,
-            "fallback_controls": z.fallback_controls.astype(int),
+            "fallback_controls": z.fallback_controls,
         }
         return view.output, view.signals | own
 
@@ -206,7 +206,7 @@ class Supervised(AbstractGatedController):
             broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
         )
         by_fallback = self._by_whom(z, conditions)
-        switches = by_fallback != z.fallback_controls
+        switches = by_fallback != (z.fallback_controls > 0)
         damaged = ~all_finite(z)
         again = begins | diverged | switches | damaged
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
@@ -233,11 +233,11 @@ class Supervised(AbstractGatedController):
             time=time,
             safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
             output=u,
-            turning=again | (z.turning & ~view.reached),
+            turning=(again | ((z.turning > 0) & ~view.reached)).astype(int),
             variation=variation,
             restarts=jnp.where(switches, _LONG_AGO, times),
             restarted=z.restarted + jnp.where(counted, 1, 0),
-            fallback_controls=by_fallback,
+            fallback_controls=by_fallback.astype(int),
             request=z.request,
             log=logged(z.log, changed, (time, state, reason, cause[0], cause[1])),
         )
@@ -249,7 +249,8 @@ class Supervised(AbstractGatedController):
         new = self._fresh(after.law, after.fallback, self.gate.init(y), none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
         entry = (time, new.state, jnp.asarray(code_of(MEMORY)), *new.cause)
-        return new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
+        new = new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
+        return jax.tree.map(lambda fresh, old: fresh.astype(old.dtype), new, after)
 
     def known_acceleration(self, z: SupervisedState, y: Measurement, u_applied: Inputs) -> Outputs:
         return known_acceleration(self.law, z.law, y, u_applied)
@@ -265,11 +266,11 @@ class Supervised(AbstractGatedController):
         if self.fallback is None:
             command, signals = own()
         else:
-            command, signals = jax.lax.cond(z.fallback_controls, lambda: self._by_fallback(z, y, r), own)
+            command, signals = jax.lax.cond((z.fallback_controls > 0), lambda: self._by_fallback(z, y, r), own)
         most = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
         within = jnp.clip(command, self.watch.low, self.watch.high)
         towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
-        output = jnp.where(z.turning, towards(within), within)
+        output = jnp.where((z.turning > 0), towards(within), within)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
@@ -308,7 +309,7 @@ class Supervised(AbstractGatedController):
         if (fallback := self.fallback) is None:
             return by_law()
         by_fallback = lambda: (z.law, fallback.advance(z.fallback, y, r, u, step))
-        return jax.lax.cond(z.fallback_controls, by_fallback, by_law)
+        return jax.lax.cond((z.fallback_controls > 0), by_fallback, by_law)
 
     def _continued(self, z: SupervisedState, view: View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
         """States of law and fallback: begun again from the present measurement, advanced, or held."""
@@ -331,7 +332,7 @@ class Supervised(AbstractGatedController):
         if not isinstance(self.fallback, AbstractRestartable):
             return known
         own = _readable(self.fallback.knowledge(z.fallback))
-        return jax.tree.map(lambda a, b: jnp.where(z.fallback_controls, a, b), own, known)
+        return jax.tree.map(lambda a, b: jnp.where((z.fallback_controls > 0), a, b), own, known)
 
     def _allowance(self, z: SupervisedState, view: View, elapsed: Scalar) -> AllowanceState:
         """Allowed tracking error; where nobody controls, it is the present one."""
@@ -345,19 +346,19 @@ class Supervised(AbstractGatedController):
         """Average variation of the input, ranges from limit to limit per second."""
         now = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
-        return jnp.where(view.controls & ~z.turning, z.variation + share * (now - z.variation), 0.0)
+        return jnp.where(view.controls & ~(z.turning > 0), z.variation + share * (now - z.variation), 0.0)
 
     def _tolerated(self, z: SupervisedState) -> Bool[Array, " conditions"]:
         """Conditions that do not lead to SAFE now: the law has failed, but there is a fallback."""
         row = jnp.arange(len(NAMES)) == NUMBER["restarts_exhausted"]
-        return row & ~z.fallback_controls & (self.fallback is not None)
+        return row & ~(z.fallback_controls > 0) & (self.fallback is not None)
 
     def _by_whom(self, z: SupervisedState, conditions: Conditions) -> Bool[Array, ""]:
         """Whether the fallback controls from now on: where the law has failed, or as the operator wants."""
         if self.fallback is None:
-            return z.fallback_controls
+            return z.fallback_controls > 0
         failed = jnp.stack([conditions.level[NUMBER[name]] for name in ("restarts_exhausted", "chattering")]).max() > 0
-        fails = z.fallback_controls | (failed & _controls(z.state))
+        fails = (z.fallback_controls > 0) | (failed & _controls(z.state))
         asked = lambda request: z.request == int(request)
         return (fails | asked(Request.FALLBACK)) & ~asked(Request.LAW)
 

@@ -1,0 +1,74 @@
+"""A supervised autopilot: the bits of a simulation, its requests, its limits, and damage to its memory."""
+
+import numpy as np
+import pytest
+
+import undertow as ut
+from undertow.supervision.supervised_controller import state_in
+
+SCENARIO = {
+    "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+    "controller": "pid",
+    "supervisor": True,
+    "navigation": {"kind": "white_noise", "position": 1e-4, "velocity": 1e-4},
+    "reference": {"kind": "setpoint", "position": [0.5, 0, 0.5, 0, 0, 0.3]},
+    "loop": {"dt": 0.02, "duration": 1.0, "record": 0.02},
+}
+REST = np.zeros(3), np.zeros(6), np.zeros(3)
+
+
+@pytest.fixture(scope="module")
+def autopilot():
+    return ut.Autopilot(SCENARIO, attitude="euler", velocity="rates")
+
+
+def test_it_has_the_bits_of_a_simulation(autopilot):
+    run = ut.simulate_scenario(SCENARIO).dataset
+    position, velocity = run["measured_position"].values, run["measured_velocity"].values
+    taken = [autopilot.start(position[0, :3], velocity[0], position[0, 3:])]
+    for k in range(1, len(position)):
+        taken.append(autopilot.step(position[k, :3], velocity[k], position[k, 3:]))
+    assert autopilot.backend == "simd" and autopilot.state == ("ACTIVE", "")
+    np.testing.assert_array_equal(taken, run["commanded_input"].values)
+
+
+def test_requests_are_obeyed_without_a_jump(autopilot):
+    before, most = autopilot.start(*REST), 32.0 * 0.02
+    for request, state in (
+        ("hold", "READY"),
+        ("run", "ACTIVE"),
+        ("fallback", "ACTIVE"),
+        ("law", "ACTIVE"),
+        ("stop", "STOPPED"),
+    ):
+        autopilot.request(request)
+        autopilot.step(*REST)
+        output = autopilot.step(*REST)
+        assert autopilot.state[0] == state
+    assert np.abs(output - before).max() <= 16 and most > 0
+    with pytest.raises(ut.BadInput, match="request"):
+        autopilot.request("fly")
+
+
+def test_it_begins_at_the_input_that_was_applied(autopilot):
+    first = autopilot.start(*REST, applied=np.full(8, 1e6))
+    assert (np.abs(first) <= 16).all()
+    second = autopilot.step(*REST)
+    assert np.abs(second - first).max() <= 32.0 * 0.02 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf, 1e-310, 1e9])
+def test_any_time_and_reading_gives_an_input_within_limits(autopilot, dt):
+    autopilot.start(*REST)
+    for reading in (np.nan, np.inf, 1e300, -1e20, 0.0):
+        output = autopilot.step(np.full(3, reading), np.full(6, reading), np.full(3, reading), dt=dt)
+        assert (np.abs(output) <= 16).all()
+
+
+def test_a_damaged_memory_is_mended(autopilot):
+    autopilot.start(*REST)
+    autopilot.step(*REST)
+    state_in(autopilot._go_on.state).output[...] = np.nan
+    outputs = [autopilot.step(*REST) for _ in range(5)]
+    assert np.isfinite(outputs).all() and autopilot.state == ("ACTIVE", "")
+    assert "memory_damaged" in {one.reason for one in autopilot.transitions()}
