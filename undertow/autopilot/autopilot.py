@@ -378,13 +378,9 @@ class Autopilot:
         place = self._begin.inputs.health
         if place is None and health is not None:
             raise BadInput("health", "be left out: no actuator of this scenario announces a failure", "given")
-        return (
-            None
-            if place is None
-            else np.ones(place.shape)
-            if health is None
-            else numbers("health", health, place.shape)
-        )
+        if place is None:
+            return None
+        return np.ones(place.shape) if health is None else numbers("health", health, place.shape)
 
     def _target(self, target: Any) -> Target:
         """The target as given, or of the scenario's reference now."""

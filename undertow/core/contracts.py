@@ -43,9 +43,8 @@ class Measurement(NamedTuple):
     velocity: Outputs  # m/s, rad/s
     actuator: Any = None  # report of the actuators; None where there is none
     body: BodyMotion | None = None  # None for a plant that is not a body in space
-    health: Any = (
-        None  # per actuator, 1, or 0 where it announced that it has failed; None where none announces anything
-    )
+    # Per actuator, 1, or 0 where it announced that it has failed; None where none announces anything.
+    health: Any = None
 
 
 class Target(NamedTuple):

@@ -199,7 +199,6 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
                 raise BadInput("supervisor.fallback", "be a controller by name, or a mapping with `kind`", given)
             fallback, found = one("controller", "supervisor.fallback", Part(**given), (model,))
             described = {"fallback": found}
-        context["update_period"] = float(getattr(navigation, "update_period", 0.0))
         made, resolved["supervisor"] = one("supervisor", "supervisor", Part(**options), (law, plant, fallback))
         resolved["supervisor"] |= described
         return made

@@ -24,10 +24,9 @@ from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
 from undertow.supervision.conditions import state_of
 from undertow.supervision.supervised_controller import state_in
+from undertow.supervision.supervisor import limits_of
 from undertow.supervision.transition_log import Transition, transitions
 
-# Beyond any limit, in the unit of an input; a plant that takes it has none.
-_LARGE = 1e6
 _BEGINNING = 2  # transitions to READY and to ACTIVE
 _AT_ONCE = 512  # runs of one call: the memory of their results
 
@@ -141,11 +140,8 @@ def prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
     """A run of a scenario that is watched, its plan and its precision."""
     loop, plant = built.scenario.loop, built.closed_loop.plant
     start = built.closed_loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
-    most = jnp.full(plant.inputs(), _LARGE)
     x = plant.initial_state(*map(jnp.asarray, start))
-    limits = [np.asarray(plant.admissible(x, sign * most)) for sign in (-1, 1)]
-    limits = [np.where(np.abs(limit) >= _LARGE, np.copysign(np.inf, limit), limit) for limit in limits]
-    least, largest, length = map(as_array, (*limits, loop.duration / windows))
+    least, largest, length = map(as_array, (*map(np.asarray, limits_of(plant, x)), loop.duration / windows))
     watching = (Watch(least, largest, length, windows),)
     run = Run(built.closed_loop, watching, start, key_of_seed(built.scenario.seed))
     plan = Plan(round(loop.duration / loop.dt), loop.dt, 0, (), loop.method, loop.substeps)

@@ -106,7 +106,7 @@ CONDITIONS = (
     ),
     Condition(
         "measurement_stuck",
-        "motion missing from readings of the same bits, ten times or for three periods of the sensor",
+        "motion missing from readings of the same bits, ten times or for three times `update_period`",
         "1, of `stuck_distance` and `stuck_angle`",
         0.0,
         5.0,

@@ -59,7 +59,7 @@ def supervisor(
         plant: for the limits of its inputs, and for the accelerations that they can give.
         fallback: controller that takes over where the law fails again and again, or chatters; None for none.
         sampling_time: that of the loop, s; a scenario sets it.
-        update_period: longest time between two readings of a sensor, s; 0 for one at every step; a scenario sets it.
+        update_period: longest time between two readings of a sensor, s; 0 for one at every step.
         safe_output: input where nobody controls; one number or one per actuator, in the unit of the input.
         slew: fastest change of the input when control begins or changes hands, ranges from limit to limit per second.
         max_distance: largest plausible coordinate, m.
