@@ -11,19 +11,23 @@ from undertow.core import checks
 from undertow.core.contracts import Inputs, Measurement, Model
 from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
-from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters, weighed
+from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
+from undertow.supervision.fault_onset import (
+    OnsetState,
+    cleared,
+    examine,
+    first_weight,
+    onset_state,
+    transients,
+    weighed,
+)
 
 PerActuator = Float[Array, " m"]
 PerAxis = Float[Array, " n"]
 
-# Examinations between the samples of the second difference.
-_LAG = 5
-# Largest squared size of a residual, relative to its mean, with which it enters its covariance.
-_CLIP = 9.0
-# Variance of the residual that is always there, in squares of `unit`.
-_FLOOR = 0.25
-# First value of the covariance, in squares of `unit`, and the residuals that it counts for.
-_START, _FIRST = 25.0, 4.0
+# First value of the covariance of the residual without its background, in squares of `unit`, the residuals that it
+# counts for, and the largest squared size of one, relative to its mean, with which it enters.
+_START, _FIRST, _CLIP = 25.0, 4.0, 9.0
 # Part of the change of the nominal force of an unused thruster that its direction is not trusted to show.
 _UNUSED = 2.0
 # Difference between reported and predicted force that is a fault: share of the largest force, and of the predicted one.
@@ -37,9 +41,7 @@ _CHANGE = 20.0
 class Findings(NamedTuple):
     """What the examinations keep."""
 
-    residuals: Float[Array, "10 n"]  # of the last examinations, the latest first, m/s^2, rad/s^2
-    forces: Float[Array, "10 m"]  # nominal forces behind the same low-passes, N
-    covariance: Float[Array, "n n"]  # of the second difference without faults, in squares of `unit`
+    onsets: OnsetState
     background: PerAxis  # slow part of the residual: loads and errors of the model, m/s^2, rad/s^2
     slow_forces: PerActuator  # slow part of the nominal forces, N
     slow_covariance: Float[Array, "n n"]  # of the residual without its background, in squares of `unit`
@@ -114,13 +116,12 @@ class ThrusterMonitor(eqx.Module):
     interval: Float[Param, ""] = param("s", "between two examinations, at least the sampling time", default=0.05)
     background_time: Float[Param, ""] = param("s", "time constant of the slow part of the residual", default=0.7)
     memory: Float[Param, ""] = param("s", "time constant of the covariance", default=15.0)
-    mismatch: Float[Param, ""] = param("", "share of a change of force that the model may miss", default=0.04)
-    threshold: Float[Param, ""] = param("", "size of the residual that is a fault, in standard deviations", default=6.0)
-    other_threshold: Float[Param, ""] = param("", "the same where the thruster is not simply off", default=8.0)
-    learning: Float[Param, ""] = param(
-        "s", "time from the start at which both thresholds are still doubled", default=1.0
+    mismatch: Float[Param, ""] = param("", "share of a change of force that the model may miss", default=0.06)
+    decay: Float[Param, ""] = param("s", "time constant with which the thrust of a failed thruster ends", default=0.06)
+    threshold: Float[Param, ""] = param(
+        "", "size of the residuals that is a fault, in standard deviations", default=5.0
     )
-    explained: Float[Param, ""] = param("", "least share of the residual that one thruster explains", default=0.8)
+    learning: Float[Param, ""] = param("s", "time from the start at which the threshold is still doubled", default=1.0)
     margin: Float[Param, ""] = param("", "least squared distance to the second best, in variances", default=12.0)
     least: Float[Param, ""] = param("", "smallest force of a fault, as a share of the largest force", default=0.08)
     likely: Float[Param, ""] = param("", "log-likelihood ratio that is a fault", default=50.0)
@@ -134,14 +135,11 @@ class ThrusterMonitor(eqx.Module):
 
     def __check_init__(self):
         for name in (
-            *("unit", "largest", "bandwidth", "interval", "background_time", "memory", "threshold", "explained"),
+            *("unit", "largest", "bandwidth", "interval", "background_time", "memory", "threshold", "decay"),
             *("likely", "likely_rival", "correlation", "fading"),
         ):
             checks.positive(name, getattr(self, name))
-        for name in (
-            *("margin", "least", "other_threshold", "learning", "clearly", "persistence", "settling", "pause"),
-            "mismatch",
-        ):
+        for name in (*("margin", "least", "learning", "clearly", "persistence", "settling", "pause"), "mismatch"):
             checks.not_negative(name, getattr(self, name))
 
     def init(self, y: Measurement) -> MonitorState:
@@ -149,9 +147,7 @@ class ThrusterMonitor(eqx.Module):
         actuators, zero, none = self.model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
         velocity = self.model.coordinates.velocity(y)
         findings = Findings(
-            residuals=jnp.zeros((2 * _LAG, *velocity.shape)),
-            forces=jnp.zeros((2 * _LAG, *none.shape)),
-            covariance=_START * jnp.eye(velocity.shape[0]),
+            onsets=onset_state(velocity.shape[0], none.shape[0]),
             background=jnp.zeros_like(velocity),
             slow_forces=none,
             slow_covariance=_START * jnp.eye(velocity.shape[0]),
@@ -196,7 +192,9 @@ class ThrusterMonitor(eqx.Module):
         elapsed = jnp.maximum(self.interval, dt)
         findings = jax.lax.cond(
             state.wait < dt / 2,
-            lambda: self.examined(state.findings, effect, residual, second, differs, used, elapsed),
+            lambda: self.examined(
+                state.findings, effect, residual, jnp.stack([second, first, force]), differs, used, elapsed
+            ),
             lambda: state.findings,
         )
         return MonitorState(
@@ -214,7 +212,7 @@ class ThrusterMonitor(eqx.Module):
         past: Findings,
         effect: Float[Array, "n m"],
         residual: PerAxis,
-        forces: PerActuator,
+        forces: Float[Array, "3 m"],
         differs: PerActuator,
         used: PerActuator,
         elapsed: Float[Array, ""],
@@ -225,59 +223,48 @@ class ThrusterMonitor(eqx.Module):
             past: findings until now.
             effect: acceleration per force.
             residual: of now, m/s^2, rad/s^2.
-            forces: nominal ones behind the same low-passes, N.
+            forces: nominal ones behind two, one and no low-pass, N.
             differs: 1 for an actuator whose report differs from its command, else 0.
             used: 1 for an actuator that is in use, else 0.
             elapsed: time since the examination before, s.
         """
-        surprise = (residual - 2 * past.residuals[_LAG - 1] + past.residuals[-1]) / self.unit
-        changes = forces - 2 * past.forces[_LAG - 1] + past.forces[-1]
         scaled = effect / self.unit[:, None]
-        doubted = (jnp.where(used > 0, self.mismatch, _UNUSED) * changes)[None, :] * scaled
-        unknown = (doubted[:, None, :] * doubted[None, :, :]).sum(-1)
-        seen = weighed(scaled, past.covariance + _FLOOR * jnp.eye(len(surprise)) + unknown, surprise)
-        raised_by = 1 + self.learning / (
-            (past.examinations + 1) * elapsed
-        )  # while the covariance is that of a short time
+        doubt = jnp.where(used > 0, self.mismatch, _UNUSED)
+        remains = transients(self.bandwidth, self.decay, elapsed)
+        learned = first_weight(past.examinations, elapsed, self.memory)
+        onsets, seen = examine(past.onsets, residual / self.unit, forces, scaled, doubt, remains, learned)
+        since = jnp.maximum(past.examinations, 1.0) * elapsed  # while it is short, the covariance is not well known
         bounds = Bounds(
-            (raised_by * self.threshold) ** 2,
-            (raised_by * self.other_threshold) ** 2,
-            self.margin,
-            self.explained,
-            self.least,
+            ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest
         )
         awake = past.quiet <= 0
-        found, explained = one_thruster(seen, forces, self.largest, used, bounds)
+        found, explained = one_thruster(onsets, seen, used, bounds)
+        behind = forces[0]
         slow = (residual - past.background) / self.unit
         seen_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
         diagonal = jnp.eye(len(used)) > 0
-        ratio = jnp.where(diagonal, missing_effect(seen_slow, forces - past.slow_forces), missing_effect(seen, changes))
+        ratio = jnp.where(
+            diagonal, missing_effect(seen_slow, behind - past.slow_forces), missing_effect(seen.wide, seen.changes)
+        )
         likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
-        strained = jnp.where(jnp.abs(forces) > _STRAINED * self.largest, likely_pair, 0.0)
+        strained = jnp.where(jnp.abs(behind) > _STRAINED * self.largest, likely_pair, 0.0)
         suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
-        both = two_thrusters(seen, forces, self.largest, used, bounds, explained)
+        both = two_thrusters(seen, behind, used, bounds)
         both = jnp.where(awake, jnp.where(both.max() > 0, both, strained), 0.0)
         in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
         both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
         alarm = jnp.where(alarm.any(), alarm, both_alarm)
         raised = alarm.any()
-        known = past.examinations >= 2 * _LAG  # the differences are those of residuals
-        steady = jnp.maximum(elapsed / self.memory, 1 / (jnp.maximum(past.examinations - 2 * _LAG, 0.0) + _FIRST))
-        large = _CLIP * len(surprise)
-        weight = steady * jnp.minimum(1.0, large / jnp.where(seen.total > 0, seen.total, 1.0))
         forgotten = -jnp.expm1(-elapsed / self.background_time)
-        steady_slow = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
-        weight_slow = steady_slow * jnp.minimum(1.0, large / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
-        learned = past.covariance * (1 - steady) + weight * surprise[:, None] * surprise[None, :]
+        steady = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
+        weight = steady * jnp.minimum(1.0, _CLIP * len(slow) / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
         return Findings(
-            residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
-            forces=jnp.concatenate([forces[None], past.forces[:-1]]),
-            covariance=jnp.where(known, learned, past.covariance),
+            onsets=cleared(onsets, raised),
             background=past.background + forgotten * (residual - past.background),
-            slow_forces=past.slow_forces + forgotten * (forces - past.slow_forces),
-            slow_covariance=past.slow_covariance * (1 - steady_slow) + weight_slow * slow[:, None] * slow[None, :],
+            slow_forces=past.slow_forces + forgotten * (behind - past.slow_forces),
+            slow_covariance=past.slow_covariance * (1 - steady) + weight * slow[:, None] * slow[None, :],
             likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
             in_pair=jnp.where(raised, 0.0, in_pair),
