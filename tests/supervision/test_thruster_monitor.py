@@ -24,25 +24,27 @@ def monitor_of(speed_sensor=False, **options):
     if speed_sensor:
         actuators = thruster.actuator_model(8, True)
         model = model.in_body_axes()._replace(actuators=actuators)
-    return fault_tolerant(pid(model, sampling_time=DT), DT, **options).monitor
+    law = fault_tolerant(pid(model, sampling_time=DT), DT, **options)
+    return law.monitor, law.law.model
 
 
 def at(nu, report=None):
     return Measurement(jnp.zeros(6), nu, report, BodyMotion(jnp.asarray([1.0, 0.0, 0.0, 0.0]), jnp.eye(3), nu))
 
 
-def followed(monitor, input_of, force_of_plant, steps, load=None, start=None, used=None):
+def followed(watched, input_of, force_of_plant, steps, load=None, start=None, used=None):
     """State after steps of a body whose velocity obeys the nominal model with other forces, in Euler's steps."""
-    dynamics, load = monitor.model.dynamics, jnp.zeros(6) if load is None else load
+    monitor, model = watched
+    dynamics, load = model.dynamics, jnp.zeros(6) if load is None else load
     used = jnp.ones(8) if used is None else used
 
     def step(k, carry):
         state, nu = carry
         y, u = at(nu), input_of(k)
-        rate = dynamics.drift(y) + dynamics.gain(y) @ force_of_plant(k, monitor.model.actuators.force((), u)) + load
-        return monitor.advance(state, y, u, used * (1 - state.lost), jnp.asarray(DT)), nu + DT * rate
+        rate = dynamics.drift(y) + dynamics.gain(y) @ force_of_plant(k, model.actuators.force((), u)) + load
+        return monitor.advance(state, model, y, u, used * (1 - state.lost), jnp.asarray(DT)), nu + DT * rate
 
-    first = (monitor.init(at(jnp.zeros(6))), jnp.zeros(6)) if start is None else start
+    first = (monitor.init(model, at(jnp.zeros(6))), jnp.zeros(6)) if start is None else start
     return jax.lax.fori_loop(0, steps, step, first)
 
 
@@ -105,10 +107,11 @@ def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
 
 
 def test_a_propeller_that_reports_no_speed_is_lost():
-    monitor, u = monitor_of(speed_sensor=True, settling=0.0), 8.0 * jnp.ones(8)
-    state = monitor.init(at(jnp.zeros(6), PropellerReport(jnp.zeros(8), None)))
+    monitor, model = monitor_of(speed_sensor=True, settling=0.0)
+    u = 8.0 * jnp.ones(8)
+    state = monitor.init(model, at(jnp.zeros(6), PropellerReport(jnp.zeros(8), None)))
     speeds = jnp.zeros(8)
-    step = jax.jit(lambda state, y: monitor.advance(state, y, u, 1 - state.lost, jnp.asarray(DT)))
+    step = jax.jit(lambda state, y: monitor.advance(state, model, y, u, 1 - state.lost, jnp.asarray(DT)))
     for _ in range(40):
         state = step(state, at(jnp.zeros(6), PropellerReport(speeds, None)))
         speeds = state.unreported.speed.at[5].set(0.0)
@@ -116,10 +119,12 @@ def test_a_propeller_that_reports_no_speed_is_lost():
 
 
 def test_a_reading_that_is_not_finite_leaves_the_state_finite():
-    monitor = monitor_of()
-    state = monitor.init(at(jnp.zeros(6)))
-    state = monitor.advance(state, at(jnp.zeros(6).at[0].set(jnp.nan)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT))
-    state = monitor.advance(state, at(jnp.zeros(6)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT))
+    monitor, model = monitor_of()
+    state = monitor.init(model, at(jnp.zeros(6)))
+    state = monitor.advance(
+        state, model, at(jnp.zeros(6).at[0].set(jnp.nan)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT)
+    )
+    state = monitor.advance(state, model, at(jnp.zeros(6)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT))
     assert all(jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
 
 

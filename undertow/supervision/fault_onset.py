@@ -87,9 +87,10 @@ def transients(bandwidth, decay, elapsed) -> Float[Array, "11 3"]:
     """
     t = elapsed * jnp.arange(ONSETS + 1, dtype=jnp.asarray(elapsed).dtype)
     slow = jnp.exp(-bandwidth * t)
-    apart = bandwidth - 1 / decay
-    apart = jnp.where(jnp.abs(apart) < 1e-3 * bandwidth, 1e-3 * bandwidth, apart)  # the limit of equal time constants
-    stopped = (bandwidth / apart) ** 2 * (jnp.exp(-t / decay) - slow * (1 + apart * t))
+    rate = 1 / decay
+    rate = jnp.where(jnp.abs(bandwidth - rate) < 0.01 * bandwidth, 0.99 * bandwidth, rate)  # the limit of equal ones
+    apart = bandwidth - rate
+    stopped = (bandwidth / apart) ** 2 * (jnp.exp(-rate * t) - slow * (1 + apart * t))
     return jnp.stack([slow, slow * bandwidth * t, stopped], axis=1)
 
 

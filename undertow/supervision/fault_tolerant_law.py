@@ -62,7 +62,7 @@ class FaultTolerantController(AbstractRestartable):
         return self.law.model
 
     def init(self, y: Measurement, r: Target) -> FaultTolerantState:
-        return FaultTolerantState(self.law.init(y, r), self.monitor.init(y))
+        return FaultTolerantState(self.law.init(y, r), self.monitor.init(self.law.model.in_body_axes(), y))
 
     def knowledge(self, z: FaultTolerantState) -> MonitorState:
         """What is known of the actuators: what is lost stays lost."""
@@ -84,7 +84,9 @@ class FaultTolerantController(AbstractRestartable):
     def advance(self, z: FaultTolerantState, y: Measurement, r: Target, u_applied, dt) -> FaultTolerantState:
         used = self._used(z.monitor, y)
         law = self._reduced(used).advance(z.law, y, r, u_applied, dt)
-        return FaultTolerantState(law, self.monitor.advance(z.monitor, y, u_applied, used, dt))
+        return FaultTolerantState(
+            law, self.monitor.advance(z.monitor, self.law.model.in_body_axes(), y, u_applied, used, dt)
+        )
 
     def known_acceleration(self, z: FaultTolerantState, y: Measurement, u_applied):
         return known_acceleration(self._reduced(self._used(z.monitor, y)), z.law, y, u_applied)
@@ -101,7 +103,7 @@ class FaultTolerantController(AbstractRestartable):
         return eqx.tree_at(lambda law: law.model, self.law, reduced(self.law.model, used, self.priority))
 
     def _lost_axes(self, used: PerActuator, y: Measurement) -> Float[Array, " n"]:
-        gain, everything = self.monitor.model.dynamics.gain(y), jnp.ones_like(used)
+        gain, everything = self.law.model.in_body_axes().dynamics.gain(y), jnp.ones_like(used)
         share = lambda used: attained_share(gain, used, self.priority)
         lost = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
         return jax.lax.cond((used < 1).any(), lost, lambda: jnp.zeros_like(self.priority))
@@ -135,12 +137,12 @@ def fault_tolerant(
     effect = np.asarray(_gain_at_rest(own))
     largest = _largest(own, effect, limits)
     unit = 0.02 * np.abs(effect * largest).max(1)
-    known = set(ThrusterMonitor.__dataclass_fields__) - {"model", "unit", "largest"}
+    known = set(ThrusterMonitor.__dataclass_fields__) - {"unit", "largest"}
     for name in monitor:
         if name not in known:
             raise BadInput(name, f"be one of {', '.join(sorted(known))}")
     given = {"persistence": max(0.05, 2.5 * sampling_time)} | monitor
-    watch = ThrusterMonitor(own, np.where(unit > 0, unit, 1.0), largest, **given)
+    watch = ThrusterMonitor(np.where(unit > 0, unit, 1.0), largest, **given)
     priority = default_priority(law.model) if priority is None else priority
     checks.positive("priority", priority)
     priority = np.broadcast_to(np.asarray(priority, dtype=float), (effect.shape[0],))

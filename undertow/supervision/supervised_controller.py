@@ -207,7 +207,11 @@ class Supervised(AbstractGatedController):
         )
         by_fallback = self._by_whom(z, conditions)
         switches = by_fallback != (z.fallback_controls > 0)
-        damaged = ~all_finite(z)
+        # A law whose memory was damaged does not advance to a finite state; that is cheaper to see than the damage.
+        others = z._replace(law=(), fallback=())
+        damaged = ~all_finite(others) | jax.lax.cond(
+            broken, lambda: ~all_finite((z.law, z.fallback)), lambda: jnp.asarray(False)
+        )
         again = begins | diverged | switches | damaged
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
@@ -220,8 +224,8 @@ class Supervised(AbstractGatedController):
         cause = jnp.where(changed, _cause(exceeding, limits, reason), z.cause)
         law, fallback = self._continued(z, view, laws, again, broken)
         after = SupervisedState(
-            law=law,
-            fallback=fallback,
+            law=(),
+            fallback=(),
             gate=self.gate.after(view.passed, self._rate(z, view, u), elapsed),
             reference=view.r,
             allowance=allowance,
@@ -241,12 +245,13 @@ class Supervised(AbstractGatedController):
             request=z.request,
             log=logged(z.log, changed, (time, state, reason, cause[0], cause[1])),
         )
-        return jax.lax.cond(damaged, lambda: self._mended(after, z, y), lambda: after)
+        after = jax.lax.cond(damaged, lambda: self._mended(after, z, y), lambda: after)
+        return after._replace(law=law, fallback=fallback)
 
     def _mended(self, after: SupervisedState, z: SupervisedState, y: Measurement) -> SupervisedState:
-        """The state after damage to the memory: as at the start, with what can still be read of the old log."""
+        """The state, without laws, after damage to the memory: as at the start, with what can be read of the old log."""
         none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
-        new = self._fresh(after.law, after.fallback, self.gate.init(y), none, _readable(after.reference))
+        new = self._fresh((), (), self.gate.init(y), none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
         entry = (time, new.state, jnp.asarray(code_of(MEMORY)), *new.cause)
         new = new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
@@ -320,9 +325,9 @@ class Supervised(AbstractGatedController):
                 return _begun(self.law, self._knowledge(z), y, r), ()
             return _begun(self.law, self._knowledge(z), y, r), _begun(self.fallback, self._knowledge(z), y, r)
 
-        goes_on = view.controls & ~broken
-        kept = lambda: jax.tree.map(lambda new, old: jnp.where(goes_on, new, old), laws, (z.law, z.fallback))
-        return jax.lax.cond(again, begun, kept)
+        held = lambda: (z.law, z.fallback)
+        goes_on = view.controls & ~broken & ~again
+        return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(again, begun, held))
 
     def _knowledge(self, z: SupervisedState) -> PyTree:
         """What law and fallback know and must not lose: of the one that controls; () where they know nothing."""

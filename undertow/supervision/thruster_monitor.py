@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.contracts import Inputs, Measurement, Model
 from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
@@ -109,7 +110,6 @@ class ThrusterMonitor(eqx.Module):
         BadInput: a value that is not positive.
     """
 
-    model: Model  # in body axes
     unit: Float[Param, " n"] = param("m/s^2, rad/s^2", "residual that is not worth attention")
     largest: Float[Param, " m"] = param("N", "largest force of each actuator")
     bandwidth: Float[Param, ""] = param("rad/s", "of each low-pass", symbol="w", default=15.0)
@@ -142,10 +142,15 @@ class ThrusterMonitor(eqx.Module):
         for name in (*("margin", "least", "learning", "clearly", "persistence", "settling", "pause"), "mismatch"):
             checks.not_negative(name, getattr(self, name))
 
-    def init(self, y: Measurement) -> MonitorState:
-        """State before the first step: nothing is lost."""
-        actuators, zero, none = self.model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
-        velocity = self.model.coordinates.velocity(y)
+    def init(self, model: Model, y: Measurement) -> MonitorState:
+        """State before the first step: nothing is lost.
+
+        Args:
+            model: nominal, in body axes.
+            y: measurement of now.
+        """
+        actuators, zero, none = model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
+        velocity = model.coordinates.velocity(y)
         findings = Findings(
             onsets=onset_state(velocity.shape[0], none.shape[0]),
             background=jnp.zeros_like(velocity),
@@ -169,20 +174,23 @@ class ThrusterMonitor(eqx.Module):
             findings=findings,
         )
 
-    def advance(self, state: MonitorState, y: Measurement, u_applied: Inputs, used: PerActuator, dt) -> MonitorState:
+    def advance(
+        self, state: MonitorState, model: Model, y: Measurement, u_applied: Inputs, used: PerActuator, dt
+    ) -> MonitorState:
         """State one sampling time later; what is lost stays lost.
 
         Args:
             state: now.
+            model: nominal, in body axes. That of the law, so that what both compute of it is computed once.
             y: measurement of now.
             u_applied: input, held until then.
             used: 1 for an actuator that is in use, else 0.
             dt: sampling time, s.
         """
         share = -jnp.expm1(-self.bandwidth * dt)
-        dynamics = self.model.dynamics
-        after, force, unreported, differs = self._forces(state, y, u_applied, dt)
-        away = self.model.coordinates.velocity(y) - state.velocity
+        dynamics = model.dynamics
+        after, force, unreported, differs = self._forces(state, model.actuators, y, u_applied, dt)
+        away = model.coordinates.velocity(y) - state.velocity
         away = jnp.where(jnp.isfinite(away), away, 0.0)
         effect = dynamics.gain(y)
         residual = state.residual + share * (share / dt * away - state.residual)
@@ -274,9 +282,8 @@ class ThrusterMonitor(eqx.Module):
             evidence=jnp.maximum(jnp.sqrt(explained) / self.threshold, likelihood.max() / self.likely),
         )
 
-    def _forces(self, state: MonitorState, y: Measurement, u_applied: Inputs, dt):
+    def _forces(self, state: MonitorState, model: AbstractActuatorModel, y: Measurement, u_applied: Inputs, dt):
         """Actuators one step later, their mean force, the same actuators without report, and 1 where both differ."""
-        model = self.model.actuators
         reported = model.update_from_report(state.actuators, y.actuator)
         after = model.advance(reported, u_applied, dt)
         before = model.force(reported, u_applied)
