@@ -54,7 +54,13 @@ class FaultTolerantController(AbstractRestartable):
 
     law: AbstractController
     monitor: ThrusterMonitor
+    own: Model | None  # in body axes, where that of the law is not
     priority: Float[Param, " n"] = param("", "weight of each axis where not all can be controlled")
+
+    @property
+    def body_model(self) -> Model:
+        """Nominal model in body axes. It is the law's own if that is: what both compute of it is computed once."""
+        return self.law.model if self.own is None else self.own
 
     @property
     def model(self) -> Model:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -62,7 +68,7 @@ class FaultTolerantController(AbstractRestartable):
         return self.law.model
 
     def init(self, y: Measurement, r: Target) -> FaultTolerantState:
-        return FaultTolerantState(self.law.init(y, r), self.monitor.init(self.law.model.in_body_axes(), y))
+        return FaultTolerantState(self.law.init(y, r), self.monitor.init(self.body_model, y))
 
     def knowledge(self, z: FaultTolerantState) -> MonitorState:
         """What is known of the actuators: what is lost stays lost."""
@@ -85,7 +91,7 @@ class FaultTolerantController(AbstractRestartable):
         used = self._used(z.monitor, y)
         law = self._reduced(used).advance(z.law, y, r, u_applied, dt)
         return FaultTolerantState(
-            law, self.monitor.advance(z.monitor, self.law.model.in_body_axes(), y, u_applied, used, dt)
+            law, self.monitor.advance(z.monitor, self.body_model, y, u_applied, used, dt)
         )
 
     def known_acceleration(self, z: FaultTolerantState, y: Measurement, u_applied):
@@ -103,7 +109,7 @@ class FaultTolerantController(AbstractRestartable):
         return eqx.tree_at(lambda law: law.model, self.law, reduced(self.law.model, used, self.priority))
 
     def _lost_axes(self, used: PerActuator, y: Measurement) -> Float[Array, " n"]:
-        gain, everything = self.law.model.in_body_axes().dynamics.gain(y), jnp.ones_like(used)
+        gain, everything = self.body_model.dynamics.gain(y), jnp.ones_like(used)
         share = lambda used: attained_share(gain, used, self.priority)
         lost = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
         return jax.lax.cond((used < 1).any(), lost, lambda: jnp.zeros_like(self.priority))
@@ -146,7 +152,7 @@ def fault_tolerant(
     priority = default_priority(law.model) if priority is None else priority
     checks.positive("priority", priority)
     priority = np.broadcast_to(np.asarray(priority, dtype=float), (effect.shape[0],))
-    return FaultTolerantController(law, watch, priority)  # pyright: ignore[reportArgumentType] - an abstract field is no argument
+    return FaultTolerantController(law, watch, None if own is law.model else own, priority)  # pyright: ignore[reportArgumentType] - an abstract field is no argument
 
 
 def _gain_at_rest(model: Model):

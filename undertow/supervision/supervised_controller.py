@@ -249,7 +249,7 @@ class Supervised(AbstractGatedController):
         return after._replace(law=law, fallback=fallback)
 
     def _mended(self, after: SupervisedState, z: SupervisedState, y: Measurement) -> SupervisedState:
-        """The state, without laws, after damage to the memory: as at the start, with what can be read of the old log."""
+        """The state without laws after damage to the memory: as at the start, with what can be read of the log."""
         none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
         new = self._fresh((), (), self.gate.init(y), none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)

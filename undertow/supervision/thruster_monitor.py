@@ -197,7 +197,7 @@ class ThrusterMonitor(eqx.Module):
         second = state.forces[1] + share * (state.forces[0] - state.forces[1])
         first = state.forces[0] + share * (force - state.forces[0])
         velocity = state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away
-        elapsed = jnp.maximum(self.interval, dt)
+        elapsed = dt * jnp.maximum(jnp.round(self.interval / dt), 1.0)  # whole sampling times
         findings = jax.lax.cond(
             state.wait < dt / 2,
             lambda: self.examined(
