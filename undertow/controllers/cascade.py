@@ -58,7 +58,7 @@ def placed(
         inner: k, acceleration per error of the rate, 1/s; None: 2 w.
         integral: k_i, 1/s^2; None: 0.28 w^2. 0 for none.
         derivative: k_d, acceleration per derivative of the error of the rate.
-        derivative_filter: bandwidth of its filter, rad/s; by default beyond that of the sampling, so that there is none.
+        derivative_filter: bandwidth of its filter, rad/s; by default far beyond that of the sampling: none.
         rate_limit: largest rate demanded for an error, m/s and rad/s.
         feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
