@@ -81,7 +81,8 @@ def test_how_gains_came_about():
     assert note({"kind": "pid", "damping": 1.0, "frequency": None}, pid) == by_rule  # the default values
     given = note({"kind": "pid", "frequency": 2.0}, pid, Path("a.yaml"))
     assert given == ("gains given in a.yaml (frequency 2.0), not tuned by `undertow tune`", False)
-    assert note({"kind": "adrc", "bandwidth": 20.0}, adrc) == ("default gains of `adrc`, not tuned", False)
+    assert note({"kind": "adrc"}, adrc) == by_rule
+    assert note({"kind": "adrc", "bandwidth": 20.0}, adrc).sentence.startswith("gains given (bandwidth 20.0)")
     paper = note({"kind": "rcaf"}, rcaf)
     assert not paper.tuned and "Table 1" in paper.sentence
 

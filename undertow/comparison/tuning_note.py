@@ -13,7 +13,17 @@ from undertow.scenario import factory
 from undertow.tuning.tunable_parameters import law_of
 
 # Controllers whose gains follow from a rule unless this option, or another one instead of it, is given.
-_BY_RULE = {("pid", None): "frequency", ("rcaf", "robust"): "bandwidth"}
+_BY_RULE = {
+    ("pid", None): "frequency",
+    ("rcaf", "robust"): "bandwidth",
+    ("adrc", None): "bandwidth",
+    ("indi", None): "bandwidth",
+    ("disturbance_observer", None): "bandwidth",
+    ("l1_adaptive", None): "bandwidth",
+    ("nmpc", None): "bandwidth",
+    ("cascade", "placed"): "outer",
+    ("neural", None): "slope",
+}
 _RULE = "gains from the rule of `controllers/bandwidths.py`"
 _TABLE_1 = ("rcaf", "paper")
 _NO_GAINS = ("kind", "preset", "sampling_time", "velocity_noise")  # the last two follow from the rest of a scenario

@@ -14,12 +14,12 @@ from jaxtyping import Array, Float
 
 from undertow.numerics.linear_algebra import inverse_symmetric, matvec
 
-State = Float[Array, " 2n"]  # e and e_dot
+State = Float[Array, " states"]  # e and e_dot
 # Of a time within the horizon (s) and a state: e'' without forces, and its change per force -G.
 Motion = Callable[[Float[Array, ""], State], tuple[Float[Array, " n"], Float[Array, "n m"]]]
 
 _DOUBLINGS = 10  # of the horizon of the regulator at the end: 1024 steps
-_LEAST = 1e-6  # of a unit cost: forces that cancel each other stay small
+_LEAST = 1e-8  # cost of a force relative to that of its largest acceleration: forces that cancel stay small
 
 
 class Horizon(NamedTuple):
@@ -49,7 +49,7 @@ class Improved(NamedTuple):
 
     forces: Float[Array, "steps m"]
     start: State
-    gain: Float[Array, "m 2n"]
+    gain: Float[Array, "m states"]
 
 
 def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array, "steps m"]) -> Improved:
@@ -59,8 +59,6 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
     section III, with one projected Newton step for the limits.
     """
     h, low, high = horizon.step, horizon.low, horizon.high
-    unit = jnp.maximum(high - low, 1e-9)
-    ridge = _LEAST * h / unit**2
     weight = h * jnp.concatenate([horizon.position, horizon.rate])
     times = h * jnp.arange(forces.shape[0], dtype=forces.dtype)
 
@@ -84,7 +82,7 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
     def backward(after, now):
         slope, curve = after
         s, force, bend, by_state, by_force = now
-        axes = bend.shape[0]
+        axes, ridge = bend.shape[0], _LEAST * h * (by_force**2).sum(0).max()
         spread = jnp.concatenate([jnp.full(axes, h**2 / 2), jnp.full(axes, h)])
         drift = jnp.eye(2 * axes) + h * jnp.eye(2 * axes, k=axes)
         a = drift + spread[:, None] * jnp.concatenate([by_state, by_state])
@@ -93,7 +91,7 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
         own = weight * s + h * matvec(by_state.T, bend) + matvec(a.T, slope)
         of_force = h * matvec(by_force.T, bend) + ridge * force + matvec(b.T, slope)
         mixed = h * _product(by_force.T, by_state) + _product(curved_b.T, a)
-        hessian = h * _product(by_force.T, by_force) + jnp.diag(ridge) + _product(b.T, curved_b)
+        hessian = h * _product(by_force.T, by_force) + ridge * jnp.eye(force.shape[0]) + _product(b.T, curved_b)
         held = ((force <= low) & (of_force > 0)) | ((force >= high) & (of_force < 0))
         loose = jnp.where(held, 0.0, 1.0)
         kept = hessian * loose[:, None] * loose[None, :] + jnp.diag(1.0 - loose)
@@ -145,7 +143,7 @@ def regulator(horizon: Horizon) -> tuple[Float[Array, "n 2 2"], Float[Array, "n 
     return cost, gain
 
 
-def _end(horizon: Horizon) -> Float[Array, "2n 2n"]:
+def _end(horizon: Horizon) -> Float[Array, "states states"]:
     cost = regulator(horizon)[0]
     blocks = [[jnp.diag(cost[:, i, j]) for j in range(2)] for i in range(2)]
     return jnp.concatenate([jnp.concatenate(row, axis=1) for row in blocks])
