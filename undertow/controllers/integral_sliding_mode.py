@@ -59,8 +59,8 @@ class IntegralSlidingMode(AbstractAccelerationLaw):
 
     def demand(self, own: SlidingState, y: Measurement, off: TrackingError):
         surface, switching = self._surface(own, off)
-        wanted = off.acceleration + self._nominal(off) + switching
-        return wanted, {"estimate": -switching, "surface": surface}
+        demanded = off.acceleration + self._nominal(off) + switching
+        return demanded, {"estimate": -switching, "surface": surface}
 
     def adapt(self, own: SlidingState, y: Measurement, off: TrackingError, given: Given, dt) -> SlidingState:
         start = jnp.where(own.begun > 0, own.integral, -off.rate)

@@ -67,8 +67,8 @@ class LQI(AbstractAccelerationLaw):
     def demand(self, own: LQIState, y: Measurement, off: TrackingError):
         error, rate, acceleration = off
         _, of_error, of_rate, of_given = jnp.moveaxis(self.gains, -1, 0)
-        wanted = acceleration + of_error * error + of_rate * rate + own.integral
-        return wanted - of_given * (own.acceleration - acceleration), {"estimate": -own.integral / (1 + of_given)}
+        demanded = acceleration + of_error * error + of_rate * rate + own.integral
+        return demanded - of_given * (own.acceleration - acceleration), {"estimate": -own.integral / (1 + of_given)}
 
     def adapt(self, own: LQIState, y: Measurement, off: TrackingError, given: Given, dt) -> LQIState:
         """State one sampling time later; what limits take away is given back to the integral, as in `pid`."""

@@ -92,13 +92,13 @@ class SlotineLi(AbstractAccelerationLaw):
         structure, surface = self.regressor.parametrization(), self._surface(off)
         force, nominal = self._force(own, y, off), self._force(structure.nominal, y, off)
         # Of the whole acceleration, the drift is compensated later by the path that all laws share.
-        wanted = self.regressor.accelerated_by(y, force + self.gain * structure.inertia * surface)
+        demanded = self.regressor.accelerated_by(y, force + self.gain * structure.inertia * surface)
         signals = {
             "estimate": self.regressor.accelerated_by(y, nominal - force),
             "surface": surface,
             "parameter_change": (jnp.abs(own - structure.nominal) / structure.most).max(),
         }
-        return wanted + self.regressor.drift(y), signals
+        return demanded + self.regressor.drift(y), signals
 
     def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: Given, dt) -> Parameters:
         structure = self.regressor.parametrization()

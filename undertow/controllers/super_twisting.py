@@ -60,8 +60,8 @@ class SuperTwisting(AbstractAccelerationLaw):
         error, rate, acceleration = off
         surface = rate + self.slope * error
         root = surface / jnp.sqrt(jnp.maximum(jnp.abs(surface), self.layer))
-        wanted = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + own
-        return wanted, {"estimate": -own, "surface": surface}
+        demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + own
+        return demanded, {"estimate": -own, "surface": surface}
 
     def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
         """w one sampling time later; what limits take away is given back to it, as to the integral of `pid`."""
