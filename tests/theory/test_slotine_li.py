@@ -119,7 +119,7 @@ def test_lyapunov_function_falls_as_in_the_theorem():
     inertia = wrong.dynamics.parametrization().inertia
     rates = jnp.array([0.03, 0.05, 0.1, 0.3, 1.0])
     law = slotine_li(
-        wrong, sampling_time=1e-3, slope=20.0, gain=100.0 / inertia, adaptation=rates, reference_frequency=0.0
+        wrong, sampling_time=1e-3, slope=20.0, gain=100.0 / inertia, adaptation_rate=rates, reference_frequency=0.0
     )
     swing = np.radians([30.0, 45.0])
     reference = sine(amplitude=swing, frequency=2 * np.pi, phase=-np.pi / 2, offset=swing)
@@ -157,7 +157,7 @@ def test_lyapunov_function_falls_as_in_the_theorem():
 def test_with_the_load_alone_it_is_a_pid():
     plant, slope, gain, gamma = double_integrator(1), 1.5, 2.5, 0.8
     law = slotine_li(
-        plant.model(), slope=slope, gain=gain, adaptation=jnp.array([0.0, 0.0, gamma]), reference_frequency=0.0
+        plant.model(), slope=slope, gain=gain, adaptation_rate=jnp.array([0.0, 0.0, gamma]), reference_frequency=0.0
     )
     gains = [gain * slope + gamma, gamma * slope, slope + gain]
     same = pid(plant.model(), gains=gains, reference_frequency=0.0)
@@ -181,14 +181,25 @@ def test_vehicle_holds_its_place_under_constant_loads():
 
 def test_parameters_wait_at_limits_and_stay_plausible():
     plant = double_integrator(1, limit=1.0)
-    law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation=5.0, reference_frequency=0.0)
+    law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
     y, r = Measurement(jnp.zeros(1), jnp.zeros(1)), Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1))
     z = law.init(y, r)
     np.testing.assert_array_equal(law.advance(z, y, r, jnp.ones(1), 1e-2).law, z.law)
     structure = law.regressor.parametrization()
-    whole = slotine_li(double_integrator(1).model(), slope=1.0, adaptation=5.0, reference_frequency=0.0)
-    moved = whole.advance(z, y, r, whole.command(z, y, r)[0], 1e3)
+    whole = slotine_li(double_integrator(1).model(), slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
+    near = z._replace(law=jnp.array([1.0, 1.0, structure.most[2] - 0.1]))
+    moved = whole.advance(near, y, r, whole.command(near, y, r)[0], 1.0)
     np.testing.assert_array_equal(moved.law - structure.nominal, [0.0, 0.0, structure.most[2]])
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e6])
+def test_any_rate_of_adaptation_is_stable_when_sampled(rate):
+    """The rate is slowed down to what feedback can take away in one sampling time."""
+    plant = double_integrator(1)
+    law = slotine_li(plant.model(), sampling_time=0.02, slope=3.0, adaptation_rate=rate, reference_frequency=0.0)
+    found = run(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=2.0), duration=60.0, dt=0.02)
+    assert np.abs(found.signals["error"]).max() < 0.2
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
 def test_pendulum_stands():
@@ -202,8 +213,8 @@ def test_pendulum_stands():
     [
         ({"slope": -1.0}, "slope"),
         ({"gain": 0.0}, "gain"),
-        ({"adaptation": -1.0}, "adaptation"),
-        ({"adaptation": [1.0, 2.0]}, "adaptation"),
+        ({"adaptation_rate": -1.0}, "adaptation_rate"),
+        ({"adaptation_rate": [1.0, 2.0]}, "adaptation_rate"),
     ],
 )
 def test_settings_that_cannot_be(wrong, name):

@@ -19,6 +19,7 @@ PerAxis = Float[Array, " n"]
 # An attained share below this means that limits bind; above it the difference from 1 is rounding.
 _WHOLE = 0.999
 _ADAPTATION = 0.1  # over the square of the slope
+_USUAL = 10.0  # m/s^2, rad/s^2: at this acceleration the factors of other dynamics are learnt as fast as a load
 
 _CHANGE = Signal((), "1", "largest change of a parameter, as a share of the plausible one: 1 where projection acts")
 
@@ -40,9 +41,11 @@ class DiagonalDynamics(AbstractParametricDynamics):
 
     def parametrization(self) -> Parametrization:
         one = jnp.ones(self.axes)
-        nominal = jnp.concatenate([one, one, 0 * one])
         return Parametrization(
-            nominal, jnp.concatenate([0.8 * one, 0.8 * one, 100 * one]), jnp.ones(3 * self.axes), one
+            nominal=jnp.concatenate([one, one, 0 * one]),
+            most=jnp.concatenate([0.8 * one, 0.8 * one, _USUAL**2 * one]),
+            rates=jnp.concatenate([one / _USUAL**2, one / _USUAL**2, one]),
+            inertia=one,
         )
 
     def generalized_force(self, y: Measurement, parameters: Parameters, velocity, acceleration) -> Outputs:
@@ -73,7 +76,7 @@ class SlotineLi(AbstractAccelerationLaw):
     regressor: AbstractParametricDynamics
     slope: Float[Param, "..."] = param("1/s", "rate of decay on the surface", symbol="l", range=(0.1, 30.0))
     gain: Float[Param, "..."] = param("1/s", "rate of decay of s", symbol="k", range=(0.1, 30.0))
-    adaptation: Float[Param, "..."] = param(
+    adaptation_rate: Float[Param, "..."] = param(
         "1/s^2", "rate of adaptation; one number or one per parameter", symbol="gamma", range=(1e-3, 100.0)
     )
 
@@ -81,9 +84,10 @@ class SlotineLi(AbstractAccelerationLaw):
         for name in ("slope", "gain"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
             checks.positive(name, getattr(self, name))
-        checks.not_negative("adaptation", self.adaptation, "1/s^2")
-        if self.adaptation.ndim:
-            checks.length("adaptation", self.adaptation, self.regressor.parametrization().nominal.size, "parameters")
+        checks.not_negative("adaptation_rate", self.adaptation_rate, "1/s^2")
+        if self.adaptation_rate.ndim:
+            count = self.regressor.parametrization().nominal.size
+            checks.length("adaptation_rate", self.adaptation_rate, count, "parameters of the model")
 
     def begin(self, y: Measurement, r: Target) -> Parameters:
         return self.regressor.parametrization().nominal
@@ -101,12 +105,19 @@ class SlotineLi(AbstractAccelerationLaw):
         return demanded + self.regressor.drift(y), signals
 
     def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: Given, dt) -> Parameters:
-        structure = self.regressor.parametrization()
+        """Parameters one sampling time later.
+
+        Euler's method adds T / 2 theta_dot^T (gamma Gamma)^-1 theta_dot to V_dot. Where that is more than half of what
+        feedback takes away, adaptation is slowed down to it, so that V falls at any sampling time.
+        """
+        structure, surface = self.regressor.parametrization(), self._surface(off)
         _, transposed = jax.vjp(lambda parameters: self._force(parameters, y, off), own)
-        rate = jnp.where(
-            given.share < _WHOLE, 0.0, self.adaptation * structure.rates * transposed(self._surface(off))[0]
-        )
-        return jnp.clip(own + dt * rate, structure.nominal - structure.most, structure.nominal + structure.most)
+        (slope,) = transposed(surface)
+        rate = self.adaptation_rate * structure.rates * slope
+        added, taken = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
+        share = jnp.where(added > taken, taken / jnp.where(added > taken, added, 1.0), 1.0)
+        share = jnp.where(given.share < _WHOLE, 0.0, share)
+        return jnp.clip(own + dt * share * rate, structure.nominal - structure.most, structure.nominal + structure.most)
 
     def signals(self):
         surface = Signal(("axis",), "[axis]/s", "distance s from the surface")
@@ -129,7 +140,7 @@ def slotine_li(
     delay: float = 0.0,
     slope=None,
     gain=None,
-    adaptation=None,
+    adaptation_rate=None,
     motor: str = "steady",
     reference_frequency=None,
     actuator_rate=None,
@@ -151,8 +162,8 @@ def slotine_li(
         slope: l, rate of decay on the surface, 1/s; one number or one per axis. None: the one of least predicted cost
             that keeps the margins of `bandwidths.py` with the other defaults.
         gain: k, rate of decay of s, 1/s; one number or one per axis. None: the slope.
-        adaptation: gamma, rate of adaptation, 1/s^2; one number, or one per parameter. None: a tenth of the square of
-            the smallest slope. 0 for none.
+        adaptation_rate: gamma, 1/s^2; one number, or one per parameter. None: a tenth of the square of the smallest
+            slope. 0 for none.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of the slope, 2 at most; 0 for no
             filter.
@@ -168,6 +179,8 @@ def slotine_li(
         slope = alike([best_frequency(axis, _small_errors) for axis in axes])
     checks.per_axis("slope", slope, len(axes))
     checks.positive("slope", slope)
+    if adaptation_rate is None:
+        adaptation_rate = _ADAPTATION * jnp.min(jnp.asarray(slope, dtype=float)) ** 2
     dynamics = model.dynamics
     regressor = dynamics if isinstance(dynamics, AbstractParametricDynamics) else DiagonalDynamics(dynamics, len(axes))
     return SlotineLi(
@@ -183,7 +196,7 @@ def slotine_li(
         regressor=regressor,
         slope=slope,
         gain=slope if gain is None else gain,
-        adaptation=_ADAPTATION * jnp.min(jnp.asarray(slope, dtype=float)) ** 2 if adaptation is None else adaptation,
+        adaptation_rate=adaptation_rate,
     )
 
 
