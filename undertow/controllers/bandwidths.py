@@ -192,17 +192,27 @@ def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: i
 @functools.lru_cache(maxsize=4096)
 def pid_frequency(axis: Axis) -> float:
     """Natural frequency w of a PID with k_p = w^2, k_d = 2 w and k_i = w^3 / 10, rad/s: Fossen (2021), ch. 15."""
-    frequency = _bandwidth_grid(axis)[:, None]
-    law = lambda s: Law(frequency**2 + 0.1 * frequency**3 / s, 2 * frequency + 0 * s)
-    return float(frequency[_best(axis, law, frequency), 0])
+    return best_frequency(axis, lambda w, s: Law(w**2 + 0.1 * w**3 / s, 2 * w + 0 * s))
 
 
-def _bandwidth_grid(axis: Axis) -> np.ndarray:
+def best_frequency(axis: Axis, law: Callable[[np.ndarray, np.ndarray], Law]) -> float:
+    """Frequency of least cost with all margins of a law with one free number, rad/s.
+
+    Args:
+        axis: data of the axis.
+        law: (frequencies (candidates, 1), Laplace variables (frequencies,)) -> transfer functions of each candidate.
+    """
+    frequency = bandwidth_grid(axis)[:, None]
+    return float(frequency[_best(axis, lambda s: law(frequency, s), frequency), 0])
+
+
+def bandwidth_grid(axis: Axis) -> np.ndarray:
+    """Bandwidths that the rule tries, rad/s, in rising order."""
     return np.geomspace(_SLOWEST / axis.response_time, _FASTEST / axis.sampling_time, _CANDIDATES)
 
 
 def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
-    return _bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
+    return bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
 
 
 def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: int = 2) -> Law:

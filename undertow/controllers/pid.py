@@ -46,8 +46,8 @@ class PID(AbstractAccelerationLaw):
 
     def demand(self, own: PerAxis, y: Measurement, off: TrackingError):
         error, rate, acceleration = off
-        wanted = acceleration + self.proportional * error + self.derivative * rate + own
-        return wanted, {"estimate": -own}
+        demanded = acceleration + self.proportional * error + self.derivative * rate + own
+        return demanded, {"estimate": -own}
 
     def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
         """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.

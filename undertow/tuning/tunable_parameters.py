@@ -129,7 +129,7 @@ class Law(NamedTuple):
 
 
 # Options with one number for all axes.
-SHARED = ("actuator_rate", "direction")
+SHARED = ("actuator_rate", "adaptation_rate", "direction")
 
 
 def _robust(dt: float) -> Mapping[str, Range]:
