@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
-from undertow.controllers.observer_gains import observer_gains
+from undertow.controllers.second_order_observer import observer_gains
 from undertow.controllers.tracking_error import check_gains
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError

@@ -83,23 +83,24 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
         slope, curve = after
         s, force, bend, by_state, by_force = now
         axes, ridge = bend.shape[0], _LEAST * h * (by_force**2).sum(0).max()
-        spread = jnp.concatenate([jnp.full(axes, h**2 / 2), jnp.full(axes, h)])
-        drift = jnp.eye(2 * axes) + h * jnp.eye(2 * axes, k=axes)
-        a = drift + spread[:, None] * jnp.concatenate([by_state, by_state])
-        b = spread[:, None] * jnp.concatenate([by_force, by_force])
-        curved_b = _product(curve, b)
-        own = weight * s + h * matvec(by_state.T, bend) + matvec(a.T, slope)
-        of_force = h * matvec(by_force.T, bend) + ridge * force + matvec(b.T, slope)
-        mixed = h * _product(by_force.T, by_state) + _product(curved_b.T, a)
-        hessian = h * _product(by_force.T, by_force) + ridge * jnp.eye(force.shape[0]) + _product(b.T, curved_b)
+        spread = h * jnp.concatenate([h / 2 * jnp.eye(axes), jnp.eye(axes)])
+        a = jnp.eye(2 * axes) + h * jnp.eye(2 * axes, k=axes) + _product(spread, by_state)
+        # By the bending b of the error: gradient, and second derivatives by b and by b and the state.
+        of_bend = h * bend + matvec(spread.T, slope)
+        curved = _product(curve, spread)
+        hessian, mixed = h * jnp.eye(axes) + _product(spread.T, curved), h * by_state + _product(curved.T, a)
+        of_force = matvec(by_force.T, of_bend) + ridge * force
         held = ((force <= low) & (of_force > 0)) | ((force >= high) & (of_force < 0))
-        loose = jnp.where(held, 0.0, 1.0)
-        kept = hessian * loose[:, None] * loose[None, :] + jnp.diag(1.0 - loose)
-        inverse = inverse_symmetric(kept) * loose[:, None] * loose[None, :]
-        step, gain = -matvec(inverse, of_force), -_product(inverse, mixed)
-        slope = own + matvec(mixed.T, step)
+        free = by_force * jnp.where(held, 0.0, 1.0)[None, :]
+        # (r I + B^T H B)^-1 B^T = B^T (r H^-1 + B B^T)^-1 H^-1, which redundant forces do not make singular.
+        inverse = inverse_symmetric(hessian)
+        back = _product(free.T, inverse_symmetric(ridge * inverse + _product(free, free.T)))
+        surplus = jnp.where(held, 0.0, force)
+        step = matvec(back, matvec(free, surplus) - matvec(inverse, of_bend)) - surplus
+        gain = -_product(back, _product(inverse, mixed))
+        slope = weight * s + h * matvec(by_state.T, bend) + matvec(a.T, slope) + matvec(mixed.T, matvec(free, step))
         curve = jnp.diag(weight) + h * _product(by_state.T, by_state) + _product(_product(a.T, curve), a)
-        curve = curve + _product(mixed.T, gain)
+        curve = curve + _product(mixed.T, _product(free, gain))
         return (slope, (curve + curve.T) / 2), (step, gain)
 
     end = _end(horizon)
