@@ -25,6 +25,9 @@ LAWS = sorted(
     and isinstance(law(AXIS), AbstractAccelerationLaw)
 )  # fmt: skip
 
+# Laws whose programs for a vehicle are too large for the batch compiler: they run by XLA.
+LARGE = ("nmpc",)
+
 
 def made(name, plant, **options):
     return catalogue.names("controllers")[name](plant.model(), **options)
@@ -52,11 +55,12 @@ def test_default_gains_hold_a_vehicle_against_loads(name, make):
     """Loads that change, 50 Hz, limits of 16 V: for 200 s, within twice the error of `pid`."""
     plant = hybrid_vehicle(make(), t200(supply=16.0), ledger=False)
     load = sinusoid([0.2, 0.2, 0.2, 0.1, 0.1, 0.1], 0.8, offset=[0.1, 0.2, 0.1, 0.0, 0.0, 0.1])
+    simulate = sampled.simulate if name in LARGE else simd_batch.simulate
 
     def rms(name):
         law = made(name, plant, sampling_time=0.02)
         loop = ClosedLoop(plant, law, setpoint([1.0, -1.0, 0.5, 0.0, 0.0, 1.0]), load, perfect())
-        found = simd_batch.simulate(loop, duration=200.0, dt=0.02, record_every=5)
+        found = simulate(loop, duration=200.0, dt=0.02, record_every=5)
         assert int(found.status) == 0
         error = np.asarray(found.signals["error"])[-1000:]
         return np.sqrt((error[:, :3] ** 2).sum(1).mean()), np.sqrt((error[:, 3:] ** 2).sum(1).mean())

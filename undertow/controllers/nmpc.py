@@ -18,6 +18,7 @@ from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 
+_TIMES, _LONGEST = 4.0, 1.0  # length of the horizon: times 1 / w; s
 _LIMITLESS = 1e6  # N, or the unit of the force: infinity has no gradient
 
 
@@ -133,7 +134,7 @@ def nmpc(
     delay: float = 0.0,
     bandwidth=None,
     tracking=None,
-    horizon: float = 1.0,
+    horizon=None,
     steps: int = 10,
     motor: str = "computed",
     reference_frequency=None,
@@ -156,7 +157,7 @@ def nmpc(
             `disturbance_observer`.
         tracking: w, natural frequency of the tracking error where no limit binds, rad/s; None: as of
             `disturbance_observer`.
-        horizon: its length, s.
+        horizon: its length, s; None: 4 / w of the slowest axis, 1 s at most.
         steps: its number of steps.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
@@ -169,10 +170,13 @@ def nmpc(
     """
     if steps < 2:
         raise BadInput("steps", "be at least 2", steps)
-    checks.positive("horizon", horizon, "s")
+    if horizon is not None:
+        checks.positive("horizon", horizon, "s")
     model = model.in_body_axes()
     axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
     bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
+    if horizon is None:
+        horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
     path = actuation_for(
         sampling_time,
         tracking,
