@@ -189,7 +189,8 @@ def test_parameters_wait_at_limits_and_stay_plausible():
     structure = law.regressor.parametrization()
     whole = slotine_li(double_integrator(1).model(), slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
     near = z._replace(law=jnp.array([1.0, 1.0, structure.most[2] - 0.1]))
-    moved = whole.advance(near, y, r, whole.command(near, y, r)[0], 1.0)
+    still = Measurement(jnp.zeros(1), jnp.zeros(1))
+    moved = whole.advance(near, still, r, whole.command(near, still, r)[0], 1.0)
     np.testing.assert_array_equal(moved.law - structure.nominal, [0.0, 0.0, structure.most[2]])
 
 
