@@ -14,7 +14,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, inverted_pendulum
+from undertow.plants import double_integrator
 from undertow.references import setpoint
 
 C, INNER, GAMMA, LOAD = 2.0, 5.0, 1.2, 0.7
@@ -90,12 +90,6 @@ def test_estimate_waits_at_limits_and_stays_within_its_bound():
     np.testing.assert_allclose(held.signals["estimate"][-1], -0.5)
     # The rest of the load is balanced by an error: 2 c^2 e = 0.5 m/s^2.
     np.testing.assert_allclose(held.signals["error"][-1], 0.25, rtol=1e-6)
-
-
-def test_pendulum_stands():
-    pendulum = inverted_pendulum()
-    found = run(pendulum, adaptive_backstepping(pendulum.model(), rate=6.0), [0.1], duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 @pytest.mark.parametrize(

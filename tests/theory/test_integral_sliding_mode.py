@@ -9,7 +9,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, inverted_pendulum
+from undertow.plants import double_integrator
 from undertow.references import setpoint
 
 
@@ -68,12 +68,6 @@ def test_a_load_above_the_amplitude_leaves_the_layer():
     found = run(plant, law, [0.0], sinusoid(0.0, 1.0, offset=1.5), duration=6.0, dt=1e-3)
     growth = np.diff(found.signals["surface"][[3000, 5000], 0])[0] / 2.0
     np.testing.assert_allclose(growth, -0.5, rtol=1e-6)
-
-
-def test_pendulum_stands():
-    pendulum = inverted_pendulum()
-    found = run(pendulum, integral_sliding_mode(pendulum.model(), frequency=8.0), [0.1], duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, inverted_pendulum
+from undertow.plants import double_integrator
 from undertow.references import setpoint, sine
 
 
@@ -103,13 +103,6 @@ def test_e_modification_forgets_and_projection_bounds():
     assert size[1] < 0.8 * size[0]
     # Four parameters of at most 0.5, of which the load's is the whole where nothing moves.
     assert np.abs(bounded.signals["estimate"]).max() < 0.9 * size[0]
-
-
-def test_pendulum_follows_with_a_wrong_length():
-    plant = inverted_pendulum()
-    law = mrac(plant.model(half_length=0.35), frequency=8.0)
-    found = run(plant, law, setpoint([0.1]), duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 @pytest.mark.parametrize(

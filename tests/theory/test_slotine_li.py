@@ -182,13 +182,15 @@ def test_vehicle_holds_its_place_under_constant_loads():
 def test_parameters_wait_at_limits_and_stay_plausible():
     plant = double_integrator(1, limit=1.0)
     law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
-    y, r = Measurement(jnp.zeros(1), jnp.zeros(1)), Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1))
+    y, r = Measurement(jnp.zeros(1), jnp.array([-3.0])), Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1))
     z = law.init(y, r)
+    np.testing.assert_allclose(law.reach, 0.5)
     np.testing.assert_array_equal(law.advance(z, y, r, jnp.ones(1), 1e-2).law, z.law)
     structure = law.regressor.parametrization()
     whole = slotine_li(double_integrator(1).model(), slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
     near = z._replace(law=jnp.array([1.0, 1.0, structure.most[2] - 0.1]))
-    moved = whole.advance(near, y, r, whole.command(near, y, r)[0], 1.0)
+    still = Measurement(jnp.zeros(1), jnp.zeros(1))
+    moved = whole.advance(near, still, r, whole.command(near, still, r)[0], 1.0)
     np.testing.assert_array_equal(moved.law - structure.nominal, [0.0, 0.0, structure.most[2]])
 
 
@@ -200,12 +202,6 @@ def test_any_rate_of_adaptation_is_stable_when_sampled(rate):
     found = run(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=2.0), duration=60.0, dt=0.02)
     assert np.abs(found.signals["error"]).max() < 0.2
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
-
-
-def test_pendulum_stands():
-    plant = inverted_pendulum()
-    found = run(plant, slotine_li(plant.model(half_length=0.35), slope=8.0), setpoint([0.1]), duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 @pytest.mark.parametrize(

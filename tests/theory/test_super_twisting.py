@@ -12,7 +12,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, inverted_pendulum
+from undertow.plants import double_integrator
 from undertow.references import setpoint
 
 NO_LAYER = {"layer": 1e-9, "reference_frequency": 0.0}
@@ -114,12 +114,6 @@ def test_limits_do_not_wind_up():
     found = run(plant, law, [5.0], sinusoid(0.0, 1.0, offset=-1.0), duration=60.0)
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-4)
     assert np.abs(found.signals["estimate"]).max() < 6.0
-
-
-def test_pendulum_stands():
-    pendulum = inverted_pendulum()
-    found = run(pendulum, super_twisting(pendulum.model(), slope=4.0), [0.1], duration=8.0)
-    assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
 @pytest.mark.parametrize(

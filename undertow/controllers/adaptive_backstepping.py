@@ -17,7 +17,7 @@ from undertow.core.param import Param, param
 PerAxis = Float[Array, " n"]
 
 _INNER, _ADAPTATION = 4.0, 0.3  # over the rate, and over its square
-_SHORT = 0.5  # sampling times: a lag below that is none
+_SHORT = 8.0  # sampling times: with a shorter lag the margins leave more to the law without the third step
 _WHOLE = 0.999  # an attained share below this means that limits bind
 _UNLIMITED = 10.0  # m/s^2, rad/s^2, where actuators have no limit
 
@@ -152,7 +152,7 @@ def adaptive_backstepping(
         bound: largest estimate of the load, m/s^2 and rad/s^2. None: the authority of the actuators, 10 where
             they have no limit.
         lag: nominal time constant of the actuators, s; None: that of the model. The third step falls away where it is
-            less than half of the sampling time.
+            less than eight sampling times: there the margins leave more to the law without it.
         feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of c, 2 at most; 0 for no filter.
         direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.

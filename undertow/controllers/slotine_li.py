@@ -19,6 +19,7 @@ PerAxis = Float[Array, " n"]
 # An attained share below this means that limits bind; above it the difference from 1 is rounding.
 _WHOLE = 0.999
 _ADAPTATION = 0.1  # over the square of the slope
+_HALF, _FAR = 0.5, 1e6  # largest error: share of the authority that it asks for; m, rad
 _USUAL = 10.0  # m/s^2, rad/s^2: at this acceleration the factors of other dynamics are learnt as fast as a load
 
 _CHANGE = Signal((), "1", "largest change of a parameter, as a share of the plausible one: 1 where projection acts")
@@ -64,6 +65,9 @@ class SlotineLi(AbstractAccelerationLaw):
     V_dot = -k s^T I s. Parameters stay within plausible deviations from the nominal ones by projection, which can only
     lower V, and wait while limits of the actuators bind.
 
+    Errors beyond `reach` count as that far: without it the velocity v_r, and with it the modelled forces, would grow
+    without bound while limits keep the vehicle away.
+
     For small errors, with the load as only parameter, it is a PID with k_d = l + k, k_p = k l + gamma, k_i = gamma l.
     The state of the law are the parameters theta.
 
@@ -79,9 +83,10 @@ class SlotineLi(AbstractAccelerationLaw):
     adaptation_rate: Float[Param, "..."] = param(
         "1/s^2", "rate of adaptation; one number or one per parameter", symbol="gamma", range=(1e-3, 100.0)
     )
+    reach: Float[Param, "..."] = param("m, rad", "largest error that counts", symbol="e_max")
 
     def __check_init__(self):
-        for name in ("slope", "gain"):
+        for name in ("slope", "gain", "reach"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
             checks.positive(name, getattr(self, name))
         checks.not_negative("adaptation_rate", self.adaptation_rate, "1/s^2")
@@ -124,11 +129,12 @@ class SlotineLi(AbstractAccelerationLaw):
         return ESTIMATE | {"surface": surface, "parameter_change": _CHANGE} | ATTAINED_SHARE
 
     def _surface(self, off: TrackingError) -> PerAxis:
-        return off.rate + self.slope * off.error
+        return off.rate + self.slope * jnp.clip(off.error, -self.reach, self.reach)
 
     def _force(self, parameters: Parameters, y: Measurement, off: TrackingError) -> PerAxis:
         velocity = self.model.coordinates.velocity(y) + self._surface(off)
-        return self.regressor.generalized_force(y, parameters, velocity, off.acceleration + self.slope * off.rate)
+        counting = jnp.where(jnp.abs(off.error) < self.reach, off.rate, 0.0)
+        return self.regressor.generalized_force(y, parameters, velocity, off.acceleration + self.slope * counting)
 
 
 def slotine_li(
@@ -141,6 +147,7 @@ def slotine_li(
     slope=None,
     gain=None,
     adaptation_rate=None,
+    reach=None,
     motor: str = "steady",
     reference_frequency=None,
     actuator_rate=None,
@@ -164,6 +171,8 @@ def slotine_li(
         gain: k, rate of decay of s, 1/s; one number or one per axis. None: the slope.
         adaptation_rate: gamma, 1/s^2; one number, or one per parameter. None: a tenth of the square of the smallest
             slope. 0 for none.
+        reach: largest error that counts, m and rad. None: the one at which feedback asks for half of
+            the authority of the actuators, and 1e6 where they have no limit.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of the slope, 2 at most; 0 for no
             filter.
@@ -179,6 +188,11 @@ def slotine_li(
         slope = alike([best_frequency(axis, _small_errors) for axis in axes])
     checks.per_axis("slope", slope, len(axes))
     checks.positive("slope", slope)
+    gain = slope if gain is None else gain
+    if reach is None:
+        most = [axis.authority for axis in axes]
+        steep = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
+        reach = jnp.minimum(_HALF * jnp.asarray(most, dtype=float) / steep, _FAR)
     if adaptation_rate is None:
         adaptation_rate = _ADAPTATION * jnp.min(jnp.asarray(slope, dtype=float)) ** 2
     dynamics = model.dynamics
@@ -195,8 +209,9 @@ def slotine_li(
         ),
         regressor=regressor,
         slope=slope,
-        gain=slope if gain is None else gain,
+        gain=gain,
         adaptation_rate=adaptation_rate,
+        reach=reach,
     )
 
 

@@ -81,7 +81,8 @@ def least_second(first):
     With (|s|^(1/2) sign s, w) as state the law is a linear system whose uncertain feedback is at most L (Moreno and
     Osorio 2012); the bounded real lemma asks that the peak of (1/2) / (p^2 + p c_1 / 2 + c_2 / 2) be below 1.
     """
-    return (first >= 2) * 1.0 + (first < 2) * (2 / first**2 + first**2 / 8)
+    counted = first.clip(max=2.0)  # from there on the peak is at p = 0
+    return 2 / counted**2 + counted**2 / 8
 
 
 def super_twisting(
