@@ -110,7 +110,7 @@ def test_coriolis_forces_of_a_vehicle_do_no_work_for_any_inertia():
 
 
 def test_lyapunov_function_falls_as_in_the_theorem():
-    """The arm and the gains of Slotine and Li (1991), Example 9.3: K_D = 100 I, l = 20, Gamma = (0.03, 0.05, 0.1, 0.3).
+    """The arm of Slotine and Li (1991), section 9.2, with K_D = 100 I, l = 20 and Gamma = (0.03, 0.05, 0.1, 0.3).
 
     Nothing is known of the parameters at first. V = 1/2 s^T M s + 1/2 theta~^T Gamma^-1 theta~ falls by the integral of s^T K_D s.
     """

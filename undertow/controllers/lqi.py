@@ -144,7 +144,7 @@ def lqi(
     reference_frequency=None,
     direction=1.0,
 ) -> LQI:
-    """Linear-quadratic regulator with an integral, about trim: Anderson and Moore (1990), ch. 3 and 9. Body axes.
+    """Linear-quadratic regulator with an integral, about trim: Anderson and Moore (1990). Body axes.
 
     The model of an axis is a double integrator behind the nominal lag of the actuators; weight, buoyancy and drag are
     compensated, so that it is the same at every trim. Couplings between axes are those that the inverse of the model

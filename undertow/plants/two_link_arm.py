@@ -94,7 +94,7 @@ class Links(AbstractParametricDynamics):
         return Parametrization(nominal, largest, jnp.ones(5), jnp.diagonal(self.mass_matrix(jnp.zeros(2))))
 
     def generalized_force(self, y: Measurement, parameters, velocity, acceleration) -> Float[Array, "2"]:
-        """Eq. (9.7) and Example 9.3, with the weight of a vertical arm."""
+        """As in section 9.2 of the book, with the weight of a vertical arm."""
         a1, a2, a3, a4, moment = parameters
         (q1, q2), (rate1, rate2) = y.position, y.velocity
         coupling, h = a3 * jnp.cos(q2) + a4 * jnp.sin(q2), a3 * jnp.sin(q2) - a4 * jnp.cos(q2)
