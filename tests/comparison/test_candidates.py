@@ -8,7 +8,7 @@ import pytest
 from undertow.comparison.candidates import controllers
 from undertow.comparison.prepare import prepare_comparison
 from undertow.comparison.tuning_note import tuning_note
-from undertow.controllers import adrc, pid, rcaf
+from undertow.controllers import adrc, pid, rcaf, super_twisting
 from undertow.core.errors import BadInput
 from undertow.plants import double_integrator
 from undertow.scenario.reading import dump, read
@@ -79,9 +79,12 @@ def test_how_gains_came_about():
     assert by_rule.tuned and by_rule.sentence == "gains from the rule of `controllers/bandwidths.py`"
     assert "with damping 2.0 given" in note({"kind": "pid", "damping": 2.0}, pid).sentence
     assert note({"kind": "pid", "damping": 1.0, "frequency": None}, pid) == by_rule  # the default values
+    assert note({"kind": "super_twisting"}, super_twisting) == by_rule
+    assert "given" in note({"kind": "super_twisting", "slope": 2.0}, super_twisting).sentence
     given = note({"kind": "pid", "frequency": 2.0}, pid, Path("a.yaml"))
     assert given == ("gains given in a.yaml (frequency 2.0), not tuned by `undertow tune`", False)
-    assert note({"kind": "adrc", "bandwidth": 20.0}, adrc) == ("default gains of `adrc`, not tuned", False)
+    assert note({"kind": "adrc"}, adrc) == by_rule
+    assert note({"kind": "adrc", "bandwidth": 20.0}, adrc).sentence.startswith("gains given (bandwidth 20.0)")
     paper = note({"kind": "rcaf"}, rcaf)
     assert not paper.tuned and "Table 1" in paper.sentence
 

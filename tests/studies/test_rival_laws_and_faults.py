@@ -7,15 +7,19 @@ import numpy as np
 import pytest
 
 from undertow.analysis.small_signal import gains
+from undertow.controllers import adrc, indi
 from undertow.controllers.presets.paper import paper
+from undertow.controllers.presets.robust import robust
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.disturbances import thruster_loss
 from undertow.loop import sampled
 from undertow.navigation import degraded
-from undertow.plants import double_integrator
+from undertow.plants import double_integrator, hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.build import build
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy
 
 LOAD = {"kind": "random_suite", "amplitude": 0.5, "step": 0.3}
 
@@ -66,6 +70,30 @@ def test_a_linear_law_removes_a_constant_load(kind):
     found = run({"kind": kind, "bandwidth": 30.0, "feedback": [16.0, 8.0]}, duration=4.0, load=push)
     np.testing.assert_allclose(found["estimate"][-1], [3.0, -2.0, 1.0, 0.5, 0.0, -4.0], rtol=1e-3, atol=1e-6)
     np.testing.assert_allclose(found["error"][-1], 0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("make", [adrc, indi])
+def test_default_gains_are_those_of_the_rule_of_preset_robust(make):
+    """Bandwidth, feedback, actuator loop and filter of jumps of a vehicle with lagged thrusters and noisy velocity."""
+    model = hybrid_vehicle(bluerov2_heavy(), t200(supply=16.0)).model()
+    where = {"sampling_time": 0.01, "velocity_noise": 0.01}
+    law, like = make(model, **where), robust(model, **where)
+    np.testing.assert_array_equal(law.bandwidth, like.estimator.bandwidth)
+    np.testing.assert_array_equal(law.feedback, like.feedback)
+    np.testing.assert_array_equal(law.actuation.actuator_rate, like.actuator_rate)
+    np.testing.assert_array_equal(law.actuation.filter.frequency, like.filter.frequency)
+    assert make(model, feedback=(1.0, 2.0), **where).actuation.filter is None
+    with pytest.raises(BadInput, match="tracking"):
+        make(model, feedback=(1.0, 2.0), tracking=1.0)
+
+
+@pytest.mark.parametrize("kind", ["adrc", "indi"])
+def test_a_linear_law_does_not_wind_up(kind):
+    """The estimate of a constant load is the same at the limits: it uses what was applied."""
+    push = {"kind": "sinusoid", "amplitude": 0.0, "frequency": 1.0, "offset": 0.7}
+    law = {"kind": kind, "bandwidth": 30.0, "feedback": [16.0, 8.0]}
+    limited, free = (run(law, goal=2.0, duration=4.0, limit=limit, load=push)["estimate"] for limit in (2.0, None))
+    np.testing.assert_allclose(limited, free, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["adrc", "indi"])

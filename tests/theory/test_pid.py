@@ -62,7 +62,7 @@ def test_limits_do_not_wind_up():
     def misled(state, _):
         x, v, z = state
         y = Measurement(x, v)
-        wanted = law.proportional * (5.0 - x) - law.derivative * v + z.integral
+        wanted = law.proportional * (5.0 - x) - law.derivative * v + z.law
         moved = v + dt * (jnp.clip(wanted, -1.5, 1.5) - 1.0)
         return (x + dt * v, moved, law.advance(z, y, target, wanted, dt)), x[0]
 

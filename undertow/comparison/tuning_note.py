@@ -12,8 +12,6 @@ from undertow.core.contracts import AbstractController
 from undertow.scenario import factory
 from undertow.tuning.tunable_parameters import law_of
 
-# Controllers whose gains follow from a rule unless this option, or another one instead of it, is given.
-_BY_RULE = {("pid", None): "frequency", ("rcaf", "robust"): "bandwidth"}
 _RULE = "gains from the rule of `controllers/bandwidths.py`"
 _TABLE_1 = ("rcaf", "paper")
 _NO_GAINS = ("kind", "preset", "sampling_time", "velocity_noise")  # the last two follow from the rest of a scenario
@@ -41,10 +39,9 @@ def tuning_note(
     searched = _searched(part, source)
     if searched is not None:
         return searched
-    kind, preset, given = _given(part, law, dt, folder)
+    kind, preset, given, main = _given(part, law, dt, folder)
     short, where = kind.rpartition("/")[2], f" in {source}" if source else ""
     options = ", ".join(f"{name} {words(value)}" for name, value in given.items())
-    main = _BY_RULE.get((kind, preset))
     if main is not None:
         instead = {main, *law_of(kind, preset, law).instead.get(main, ())}
         if not instead & set(given):
@@ -58,19 +55,26 @@ def tuning_note(
 
 def _given(
     part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path
-) -> tuple[str, str | None, dict[str, Any]]:
-    """Kind, preset and the gains that do not have their default value."""
+) -> tuple[str, str | None, dict[str, Any], str | None]:
+    """Kind, preset, the gains that do not have their default value, and the gain that a rule sets unless it is given.
+
+    A rule sets the first tunable gain of a law of the catalogue, where its default is None.
+    """
     kind = part["kind"]
     function = catalogue.find("controllers", kind, folder)
     presets = factory.presets_of(function)
     preset = part.get("preset", next(iter(presets))) if presets else None
     defaults = inspect.signature(presets[preset] if preset else function).parameters
     known = law_of(kind, preset, law)
-    names = {name.partition("[")[0] for name in known.ranges(dt)}
+    tunable = [name.partition("[")[0] for name in known.ranges(dt)]
+    ours = kind in catalogue.names("controllers")
+    ruled = [name for name in tunable[:1] if ours and name in defaults and defaults[name].default is None]
+    names = set(tunable)
     names |= {other for several in known.instead.values() for other in several}
     gains = [name for name in part if name in names or (not names and name not in _NO_GAINS)]
     changed = lambda name: name not in defaults or factory.listed(defaults[name].default) != part[name]
-    return kind, preset, {name: part[name] for name in gains if part[name] is not None and changed(name)}
+    given = {name: part[name] for name in gains if part[name] is not None and changed(name)}
+    return kind, preset, given, ruled[0] if ruled else None
 
 
 def _searched(part: Mapping[str, Any], source: Path | None) -> TuningNote | None:

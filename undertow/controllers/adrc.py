@@ -5,34 +5,36 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.law_signals import ESTIMATE, MODELLING_ERROR
-from undertow.controllers.tracking_error import check_gains, demanded_acceleration, modelled_acceleration
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
+from undertow.controllers.second_order_observer import observer_gains
+from undertow.controllers.tracking_error import check_gains
 from undertow.core import checks
-from undertow.core.actuator_model import input_for
-from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
 
 
 class ObserverState(NamedTuple):
-    """State z: the estimates of the observer."""
+    """State of the law: the estimates of the observer."""
 
     rates: PerAxis  # m/s, rad/s
     estimate: PerAxis  # d_hat, m/s^2, rad/s^2
 
 
-class ADRC(AbstractInformedController):
-    """v_hat_dot = F + G u + d_hat - 2 zeta w_o eps and d_hat_dot = -w_o^2 eps, with eps = v_hat - v, by Euler's method.
+class ADRC(AbstractAccelerationLaw):
+    """v_hat_dot = F + G f + d_hat - 2 zeta w_o eps and d_hat_dot = -w_o^2 eps, with eps = v_hat - v, by Euler's method.
 
-    The input gives x_ddot_d + k_1 e + k_2 e_dot - d_hat. The observer uses the applied input, so limits cause no
-    windup.
+    The demanded acceleration is a_d + k_1 e + k_2 e_dot - d_hat. The observer uses the applied input, so limits cause
+    no windup.
 
     Raises:
         BadInput: bandwidth or damping not positive, or feedback not Hurwitz.
     """
 
     model: Model
+    actuation: Actuation
     bandwidth: Float[Param, "..."] = param("rad/s", "natural frequency of the observer", symbol="w_o")
     damping: Float[Param, "..."] = param("", "damping ratio of the observer", symbol="zeta")
     feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
@@ -43,43 +45,79 @@ class ADRC(AbstractInformedController):
         per_axis = {"bandwidth": self.bandwidth, "damping": self.damping}
         check_gains(self.feedback, jnp.eye(2), per_axis, len(self.model.coordinates.angles))
 
-    def init(self, y: Measurement, r: Target) -> ObserverState:
+    def begin(self, y: Measurement, r: Target) -> ObserverState:
         rates = self.model.coordinates.velocity(y)
         return ObserverState(rates, jnp.zeros_like(rates))
 
-    def command(self, z: ObserverState, y: Measurement, r: Target):
-        model = self.model
-        demand = demanded_acceleration(model.coordinates, self.feedback, y, r)
-        signals = {"estimate": z.estimate, "modelling_error": z.rates - model.coordinates.velocity(y)}
-        forces = model.dynamics.invert(y, demand - z.estimate - model.dynamics.drift(y))
-        return input_for(model.actuators, forces), signals
+    def demand(self, own: ObserverState, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
+        signals = {"estimate": own.estimate, "modelling_error": own.rates - self.model.coordinates.velocity(y)}
+        return feedback - own.estimate, signals
 
-    def known_acceleration(self, z, y: Measurement, u_applied) -> PerAxis:
-        return modelled_acceleration(self.model, y, u_applied)
-
-    def signals(self):
-        return ESTIMATE | MODELLING_ERROR
-
-    def advance(self, z: ObserverState, y: Measurement, r: Target, u_applied, dt) -> ObserverState:
-        eps = z.rates - self.model.coordinates.velocity(y)
-        known = self.known_acceleration(z, y, u_applied)
+    def adapt(self, own: ObserverState, y: Measurement, off: TrackingError, given: Given, dt) -> ObserverState:
+        eps = own.rates - self.model.coordinates.velocity(y)
         return ObserverState(
-            z.rates + dt * (known + z.estimate - 2 * self.damping * self.bandwidth * eps),
-            z.estimate - dt * self.bandwidth**2 * eps,
+            own.rates + dt * (given.known + own.estimate - 2 * self.damping * self.bandwidth * eps),
+            own.estimate - dt * self.bandwidth**2 * eps,
         )
 
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE
 
-def adrc(model: Model, *, bandwidth=20.0, damping=1.0, feedback=(1.0, 2.0)) -> ADRC:
+
+def adrc(
+    model: Model,
+    *,
+    sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    bandwidth=None,
+    damping=1.0,
+    tracking=None,
+    feedback=None,
+    feedforward: bool = True,
+    motor: str = "computed",
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+) -> ADRC:
     """Active disturbance rejection control (ADRC): Han (2009), with the bandwidths of Gao (2003). Body axes.
 
     Args:
         model: nominal model, from `plant.model()`.
-        bandwidth: natural frequency of the extended-state observer, rad/s; one number or one per axis. Below half of
-            the sampling rate and the bandwidth of the actuators.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
+        bandwidth: natural frequency of the extended-state observer, rad/s; one number or one per axis. None: as
+            in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
         damping: its damping ratio; one number or one per axis.
-        feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth;
+            with a given bandwidth between a quarter and half of it.
+        feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most, or none
+            with a given `feedback`; 0 for no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth; with a
+            given bandwidth three times that, if sampling allows.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
-        BadInput: a value is out of its range.
+        BadInput: a value is out of its range, or two options set the same quantity.
     """
-    return ADRC(model=model.in_body_axes(), bandwidth=bandwidth, damping=damping, feedback=feedback)
+    model = model.in_body_axes()
+    bandwidth, feedback, path = observer_gains(
+        model,
+        sampling_time,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, feedback, actuator_rate),
+        feedforward=feedforward,
+        motor=motor,
+        reference_frequency=reference_frequency,
+        direction=direction,
+    )
+    return ADRC(model=model, actuation=path, bandwidth=bandwidth, damping=damping, feedback=feedback)

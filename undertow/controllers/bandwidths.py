@@ -44,6 +44,8 @@ _FASTEST = 0.35  # share of the sampling rate; faster loops are dominated by sam
 _TRACKING_SHARES = (0.25, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # tracking bandwidth over the estimator's
 _ACTUATOR_SHARES = (0.0, 1.5, 3.0)  # bandwidth of the actuator loop over those two
 _SLOWEST, _CANDIDATES, _FREQUENCIES = 0.02, 32, 100
+# With a given bandwidth: range of tracking bandwidths, and bandwidth of the actuator loop, as shares of it.
+_BESIDE, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 _SWELL = 1.0  # rad/s
 _AT_ONCE = 32  # candidates whose margins are computed together
 _UNLIMITED = 1e9  # N, or the unit of the force
@@ -148,40 +150,80 @@ def largest_forces(actuators: AbstractActuatorModel, count: int) -> Float[Array,
 
 
 @functools.lru_cache(maxsize=4096)
-def robust_bandwidths(axis: Axis) -> Bandwidths:
-    """Bandwidths of preset `robust`: an estimator of order two, state feedback and controlled actuators."""
+def robust_bandwidths(axis: Axis, order: int = 2) -> Bandwidths:
+    """Bandwidths of an estimator of order 2, as of preset `robust`, or 1, state feedback and controlled actuators."""
     bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
     # Actuators at their limits follow with their own lag. The damping predicts by 2 / tracking, which must exceed it.
     tracking = np.minimum(share * bandwidth, 1 / axis.response_time if np.isfinite(axis.authority) else np.inf)
     bandwidth = np.minimum(bandwidth, tracking / _TRACKING_SHARES[0])
     natural = 1 / axis.lag if axis.lag else 0.0
     actuators = np.minimum(np.maximum(faster * np.maximum(bandwidth, tracking), natural), axis.max_bandwidth)
-    best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking), bandwidth)
+    best = _best(axis, lambda s: _robust(axis, s, actuators, bandwidth, tracking, order), bandwidth)
     return Bandwidths(*(float(rate[best, 0]) for rate in (actuators, bandwidth, tracking)))
+
+
+def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: int = 2):
+    """Bandwidth and tracking (one entry per axis) and actuator rate, each chosen if not given, rad/s and 1/s.
+
+    Args:
+        axes: data of each axis.
+        bandwidth, tracking, actuator_rate: those that are given; None for the others. With a given bandwidth, tracking
+            is between a quarter and half of it, and the actuators are three times as fast, if sampling allows.
+        order: of the estimator, 1 or 2.
+
+    Raises:
+        BadInput: one that is given is not positive.
+    """
+    for name, value in (("bandwidth", bandwidth), ("tracking", tracking), ("actuator_rate", actuator_rate)):
+        if value is not None:
+            checks.positive(name, value, "rad/s")
+    rates, *of_axes = zip(*(robust_bandwidths(axis, order) for axis in axes), strict=True)
+    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
+    if bandwidth is None:
+        rate, bandwidth, beside = chosen
+    else:
+        given = jnp.asarray(bandwidth, dtype=float)
+        slowest, fastest = _BESIDE
+        beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
+        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(given))
+    return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
 @functools.lru_cache(maxsize=4096)
 def pid_frequency(axis: Axis) -> float:
     """Natural frequency w of a PID with k_p = w^2, k_d = 2 w and k_i = w^3 / 10, rad/s: Fossen (2021), ch. 15."""
-    frequency = _bandwidth_grid(axis)[:, None]
-    law = lambda s: Law(frequency**2 + 0.1 * frequency**3 / s, 2 * frequency + 0 * s)
-    return float(frequency[_best(axis, law, frequency), 0])
+    return best_frequency(axis, lambda w, s: Law(w**2 + 0.1 * w**3 / s, 2 * w + 0 * s))
 
 
-def _bandwidth_grid(axis: Axis) -> np.ndarray:
+def best_frequency(axis: Axis, law: Callable[[np.ndarray, np.ndarray], Law]) -> float:
+    """Frequency of least cost with all margins of a law with one free number, rad/s.
+
+    Args:
+        axis: data of the axis.
+        law: (frequencies (candidates, 1), Laplace variables (frequencies,)) -> transfer functions of each candidate.
+    """
+    frequency = bandwidth_grid(axis)[:, None]
+    return float(frequency[_best(axis, lambda s: law(frequency, s), frequency), 0])
+
+
+def bandwidth_grid(axis: Axis) -> np.ndarray:
+    """Bandwidths that the rule tries, rad/s, in rising order."""
     return np.geomspace(_SLOWEST / axis.response_time, _FASTEST / axis.sampling_time, _CANDIDATES)
 
 
 def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
-    return _bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
+    return bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
 
 
-def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking) -> Law:
+def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: int = 2) -> Law:
     """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedActuator`."""
     dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
     decay = np.exp(-bandwidth * dt)
-    of_rates, of_estimate = 2 - 2 * decay, (1 - decay) ** 2 / dt
-    poles = (z - 1) ** 2 + of_rates * (z - 1) + dt * of_estimate
+    if order == 1:
+        of_estimate, poles = (1 - decay) / dt, z - decay
+    else:
+        of_estimate = (1 - decay) ** 2 / dt
+        poles = (z - 1) ** 2 + (2 - 2 * decay) * (z - 1) + dt * of_estimate
     by_velocity, by_force = of_estimate * (z - 1) / poles, -dt * of_estimate / poles  # d_hat
     if axis.lag:
         kept, lead = np.exp(-dt / axis.lag), axis.lag * actuators

@@ -5,18 +5,19 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.law_signals import ESTIMATE, MODELLING_ERROR
-from undertow.controllers.tracking_error import check_gains, demanded_acceleration, modelled_acceleration
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
+from undertow.controllers.second_order_observer import observer_gains
+from undertow.controllers.tracking_error import check_gains
 from undertow.core import checks
-from undertow.core.actuator_model import input_for
-from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
 
 
 class FilterState(NamedTuple):
-    """State z: the filters H of the velocity and of the modelled acceleration; SI units."""
+    """State of the law: the filters H of the velocity and of the modelled acceleration; SI units."""
 
     velocity: PerAxis
     acceleration: PerAxis  # its derivative
@@ -24,8 +25,8 @@ class FilterState(NamedTuple):
     known_rate: PerAxis
 
 
-class INDI(AbstractInformedController):
-    """G u = x_ddot_d + k_1 e + k_2 e_dot - F - (H x_ddot - H (F + G u)): no observer of the load.
+class INDI(AbstractAccelerationLaw):
+    """G f = a_d + k_1 e + k_2 e_dot - F - (H v_dot - H (F + G f)): no observer of the load.
 
     H = w^2 / (p^2 + 2 zeta w p + w^2), by Euler's method; the acceleration is the slope of the filtered velocity. In
     continuous time this is ADRC of the same bandwidth.
@@ -35,6 +36,7 @@ class INDI(AbstractInformedController):
     """
 
     model: Model
+    actuation: Actuation
     bandwidth: Float[Param, "..."] = param("rad/s", "natural frequency of the filter", symbol="w")
     damping: Float[Param, "..."] = param("", "damping ratio of the filter", symbol="zeta")
     feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
@@ -45,28 +47,24 @@ class INDI(AbstractInformedController):
         per_axis = {"bandwidth": self.bandwidth, "damping": self.damping}
         check_gains(self.feedback, jnp.eye(2), per_axis, len(self.model.coordinates.angles))
 
-    def init(self, y: Measurement, r: Target) -> FilterState:
+    def begin(self, y: Measurement, r: Target) -> FilterState:
         rates = self.model.coordinates.velocity(y)
         zero = jnp.zeros_like(rates)
         return FilterState(rates, zero, zero, zero)
 
-    def command(self, z: FilterState, y: Measurement, r: Target):
-        model, missing = self.model, z.acceleration - z.known
-        demand = demanded_acceleration(model.coordinates, self.feedback, y, r)
-        signals = {"estimate": missing, "modelling_error": z.velocity - model.coordinates.velocity(y)}
-        forces = model.dynamics.invert(y, demand - missing - model.dynamics.drift(y))
-        return input_for(model.actuators, forces), signals
+    def demand(self, own: FilterState, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        missing = own.acceleration - own.known
+        feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
+        signals = {"estimate": missing, "modelling_error": own.velocity - self.model.coordinates.velocity(y)}
+        return feedback - missing, signals
 
-    def known_acceleration(self, z, y: Measurement, u_applied) -> PerAxis:
-        return modelled_acceleration(self.model, y, u_applied)
+    def adapt(self, own: FilterState, y: Measurement, off: TrackingError, given: Given, dt) -> FilterState:
+        velocity, acceleration = self._filtered(own.velocity, own.acceleration, self.model.coordinates.velocity(y), dt)
+        return FilterState(velocity, acceleration, *self._filtered(own.known, own.known_rate, given.known, dt))
 
     def signals(self):
-        return ESTIMATE | MODELLING_ERROR
-
-    def advance(self, z: FilterState, y: Measurement, r: Target, u_applied, dt) -> FilterState:
-        known = self.known_acceleration(z, y, u_applied)
-        velocity, acceleration = self._filtered(z.velocity, z.acceleration, self.model.coordinates.velocity(y), dt)
-        return FilterState(velocity, acceleration, *self._filtered(z.known, z.known_rate, known, dt))
+        return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE
 
     def _filtered(self, value: PerAxis, slope: PerAxis, heading: PerAxis, dt) -> tuple[PerAxis, PerAxis]:
         """Output of H and its derivative one sampling time later."""
@@ -74,17 +72,58 @@ class INDI(AbstractInformedController):
         return value + dt * slope, slope + dt * pull
 
 
-def indi(model: Model, *, bandwidth=20.0, damping=1.0, feedback=(1.0, 2.0)) -> INDI:
+def indi(
+    model: Model,
+    *,
+    sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    bandwidth=None,
+    damping=1.0,
+    tracking=None,
+    feedback=None,
+    feedforward: bool = True,
+    motor: str = "computed",
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+) -> INDI:
     """Incremental nonlinear dynamic inversion: Sieberling, Chu and Mulder (2010), Smeur et al. (2016). Body axes.
 
     Args:
         model: nominal model, from `plant.model()`.
-        bandwidth: natural frequency of the filter of velocity and input, rad/s; one number or one per axis. Below half
-            of the sampling rate and the bandwidth of the actuators.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
+        bandwidth: natural frequency of the filter of velocity and input, rad/s; one number or one per axis. None: as
+            in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
         damping: its damping ratio; one number or one per axis.
-        feedback: K = (k1, k2), 1/s^2 and 1/s; one pair or one per axis.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth;
+            with a given bandwidth between a quarter and half of it.
+        feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most, or none
+            with a given `feedback`; 0 for no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth; with a
+            given bandwidth three times that, if sampling allows.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
-        BadInput: a value is out of its range.
+        BadInput: a value is out of its range, or two options set the same quantity.
     """
-    return INDI(model=model.in_body_axes(), bandwidth=bandwidth, damping=damping, feedback=feedback)
+    model = model.in_body_axes()
+    bandwidth, feedback, path = observer_gains(
+        model,
+        sampling_time,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, feedback, actuator_rate),
+        feedforward=feedforward,
+        motor=motor,
+        reference_frequency=reference_frequency,
+        direction=direction,
+    )
+    return INDI(model=model, actuation=path, bandwidth=bandwidth, damping=damping, feedback=feedback)

@@ -1,65 +1,38 @@
 """PID control as marine engineers design it: the baseline of comparisons."""
 
-from typing import Any, NamedTuple
-
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
-from undertow.controllers.reference_filter import FilterState, ReferenceFilter
-from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core import checks
-from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.numerics.linear_algebra import matvec
 
 PerAxis = Float[Array, " n"]
 
-MOTORS = ("steady", "computed")
 
-
-class PIDState(NamedTuple):
-    """State z of the law."""
-
-    integral: PerAxis  # acceleration of the integral, m/s^2, rad/s^2
-    actuators: Any  # estimated state of the actuators
-    filter: FilterState | None
-
-
-class Plan(NamedTuple):
-    """Decisions of one instant."""
-
-    actuators: Any
-    error: PerAxis  # m, rad
-    forces: Float[Array, " m"]  # for the desired acceleration, without limits
-
-
-class PID(AbstractInformedController):
+class PID(AbstractAccelerationLaw):
     """a = a_d + k_p e + k_d e_dot + integral of k_i e, in the model's own axes; forces within limits; no windup.
+
+    The state of the law is the acceleration of the integral, m/s^2 and rad/s^2.
 
     Raises:
         BadInput: a gain of the wrong sign, or an integral too strong for a stable loop: k_i < k_p k_d (Routh).
     """
 
     model: Model
-    filter: ReferenceFilter | None
+    actuation: Actuation
     proportional: Float[Param, "..."] = param("1/s^2", "acceleration per error", symbol="k_p")
     integral: Float[Param, "..."] = param("1/s^3", "rate of the acceleration per error", symbol="k_i")
     derivative: Float[Param, "..."] = param("1/s", "acceleration per error of the rates", symbol="k_d")
-    actuator_rate: Float[Param, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
-    direction: Float[Param, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
-    feedforward: bool = eqx.field(static=True, default=True)
-    motor: str = eqx.field(static=True, default="steady")
 
     def __check_init__(self):
-        checks.choice("motor", self.motor, MOTORS)
         checks.not_negative("integral", self.integral, "1/s^3")
-        for name in ("proportional", "derivative", "actuator_rate", "direction"):
+        for name in ("proportional", "derivative"):
             checks.positive(name, getattr(self, name))
         for name in ("proportional", "integral", "derivative"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
@@ -68,53 +41,24 @@ class PID(AbstractInformedController):
             worst = np.asarray(self.integral / most).max()
             raise BadInput("integral", "be less than proportional times derivative", f"{worst:g} times that")
 
-    def init(self, y: Measurement, r: Target) -> PIDState:
-        smoothing = None if self.filter is None else self.filter.init(y.position)
-        return PIDState(jnp.zeros_like(y.position), self._actuators().init(), smoothing)
+    def begin(self, y: Measurement, r: Target) -> PerAxis:
+        return jnp.zeros_like(y.position)
 
-    def command(self, z: PIDState, y: Measurement, r: Target):
-        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
-        forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, self.actuator_rate), self.direction)
-        signals = {"estimate": -z.integral, "attained_share": attained(effect, plan.forces, forces)}
-        return actuators.command(plan.actuators, forces, self.actuator_rate), signals
+    def demand(self, own: PerAxis, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        demanded = acceleration + self.proportional * error + self.derivative * rate + own
+        return demanded, {"estimate": -own}
 
-    def advance(self, z: PIDState, y: Measurement, r: Target, u_applied, dt) -> PIDState:
+    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
         """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
 
         Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
-        plan, actuators, effect = self._plan(z, y, r), self._actuators(), self.model.dynamics.gain(y)
-        heading = lambda u: actuators.target_of(plan.actuators, u, self.actuator_rate)
-        asked, going = heading(actuators.command(plan.actuators, plan.forces, self.actuator_rate)), heading(u_applied)
-        back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * matvec(effect, going - asked)
-        share = attained(effect, asked, going)
-        return PIDState(
-            integral=z.integral + dt * (self.integral * plan.error + back),
-            actuators=actuators.advance(plan.actuators, u_applied, dt),
-            filter=None if self.filter is None else self.filter.advance(z.filter, r, self.model.coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        )
-
-    def known_acceleration(self, z: PIDState, y: Measurement, u_applied) -> PerAxis:
-        actuators = self._actuators()
-        given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
-        return self._drift(y) + matvec(self.model.dynamics.gain(y), given)
+        back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * given.missing
+        return own + dt * (self.integral * off.error + back)
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
-
-    def _actuators(self) -> AbstractActuatorModel:
-        actuators = self.model.actuators
-        return actuators.quasi_static() if self.motor == "steady" else actuators
-
-    def _drift(self, y: Measurement) -> PerAxis:
-        return self.model.dynamics.drift(y) if self.feedforward else jnp.zeros_like(y.position)
-
-    def _plan(self, z: PIDState, y: Measurement, r: Target) -> Plan:
-        dynamics, coordinates, _ = self.model
-        target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        error, rate, acceleration = coordinates.tracking_error(y, target)
-        demand = acceleration + self.proportional * error + self.derivative * rate + z.integral - self._drift(y)
-        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), error, dynamics.invert(y, demand))
 
 
 def pid(
@@ -177,17 +121,18 @@ def pid(
     else:
         checks.per_axis("gains", gains, len(model.coordinates.angles), (3,))
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
-    if reference_frequency is None:
-        reference_frequency = jnp.minimum(jnp.sqrt(proportional) / 2, 2.0)
-    unfiltered = not checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return PID(
         model=model,
-        filter=None if unfiltered else ReferenceFilter(reference_frequency),
+        actuation=actuation_for(
+            sampling_time,
+            jnp.sqrt(proportional),
+            feedforward=feedforward,
+            motor=motor,
+            reference_frequency=reference_frequency,
+            actuator_rate=actuator_rate,
+            direction=direction,
+        ),
         proportional=proportional,
         integral=integral,
         derivative=derivative,
-        actuator_rate=0.15 / sampling_time if actuator_rate is None else actuator_rate,
-        direction=direction,
-        feedforward=feedforward,
-        motor=motor,
     )

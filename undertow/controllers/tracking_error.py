@@ -5,9 +5,7 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.actuator_model import force_of
-from undertow.core.contracts import AbstractCoordinates, Inputs, Measurement, Model, Target
-from undertow.numerics.linear_algebra import matvec
+from undertow.core.contracts import AbstractCoordinates, Measurement, Target
 
 PerAxis = Float[Array, " n"]
 # One for all axes, or one per axis.
@@ -32,17 +30,6 @@ def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measuremen
     """Errors of a measurement against a target, with P of Eq. (21)."""
     error, rate, acceleration = coordinates.tracking_error(y, r)
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
-
-
-def demanded_acceleration(coordinates: AbstractCoordinates, gains: Feedback, y: Measurement, r: Target) -> PerAxis:
-    """x_ddot_d + K^T E, m/s^2 and rad/s^2: the acceleration that state feedback demands."""
-    error, rate, acceleration = coordinates.tracking_error(y, r)
-    return acceleration + gains[..., 0] * error + gains[..., 1] * rate
-
-
-def modelled_acceleration(model: Model, y: Measurement, u_applied: Inputs) -> PerAxis:
-    """F + G f with the forces f that the applied input gives in steady state, (n,)."""
-    return model.dynamics.drift(y) + matvec(model.dynamics.gain(y), force_of(model.actuators, u_applied))
 
 
 def check_gains(feedback: Array, weight: Array, per_axis: dict[str, Any], axes: int) -> None:

@@ -144,12 +144,6 @@ class LaggedActuator(AbstractActuatorModel):
         return self.curve
 
 
-def input_for(actuators: AbstractActuatorModel, force: Forces) -> Inputs:
-    """Input that holds a force in steady state."""
-    held = actuators.quasi_static()
-    return held.command(held.init(), force, jnp.ones(()))
-
-
 def force_of(actuators: AbstractActuatorModel, u: Inputs) -> Forces:
     """Force that an input gives in steady state."""
     held = actuators.quasi_static()

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Model, Target, TrackingError
 from undertow.core.coordinates import AbstractOutputCoordinates
 from undertow.core.measurement import BODY_AXES, body_of, measurement_of_outputs
+from undertow.core.parametric_dynamics import AbstractParametricDynamics, Parametrization
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec, partial_inverse, printed_inverse, regularised_sharp
 from undertow.numerics.rotations import Kinematics, attitude_error, cross, rotation_from_quaternion, turning_from_euler
@@ -21,8 +22,21 @@ Vector6 = Float[Array, "6"]
 EULER_ANGLES = (False, False, False, True, True, True)
 
 
-class BodyDynamics(AbstractDynamics):
-    """nu_dot = F + M^-1 B f + d with f the thrusts, N: section X5 of the theory. J and J_dot do not appear."""
+# Largest plausible deviations from a nominal body: of inertia (factor), drag (1/s, 1/m), weight and loads (m/s^2,
+# rad/s^2); drag and loads are per inertia of their axis.
+_INERTIA, _LINEAR, _QUADRATIC, _WEIGHT = 0.5, 1.0, 2.0, 1.0
+_LOADS = (5.0, 5.0, 5.0, 50.0, 50.0, 50.0)
+
+# Heave, roll and pitch learn a constant load twice: along the axes of the body and along gravity.
+_SHARES = (1.0, 1.0, 0.5, 0.5, 0.5, 1.0)
+
+
+class BodyDynamics(AbstractParametricDynamics):
+    """nu_dot = F + M^-1 B f + d with f the thrusts, N: section X5 of the theory. J and J_dot do not appear.
+
+    Its 28 parameters: factors of the inertia of each axis (6), additional linear (6) and quadratic (6) drag, error of
+    the weight (1) and of the moments of weight and buoyancy (3), and a constant load of each axis (6).
+    """
 
     body: Body
     acceleration_per_thrust: Float[Array, "6 N"]  # M^-1 B
@@ -37,6 +51,38 @@ class BodyDynamics(AbstractDynamics):
 
     def invert(self, y: Measurement, acceleration: Vector6) -> Float[Array, " N"]:
         return matvec(self.allocation, acceleration)
+
+    def parametrization(self) -> Parametrization:
+        inertia = jnp.diagonal(self.body.mass_matrix)
+        one, most, share = jnp.ones(6), jnp.asarray(_LOADS), jnp.asarray(_SHARES)
+        join = lambda *parts: jnp.concatenate([jnp.atleast_1d(part) for part in parts])
+        weight, moments, loads = inertia[:3].mean(), inertia[3:], inertia
+        return Parametrization(
+            nominal=join(one, jnp.zeros(22)),
+            most=join(
+                _INERTIA * one, _LINEAR * loads, _QUADRATIC * loads, _WEIGHT * weight, most[3:] * moments, most * loads
+            ),
+            rates=join(one / inertia, loads, loads, weight / 2, moments / 2, share * loads),
+            inertia=inertia,
+        )
+
+    def generalized_force(self, y: Measurement, parameters, velocity: Vector6, acceleration: Vector6) -> Vector6:
+        """M a + C(nu) v + D(nu) v + g: C is linear in M, and skew-symmetric."""
+        own = body_of(y)
+        factor, linear, quadratic, weight, moment, load = jnp.split(parameters, (6, 12, 18, 19, 22))
+        mass, down, speed = self.body.mass_matrix, own.rotation[2], jnp.abs(own.nu)
+        moved = lambda motion: (factor * matvec(mass, motion) + matvec(mass, factor * motion)) / 2
+        momentum = moved(own.nu)
+        turned = jnp.concatenate(
+            [cross(velocity[3:], momentum[:3]), cross(velocity[:3], momentum[:3]) + cross(velocity[3:], momentum[3:])]
+        )
+        drag = matvec(self.body.linear_damping, velocity) + matvec(self.body.quadratic_damping, speed * velocity)
+        more_drag = (linear + quadratic * speed) * velocity
+        static = self.body.restoring(down) - jnp.concatenate([weight * down, cross(moment, down)]) + load
+        return moved(acceleration) + turned + drag + more_drag + static
+
+    def accelerated_by(self, y: Measurement, force: Vector6) -> Vector6:
+        return self.body.accelerate(force)
 
 
 class BodyCoordinates(AbstractCoordinates):

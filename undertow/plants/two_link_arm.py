@@ -8,17 +8,20 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
-from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
+from undertow.core.contracts import Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import Param, param
+from undertow.core.parametric_dynamics import AbstractParametricDynamics, Parametrization
 from undertow.numerics.linear_algebra import matvec
 from undertow.plants.mechanism import AbstractOutputMechanism, Motion, both_ways, nominal
 
 _BOOK = "Slotine and Li 1991, Example 9.1"
 
 
-class Links(AbstractDynamics):
+class Links(AbstractParametricDynamics):
     """Rigid links: mass matrix, Coriolis matrix and weight. Slotine and Li 1991, section 9.1.
+
+    Its parameters are a_1 to a_4 of the book, kg m^2, and the first moment of what the shoulder carries, kg m.
 
     The outer link carries a load: its centre of mass need not lie on the line through its joint.
 
@@ -80,6 +83,29 @@ class Links(AbstractDynamics):
 
     def invert(self, y: Measurement, acceleration: Float[Array, "2"]) -> Float[Array, "2"]:
         return matvec(self.mass_matrix(y.position), acceleration)
+
+    def parametrization(self) -> Parametrization:
+        outer = self.outer_inertia + self.outer_mass * self.outer_centre**2
+        inner = self.inner_inertia + self.inner_mass * self.inner_centre**2 + self.outer_mass * self.inner_length**2
+        coupling, offset = self._coupling(), self.outer_offset
+        moment = self.inner_mass * self.inner_centre + self.outer_mass * self.inner_length
+        nominal = jnp.stack([inner + outer, outer, coupling * jnp.cos(offset), coupling * jnp.sin(offset), moment])
+        largest = jnp.full(5, 2.0) * nominal[0]
+        return Parametrization(nominal, largest, jnp.ones(5), jnp.diagonal(self.mass_matrix(jnp.zeros(2))))
+
+    def generalized_force(self, y: Measurement, parameters, velocity, acceleration) -> Float[Array, "2"]:
+        """As in section 9.2 of the book, with the weight of a vertical arm."""
+        a1, a2, a3, a4, moment = parameters
+        (q1, q2), (rate1, rate2) = y.position, y.velocity
+        coupling, h = a3 * jnp.cos(q2) + a4 * jnp.sin(q2), a3 * jnp.sin(q2) - a4 * jnp.cos(q2)
+        (v1, v2), (w1, w2) = velocity, acceleration
+        outer = self.gravity * (a3 * jnp.cos(q1 + q2) + a4 * jnp.sin(q1 + q2)) / self.inner_length
+        first = (a1 + 2 * coupling) * w1 + (a2 + coupling) * w2 - h * rate2 * v1 - h * (rate1 + rate2) * v2
+        second = (a2 + coupling) * w1 + a2 * w2 + h * rate1 * v1
+        return jnp.stack([first + self.gravity * moment * jnp.cos(q1) + outer, second + outer])
+
+    def accelerated_by(self, y: Measurement, force: Float[Array, "2"]) -> Float[Array, "2"]:
+        return matvec(self.inverse_mass_matrix(y.position), force)
 
 
 class TwoLinkArm(AbstractOutputMechanism):

@@ -129,7 +129,7 @@ class Law(NamedTuple):
 
 
 # Options with one number for all axes.
-SHARED = ("actuator_rate", "direction")
+SHARED = ("actuator_rate", "adaptation_rate", "direction")
 
 
 def _robust(dt: float) -> Mapping[str, Range]:
@@ -156,7 +156,23 @@ def _pid(dt: float) -> Mapping[str, Range]:
     return {"frequency": (0.1, 0.25 / dt), "damping": (0.3, 4.0), "integral_share": (0.01, 1.0)}
 
 
+def _observed(dt: float) -> Mapping[str, Range]:
+    return {"bandwidth": (0.3, 0.5 / dt), "damping": (0.5, 3.0), "tracking": (0.1, 0.25 / dt)}
+
+
+_OBSERVED = Law(
+    ranges=_observed,
+    now={
+        "bandwidth": lambda law: law.bandwidth,
+        "damping": lambda law: law.damping,
+        "tracking": lambda law: jnp.sqrt(law.feedback[..., 0]),
+    },
+    instead={"tracking": ("feedback",)},
+)
+
 _LAWS = {
+    ("adrc", None): _OBSERVED,
+    ("indi", None): _OBSERVED,
     ("rcaf", "robust"): Law(
         ranges=_robust,
         now={

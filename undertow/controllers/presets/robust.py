@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.controllers.bandwidths import Axis, Bandwidths, alike, axes_of, robust_bandwidths
+from undertow.controllers.bandwidths import axes_of, completed
 from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator, widened
 from undertow.controllers.robust.robust_law import RobustRCAF
@@ -11,9 +11,6 @@ from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.estimation.fuzzy_system import gaussian_sets
-
-# With a given bandwidth: range of tracking bandwidths, and bandwidth of the actuator loop, as shares of it.
-_TRACKING_SHARES, _ACTUATORS_FASTER = (0.25, 0.5), 3.0
 
 
 def robust(
@@ -90,7 +87,7 @@ def robust(
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
     if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
         axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
-        bandwidth, tracking, actuator_rate = _bandwidths(axes, bandwidth, tracking, actuator_rate)
+        bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate)
     for name, value, unit in (("bandwidth", bandwidth, "rad/s"), ("tracking", tracking, "rad/s")):
         checks.positive(name, value, unit)
     if reach is None:
@@ -113,20 +110,6 @@ def robust(
         actuator_rate=actuator_rate,
         direction=direction,
     )
-
-
-def _bandwidths(axes: list[Axis], bandwidth, tracking, actuator_rate):
-    """Bandwidth and tracking (one entry per axis) and actuator rate, each chosen if not given, rad/s and 1/s."""
-    rates, *of_axes = zip(*(robust_bandwidths(axis) for axis in axes), strict=True)
-    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
-    if bandwidth is None:
-        rate, bandwidth, beside = chosen
-    else:
-        given = jnp.asarray(bandwidth, dtype=float)
-        slowest, fastest = _TRACKING_SHARES
-        beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
-        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(given))
-    return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
 def _from_letters(letters: dict, basis_norm_squared: float, bandwidth):

@@ -1,0 +1,218 @@
+"""Slotine and Li: the regressor against the model, passivity, the Lyapunov function, and a PID as its limit."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.controllers import pid, slotine_li
+from undertow.controllers.slotine_li import DiagonalDynamics
+from undertow.core.contracts import Measurement, Target
+from undertow.core.errors import BadInput
+from undertow.disturbances import none, sinusoid
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
+from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, two_link_arm
+from undertow.references import setpoint, sine
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy, odin, remus100
+
+ARM = two_link_arm(gravity=0.0)
+
+
+def run(plant, law, reference, disturbance=None, duration=20.0, dt=1e-2, **start):
+    loop = ClosedLoop(plant, law, reference, disturbance or none(), perfect())
+    return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
+
+
+def vehicle(make):
+    return hybrid_vehicle(make(), t200()).model().in_body_axes()
+
+
+def pendulum():
+    model = inverted_pendulum().model()
+    return model._replace(dynamics=DiagonalDynamics(model.dynamics, 1))
+
+
+MODELS = {
+    "heavy": lambda: vehicle(bluerov2_heavy),
+    "odin": lambda: vehicle(odin),
+    "remus100": lambda: vehicle(remus100),
+    "arm": lambda: two_link_arm().model(),
+    "pendulum": pendulum,
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_nominal_regressor_is_the_model(name):
+    """M^-1 Y theta = a - F at the nominal parameters and the measured velocity."""
+    model, rng = MODELS[name](), np.random.default_rng(1)
+    n = len(model.coordinates.angles)
+    y = model.coordinates.measurement(*(jnp.asarray(rng.uniform(-0.7, 0.7, n)) for _ in range(2)))
+    wanted, nominal = jnp.asarray(rng.normal(size=n)), model.dynamics.parametrization().nominal
+    force = model.dynamics.generalized_force(y, nominal, model.coordinates.velocity(y), wanted)
+    expected = wanted - model.dynamics.drift(y)
+    np.testing.assert_allclose(model.dynamics.accelerated_by(y, force), expected, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_force_is_affine_in_the_parameters(name):
+    model, rng = MODELS[name](), np.random.default_rng(2)
+    n, structure = len(model.coordinates.angles), model.dynamics.parametrization()
+    y = model.coordinates.measurement(*(jnp.asarray(rng.uniform(-0.7, 0.7, n)) for _ in range(2)))
+    velocity, acceleration = jnp.asarray(rng.normal(size=n)), jnp.asarray(rng.normal(size=n))
+    force = lambda parameters: model.dynamics.generalized_force(y, parameters, velocity, acceleration)
+    one, other = (structure.nominal + structure.most * rng.uniform(-1, 1, structure.nominal.size) for _ in range(2))
+    np.testing.assert_allclose(force(0.3 * one + 0.7 * other), 0.3 * force(one) + 0.7 * force(other), rtol=1e-9)
+    assert (np.abs(np.asarray(jax.jacfwd(force)(one))).max(0) > 0).all() or name == "arm", "a parameter without effect"
+
+
+def test_coriolis_matrix_of_the_arm_is_passive_for_any_parameters():
+    """s^T (M_dot - 2 C) s = 0, with M_dot along the motion."""
+    rng, dynamics = np.random.default_rng(3), two_link_arm().model().dynamics
+    q, rate, s, parameters = (jnp.asarray(rng.normal(size=k)) for k in (2, 2, 2, 5))
+    still = jnp.zeros(2)
+
+    def kinetic(q):
+        y = Measurement(q, still)
+        return s @ (
+            dynamics.generalized_force(y, parameters, still, s)
+            - dynamics.generalized_force(y, parameters, still, still)
+        )
+
+    changed = jax.jvp(kinetic, (q,), (rate,))[1]
+    y = Measurement(q, rate)
+    coriolis = dynamics.generalized_force(y, parameters, s, still) - dynamics.generalized_force(
+        y, parameters, still, still
+    )
+    np.testing.assert_allclose(changed, 2 * s @ coriolis, rtol=1e-10)
+
+
+def test_coriolis_forces_of_a_vehicle_do_no_work_for_any_inertia():
+    """What is left of s^T (force at s - force at 0) is drag, which does not depend on the inertia."""
+    dynamics, rng = vehicle(remus100).dynamics, np.random.default_rng(4)
+    y = vehicle(remus100).coordinates.measurement(*(jnp.asarray(rng.uniform(-0.5, 0.5, 6)) for _ in range(2)))
+    s, still = jnp.asarray(rng.normal(size=6)), jnp.zeros(6)
+    nominal = dynamics.parametrization().nominal
+    power = lambda parameters: (
+        s
+        @ (
+            dynamics.generalized_force(y, parameters, s, still)
+            - dynamics.generalized_force(y, parameters, still, still)
+        )
+    )
+    np.testing.assert_allclose(power(nominal.at[:6].set(rng.uniform(0.5, 1.5, 6))), power(nominal), rtol=1e-10)
+    np.testing.assert_allclose(
+        power(nominal),
+        s @ (dynamics.body.linear_damping @ s + dynamics.body.quadratic_damping @ (jnp.abs(y.body.nu) * s)),
+    )
+
+
+def test_lyapunov_function_falls_as_in_the_theorem():
+    """The arm of Slotine and Li (1991), section 9.2, with K_D = 100 I, l = 20 and Gamma = (0.03, 0.05, 0.1, 0.3).
+
+    Nothing is known of the parameters at first. V = 1/2 s^T M s + 1/2 theta~^T Gamma^-1 theta~ falls by the integral of s^T K_D s.
+    """
+    true = ARM.model().dynamics
+    wrong = ARM.model(outer_mass=0.5)
+    inertia = wrong.dynamics.parametrization().inertia
+    rates = jnp.array([0.03, 0.05, 0.1, 0.3, 1.0])
+    law = slotine_li(
+        wrong, sampling_time=1e-3, slope=20.0, gain=100.0 / inertia, adaptation_rate=rates, reference_frequency=0.0
+    )
+    swing = np.radians([30.0, 45.0])
+    reference = sine(amplitude=swing, frequency=2 * np.pi, phase=-np.pi / 2, offset=swing)
+    dt, y = 1e-3, Measurement(jnp.zeros(2), jnp.zeros(2))
+    theta = true.parametrization().nominal[:4]
+
+    def step(state, k):
+        x, v, z = state
+        y, r = Measurement(x, v), reference.at(k * dt)
+        u, signals = law.command(z, y, r)
+        s, off = signals["surface"], z.law[:4] - theta
+        energy = s @ true.mass_matrix(x) @ s / 2 + (off**2 / rates[:4]).sum() / 2
+        moved = lambda x, v: (v, true.drift(Measurement(x, v)) + true.gain(Measurement(x, v)) @ u)
+        a1, b1 = moved(x, v)
+        a2, b2 = moved(x + dt / 2 * a1, v + dt / 2 * b1)
+        return (x + dt * a2, v + dt * b2, law.advance(z, y, r, u, dt)), (
+            energy,
+            100.0 * (s**2).sum(),
+            off,
+            r.position - x,
+        )
+
+    unknown = law.init(y, reference.at(jnp.zeros(())))._replace(law=jnp.zeros(5))
+    start = (jnp.zeros(2), jnp.zeros(2), unknown)
+    _, (energy, lost, off, error) = jax.lax.scan(step, start, jnp.arange(5000.0))
+    energy, lost, error = np.asarray(energy), np.asarray(lost), np.degrees(np.asarray(error))
+    fallen = energy[0] - energy
+    np.testing.assert_allclose(fallen[1000::500], dt * np.cumsum(lost)[999::500][: fallen[1000::500].size], rtol=0.03)
+    assert np.diff(energy).max() < 1e-3 * energy[0]
+    first, last = np.abs(error[:1000]).max(0), np.abs(error[-1000:]).max(0)
+    assert (last < first / 4).all(), (first, last)
+    assert np.abs(off[-1]).sum() < np.abs(off[0]).sum()
+
+
+def test_with_the_load_alone_it_is_a_pid():
+    plant, slope, gain, gamma = double_integrator(1), 1.5, 2.5, 0.8
+    law = slotine_li(
+        plant.model(), slope=slope, gain=gain, adaptation_rate=jnp.array([0.0, 0.0, gamma]), reference_frequency=0.0
+    )
+    gains = [gain * slope + gamma, gamma * slope, slope + gain]
+    same = pid(plant.model(), gains=gains, reference_frequency=0.0)
+    load = sinusoid(0.3, 1.0, offset=0.2)
+    ours, theirs = (run(plant, one, setpoint([0.0]), load, duration=10.0, dt=1e-3) for one in (law, same))
+    np.testing.assert_allclose(ours.signals["error"], theirs.signals["error"], atol=2e-4)
+
+
+@pytest.mark.slow
+def test_vehicle_holds_its_place_under_constant_loads():
+    """Without a dead zone of the thrusters; loads in world axes are found in those of the vehicle."""
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0), ledger=False)
+    law = slotine_li(plant.model(), sampling_time=0.02)
+    load = sinusoid(0.0, 1.0, offset=[0.5, -0.3, 0.4, 1.0, 0.5, -0.5])
+    found = run(plant, law, setpoint([1.0, -1.0, 0.5, 0.0, 0.0, 2.0]), load, duration=60.0, dt=0.02)
+    assert int(found.status) == 0
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=0.01)
+    surge, sway = 0.5 * np.cos(2.0) - 0.3 * np.sin(2.0), -0.5 * np.sin(2.0) - 0.3 * np.cos(2.0)
+    np.testing.assert_allclose(found.signals["estimate"][-1], [surge, sway, 0.4, 1.0, 0.5, -0.5], atol=2e-3)
+
+
+def test_parameters_wait_at_limits_and_stay_plausible():
+    plant = double_integrator(1, limit=1.0)
+    law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
+    y, r = Measurement(jnp.zeros(1), jnp.array([-3.0])), Target(jnp.array([5.0]), jnp.zeros(1), jnp.zeros(1))
+    z = law.init(y, r)
+    np.testing.assert_allclose(law.reach, 0.5)
+    np.testing.assert_array_equal(law.advance(z, y, r, jnp.ones(1), 1e-2).law, z.law)
+    structure = law.regressor.parametrization()
+    whole = slotine_li(double_integrator(1).model(), slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
+    near = z._replace(law=jnp.array([1.0, 1.0, structure.most[2] - 0.1]))
+    still = Measurement(jnp.zeros(1), jnp.zeros(1))
+    moved = whole.advance(near, still, r, whole.command(near, still, r)[0], 1.0)
+    np.testing.assert_array_equal(moved.law - structure.nominal, [0.0, 0.0, structure.most[2]])
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e6])
+def test_any_rate_of_adaptation_is_stable_when_sampled(rate):
+    """The rate is slowed down to what feedback can take away in one sampling time."""
+    plant = double_integrator(1)
+    law = slotine_li(plant.model(), sampling_time=0.02, slope=3.0, adaptation_rate=rate, reference_frequency=0.0)
+    found = run(plant, law, setpoint([0.0]), sinusoid(0.0, 1.0, offset=2.0), duration=60.0, dt=0.02)
+    assert np.abs(found.signals["error"]).max() < 0.2
+    np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"slope": -1.0}, "slope"),
+        ({"gain": 0.0}, "gain"),
+        ({"adaptation_rate": -1.0}, "adaptation_rate"),
+        ({"adaptation_rate": [1.0, 2.0]}, "adaptation_rate"),
+    ],
+)
+def test_settings_that_cannot_be(wrong, name):
+    with pytest.raises(BadInput, match=f"^`{name}"):
+        slotine_li(double_integrator(1).model(), **wrong)

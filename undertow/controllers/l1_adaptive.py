@@ -1,0 +1,147 @@
+"""L1 adaptive control: a state predictor, piecewise-constant adaptation, and a low-pass filter of what is cancelled."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
+from undertow.core import checks
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.param import Param, param
+
+PerAxis = Float[Array, " n"]
+
+
+class PredictorState(NamedTuple):
+    """State of the law."""
+
+    predicted: PerAxis  # v_hat, m/s, rad/s
+    filtered: PerAxis  # C(s) sigma_hat of the sampling time before, m/s^2, rad/s^2
+    elapsed: Float[Array, ""]  # s, since then
+
+
+class Adapted(NamedTuple):
+    """What one measurement gives."""
+
+    error: PerAxis  # v_tilde = v_hat - v, m/s, rad/s
+    uncertainty: PerAxis  # sigma_hat, m/s^2, rad/s^2
+    filtered: PerAxis  # C(s) sigma_hat
+
+
+class L1Adaptive(AbstractAccelerationLaw):
+    """a = a_d + w^2 e + 2 zeta w e_dot - C(s) sigma_hat, C(s) = w_c / (s + w_c).
+
+    Predictor: v_hat_dot = F + G f + sigma_hat - a_s v_tilde. Adaptation at each sampling time:
+    sigma_hat = -a_s exp(-a_s T) / (1 - exp(-a_s T)) v_tilde, which makes v_tilde at the next one independent of this
+    one: it is minus the integral of the uncertainty over the step, at most T times its largest value. The speed of the
+    adaptation is that of sampling; robustness is set by w_c alone.
+
+    Raises:
+        BadInput: a gain is not positive.
+    """
+
+    model: Model
+    actuation: Actuation
+    predictor: Float[Param, "..."] = param("1/s", "decay rate of the predictor's error", symbol="a_s")
+    bandwidth: Float[Param, "..."] = param("rad/s", "bandwidth of the filter C(s)", symbol="w_c", range=(0.3, 30.0))
+    tracking: Float[Param, "..."] = param(
+        "rad/s", "natural frequency of the tracking error", symbol="w", range=(0.2, 15.0)
+    )
+    damping: Float[Param, "..."] = param("", "its damping ratio", symbol="zeta", range=(0.5, 3.0))
+
+    def __check_init__(self):
+        for name in ("predictor", "bandwidth", "tracking", "damping"):
+            checks.positive(name, getattr(self, name))
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
+
+    def begin(self, y: Measurement, r: Target) -> PredictorState:
+        velocity = self.model.coordinates.velocity(y)
+        return PredictorState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
+
+    def demand(self, own: PredictorState, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        seen = self._adapted(own, y)
+        demanded = acceleration + self.tracking**2 * error + 2 * self.damping * self.tracking * rate - seen.filtered
+        return demanded, {"estimate": seen.filtered, "modelling_error": seen.error}
+
+    def adapt(self, own: PredictorState, y: Measurement, off: TrackingError, given: Given, dt) -> PredictorState:
+        seen, velocity = self._adapted(own, y), self.model.coordinates.velocity(y)
+        lost = -jnp.expm1(-self.predictor * dt)
+        moved = (1 - lost) * seen.error + lost / self.predictor * seen.uncertainty
+        return PredictorState(velocity + dt * given.known + moved, seen.filtered, dt)
+
+    def signals(self):
+        return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE
+
+    def _adapted(self, own: PredictorState, y: Measurement) -> Adapted:
+        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
+        error = own.predicted - self.model.coordinates.velocity(y)
+        uncertainty = -self.predictor / jnp.expm1(self.predictor * step) * error
+        share = -jnp.expm1(-self.bandwidth * own.elapsed)
+        return Adapted(error, uncertainty, own.filtered + share * (uncertainty - own.filtered))
+
+
+def l1_adaptive(
+    model: Model,
+    *,
+    sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    predictor=1.0,
+    bandwidth=None,
+    tracking=None,
+    damping=1.0,
+    feedforward: bool = True,
+    motor: str = "computed",
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+) -> L1Adaptive:
+    """L1 adaptive control with piecewise-constant adaptation: Hovakimyan and Cao (2010), section 3.3. Body axes.
+
+    The reference system is the tracking error with state feedback; the predictor runs on the velocities, whose
+    equation holds all of the uncertainty of a fully actuated plant. A constant load leaves the share
+    1 - a_s T / (exp(a_s T) - 1) of itself uncompensated, about a_s T / 2.
+
+    Args:
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
+        predictor: a_s, decay rate of the error of the predictor, 1/s; one number or one per axis.
+        bandwidth: w_c of the low-pass filter, rad/s; one number or one per axis. None: the one of least predicted cost
+            that keeps the margins of `bandwidths.py`, for a_s T = 0.
+        tracking: natural frequency of the tracking error, rad/s; None: chosen with the bandwidth; with a given
+            bandwidth between a quarter and half of it.
+        damping: damping ratio of the tracking error.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
+            no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    model = model.in_body_axes()
+    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
+    path = actuation_for(
+        sampling_time,
+        tracking,
+        feedforward=feedforward,
+        motor=motor,
+        reference_frequency=reference_frequency,
+        actuator_rate=actuator_rate,
+        direction=direction,
+    )
+    return L1Adaptive(
+        model=model, actuation=path, predictor=predictor, bandwidth=bandwidth, tracking=tracking, damping=damping
+    )

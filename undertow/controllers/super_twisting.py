@@ -1,0 +1,167 @@
+"""Super-twisting sliding-mode control: finite time against a load of bounded rate, by a continuous input."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.core import checks
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.errors import BadInput
+from undertow.core.param import Param, param
+from undertow.core.signals import Signal
+
+PerAxis = Float[Array, " n"]
+
+_FIRST, _SECOND = 2.0, 1.1
+_SHARE = 0.1  # 1/s, rate of the load over the authority of the actuators
+_STEEP = 2.0  # gain of the first term inside the layer over the slope of the surface
+
+
+class SuperTwisting(AbstractAccelerationLaw):
+    """a = a_d + l e_dot + k_1 |s|^(1/2) sign(s) + w, w_dot = k_2 sign(s), on the surface s = e_dot + l e.
+
+    k_1 = c_1 L^(1/2) and k_2 = c_2 L with L the bound of the rate of the load. In a layer |s| < phi, where a sampled
+    loop with lag cannot follow the root, both terms are linear, and the law is a PID with k_d = l + k_1 / phi^(1/2),
+    k_p = l k_1 / phi^(1/2) + k_2 / phi and k_i = l k_2 / phi. Without the layer s and its rate are zero after a finite
+    time, and w is then the load.
+
+    The state of the law is w, m/s^2 and rad/s^2.
+
+    Raises:
+        BadInput: a number that is not positive, or c_1 and c_2 too small for a load of rate L.
+    """
+
+    model: Model
+    actuation: Actuation
+    slope: Float[Param, "..."] = param("1/s", "rate of decay on the surface", symbol="l", range=(0.1, 30.0))
+    rate_bound: Float[Param, "..."] = param(
+        "m/s^3, rad/s^3", "bound of the rate of the load", symbol="L", range=(0.01, 100.0)
+    )
+    layer: Float[Param, "..."] = param("m/s, rad/s", "layer in which the law is linear", symbol="phi", range=(1e-4, 10))
+    first: Float[Param, "..."] = param("", "factor of the first gain", symbol="c_1")
+    second: Float[Param, "..."] = param("", "factor of the second gain", symbol="c_2")
+
+    def __check_init__(self):
+        for name in ("slope", "rate_bound", "layer", "first", "second"):
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
+            checks.positive(name, getattr(self, name))
+        enough = lambda first, second: (second > least_second(first)).all()
+        if not checks.assumed(enough, self.first, self.second):
+            least = float(np.max(least_second(np.asarray(self.first))))
+            raise BadInput("second", f"be more than {least:.4g} with this `first`", float(np.min(self.second)))
+
+    def begin(self, y: Measurement, r: Target) -> PerAxis:
+        return jnp.zeros_like(y.position)
+
+    def demand(self, own: PerAxis, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        surface = rate + self.slope * error
+        root = surface / jnp.sqrt(jnp.maximum(jnp.abs(surface), self.layer))
+        demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + own
+        return demanded, {"estimate": -own, "surface": surface}
+
+    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
+        """w one sampling time later; what limits take away is given back to it, as to the integral of `pid`."""
+        surface = off.rate + self.slope * off.error
+        second = self.second * self.rate_bound
+        steepest = self.slope + self.first * jnp.sqrt(self.rate_bound / self.layer)
+        back = jnp.minimum(jnp.sqrt(self.slope * second / self.layer / steepest), 1 / dt) * given.missing
+        return own + dt * (second * surface / jnp.maximum(jnp.abs(surface), self.layer) + back)
+
+    def signals(self):
+        return ESTIMATE | {"surface": Signal(("axis",), "[axis]/s", "distance s from the surface")} | ATTAINED_SHARE
+
+
+def least_second(first):
+    """c_2 above which every load whose rate is at most L is rejected in finite time.
+
+    With (|s|^(1/2) sign s, w) as state the law is a linear system whose uncertain feedback is at most L (Moreno and
+    Osorio 2012); the bounded real lemma asks that the peak of (1/2) / (p^2 + p c_1 / 2 + c_2 / 2) be below 1.
+    """
+    counted = first.clip(max=2.0)  # from there on the peak is at p = 0
+    return 2 / counted**2 + counted**2 / 8
+
+
+def super_twisting(
+    model: Model,
+    *,
+    sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    slope=None,
+    rate_bound=None,
+    layer=None,
+    first=_FIRST,
+    second=_SECOND,
+    feedforward: bool = True,
+    motor: str = "steady",
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+) -> SuperTwisting:
+    """Super-twisting control: Levant (1993); gains by Moreno and Osorio (2012). Body axes and quaternions.
+
+    Args:
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
+            or one per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: that of measurement and input together, s.
+        slope: l, rate of decay on the surface, 1/s; one number or one per axis. None: the one of least predicted cost
+            that keeps the margins of `bandwidths.py` where the law is linear.
+        rate_bound: L, largest rate of the load that the model does not know, m/s^3 and rad/s^3; one number or one per
+            axis. None: a tenth of the authority of the actuators per second, 1 where they have no limit.
+        layer: phi, m/s and rad/s: below it the law is linear. None: that in which the first term has twice the slope.
+            A layer of 1e-9 is none.
+        first: c_1 of the first gain c_1 L^(1/2); Levant (1998) has 1.5.
+        second: c_2 of the second gain c_2 L; Levant (1998) has 1.1.
+        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
+        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: the slope, 2 at most; 0 for no filter.
+        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    model = model.in_body_axes()
+    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    if slope is None:
+        slope = alike([best_frequency(axis, _inside_the_layer) for axis in axes])
+    if rate_bound is None:
+        rate_bound = alike([_SHARE * axis.authority if np.isfinite(axis.authority) else 1.0 for axis in axes])
+    for name, value in (("slope", slope), ("rate_bound", rate_bound), ("first", first)):
+        checks.per_axis(name, value, len(axes))
+        checks.positive(name, value)
+    if layer is None:
+        steep, bound, factor = (jnp.asarray(value, dtype=float) for value in (slope, rate_bound, first))
+        layer = bound * (factor / (_STEEP * steep)) ** 2
+    return SuperTwisting(
+        model=model,
+        actuation=actuation_for(
+            sampling_time,
+            2 * jnp.asarray(slope, dtype=float),
+            feedforward=feedforward,
+            motor=motor,
+            reference_frequency=reference_frequency,
+            actuator_rate=actuator_rate,
+            direction=direction,
+        ),
+        slope=slope,
+        rate_bound=rate_bound,
+        layer=layer,
+        first=first,
+        second=second,
+    )
+
+
+def _inside_the_layer(slope, s) -> Law:
+    """The law with the default gains where it is linear."""
+    steep = _STEEP * slope
+    second = _SECOND * (steep / _FIRST) ** 2
+    return Law(slope * steep + second + slope * second / s, slope + steep + 0 * s)
