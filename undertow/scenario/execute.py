@@ -82,7 +82,17 @@ def finished(built: Built, outcome: Outcome, left_to_xla: Mapping[str, str], gat
             "seed": scenario.seed,
         }
     )
-    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    loop = scenario.loop
+    how = Measuring(
+        built.window(),
+        loop.dt,
+        built.metrics,
+        built.criterion(),
+        gathered,
+        built.requirements,
+        round(loop.record / loop.dt) * loop.dt,
+        loop.duration,
+    )
     return Executed(built, outcome, *label(built.closed_loop, outcome, how, attributes))
 
 
