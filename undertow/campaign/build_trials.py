@@ -187,7 +187,7 @@ def _traced(
     def numbers(values: dict[str, Any]) -> tuple[list[Any], list[Any]]:
         scenario = first.scenario
         for key, value in values.items():
-            scenario = _with(scenario, key_path(key), value)
+            scenario = with_value(scenario, key_path(key), value)
         with checks.recorded_conditions() as conditions:
             run = run_of(build_scenario(scenario, first.text, part_cache.copy()))
         if structure(run) != form:
@@ -201,16 +201,16 @@ def _traced(
     return [next(columns) if varies else None for varies in vary], list(map(np.asarray, conditions))
 
 
-def _with(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
+def with_value(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
     """A scenario, or what is in it, with another value at a path; a list of numbers becomes an array."""
     if not path:
         return value
     step, *rest = path
     if isinstance(node, BaseModel):
-        return node.model_copy(update={str(step): _with(getattr(node, str(step)), tuple(rest), value)})
+        return node.model_copy(update={str(step): with_value(getattr(node, str(step)), tuple(rest), value)})
     if isinstance(node, jax.Array):
         return node.at[step].set(value)
     inner = node.copy()
-    inner[step] = _with(node[step], tuple(rest), value)
+    inner[step] = with_value(node[step], tuple(rest), value)
     numeric = isinstance(inner, list) and all(isinstance(entry, float | int | Tracer) for entry in inner)
     return jnp.stack([as_array(entry) for entry in inner]) if numeric else inner
