@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
-from undertow.campaign.batch_runner import SIMD, ProgramCache, batch_of
+from undertow.campaign.batch_runner import ProgramCache, batch_of
 from undertow.campaign.campaign_schema import Series
 from undertow.core import runtime
 from undertow.core.errors import BadInput
@@ -39,7 +39,6 @@ class Evaluator:
         self._names = needed_signals(requirements)
         self._series = Series(signals=list(self._names), every=loop.record) if self._names else None
         self._programs = ProgramCache(self._probes)
-        self.repeatable = True  # whether all runs so far came from the SIMD backend, which a single run repeats
 
     def _probes(self) -> list[Built]:
         chance = np.random.default_rng(0)
@@ -47,10 +46,11 @@ class Evaluator:
         found = [self.built(departure) for departure in inside]
         return [self.nominal, *(one for one in found if one is not None)]
 
-    def built(self, departure: Float[np.ndarray, " k"]) -> Built | None:
-        """The scenario at a departure; None where it cannot be built."""
+    def built(self, departure: Float[np.ndarray, " k"], seed: int | None = None) -> Built | None:
+        """The scenario at a departure, with its own seed unless another is given; None where it cannot be built."""
+        other = {} if seed is None else {"seed": seed}
         try:
-            return build(scenario_at(self.text, self.box.values(departure)), self._part_cache)
+            return build(scenario_at(self.text, self.box.values(departure) | other), self._part_cache)
         except BadInput:
             return None
 
@@ -58,19 +58,25 @@ class Evaluator:
         """Smallest robustness of all requirements at every departure."""
         return self.each(departures).min(axis=1)
 
-    def each(self, departures: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p r"]:
-        """Robustness of every requirement at every departure; infinite where the scenario cannot be built."""
-        rows = [departures[i : i + _AT_ONCE] for i in range(0, len(departures), _AT_ONCE)]
-        return np.concatenate([self._some(some) for some in rows])
+    def each(
+        self, departures: Float[np.ndarray, "p k"], seeds: Sequence[int] | None = None
+    ) -> Float[np.ndarray, "p r"]:
+        """Robustness of every requirement at every departure; infinite where the scenario cannot be built.
 
-    def _some(self, departures: np.ndarray) -> np.ndarray:
-        found = np.full((len(departures), len(self.requirements)), _INVALID)
-        builts = [(i, built) for i, departure in enumerate(departures) if (built := self.built(departure)) is not None]
+        Args:
+            departures: where.
+            seeds: of the runs; None for that of the scenario.
+        """
+        every = list(zip(departures, seeds or [None] * len(departures), strict=True))
+        return np.concatenate([self._some(every[i : i + _AT_ONCE]) for i in range(0, len(every), _AT_ONCE)])
+
+    def _some(self, every: Sequence[tuple[np.ndarray, int | None]]) -> np.ndarray:
+        found = np.full((len(every), len(self.requirements)), _INVALID)
+        builts = [(i, built) for i, one in enumerate(every) if (built := self.built(*one)) is not None]
         if not builts:
             return found
         with runtime.on_processor():
             result = self._programs.run((batch_of(built, self._series) for _, built in builts), self._series)
-        self.repeatable &= bool((result.backend == SIMD).all())
         for row, (i, built) in enumerate(builts):
             signals = contiguous({name: result.series[name][row] for name in self._names}, self._names)
             metrics = {name: float(values[row]) for name, values in result.metrics.items()}

@@ -1,11 +1,12 @@
 """Falsify a scenario: break a requirement within bounds, then shrink what broke it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.analysis.temporal.requirements import Requirement
+from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.falsification.box import Box, box_of, scenario_at
@@ -14,8 +15,11 @@ from undertow.falsification.gradient import Gradient
 from undertow.falsification.objective import Broken, BudgetSpent, Objective, ToBreak, Violation, Watch
 from undertow.falsification.shrink import corners, shrink
 from undertow.scenario.build import Built, build
-from undertow.scenario.reading import Text
+from undertow.scenario.execute import Executed, execute
+from undertow.scenario.provenance import text_hash
+from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Falsify
+from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.search import descend, search, spread_points
 
 METHODS = ("gradient", "search")
@@ -24,6 +28,7 @@ _SPREAD = 32  # points of the initial design beside the corners
 _DESCENTS = 2  # from the best points
 _ITERATIONS = 20  # of a descent
 _GENERATIONS = 1000
+_MOST = 1e300  # robustness of a departure whose scenario cannot be built, in a checkpoint
 
 
 class Falsified(NamedTuple):
@@ -34,6 +39,7 @@ class Falsified(NamedTuple):
         objective: all runs.
         violation: the smallest; None where nothing was broken.
         broken: robustness of every requirement at the violation, by name.
+        single_runs: the nominal run and that of the violation, each run by itself.
         method: gradient or search.
         differentiated: whether gradients came from differentiation; otherwise from differences, or there were none.
         finished: whether the search converged within the budget.
@@ -44,6 +50,7 @@ class Falsified(NamedTuple):
     objective: Objective
     violation: Violation | None
     broken: dict[str, float]
+    single_runs: tuple[Executed, ...]
     method: str
     differentiated: bool
     finished: bool
@@ -58,15 +65,18 @@ class Falsified(NamedTuple):
         """Numbers of the counter-example by key path; {} without one."""
         return self.box.values(self.violation.departure) if self.violation is not None else {}
 
-    def counterexample(self) -> Built | None:
-        """The scenario of the counter-example."""
-        return self.evaluator.built(self.violation.departure) if self.violation is not None else None
+    def repeated(self) -> bool:
+        """Whether the run of the counter-example by itself has the same robustness, bit for bit."""
+        alone = judged_alone(self.evaluator.requirements, self.single_runs[-1])
+        return self.violation is not None and alone == self.broken
 
 
 def falsify(
     text: Text,
     *,
     budget: int,
+    checkpoint: Path | None = None,
+    resume: bool = False,
     seed: int = 0,
     method: str = "gradient",
     say: Callable[[str], None] = lambda stage: None,
@@ -77,6 +87,8 @@ def falsify(
     Args:
         text: the scenario, with `falsify` and `requirements`; without these, its criterion of success is to be broken.
         budget: number of runs at most.
+        checkpoint: file that keeps the runs, so that the search can be resumed; None to keep none.
+        resume: whether to resume from the checkpoint.
         seed: of the search.
         method: gradient or search.
         say: told what is done.
@@ -87,7 +99,8 @@ def falsify(
     """
     checks.choice("--method", method, METHODS)
     evaluator = evaluator_of(text)
-    objective = Objective(evaluator.robustness, evaluator.box, budget, watch)
+    compute = evaluator.robustness if checkpoint is None else _kept(evaluator, checkpoint, resume, (method, seed))
+    objective = Objective(compute, evaluator.box, budget, watch)
     say("nominal run")
     _check_nominal(evaluator)
     gradient = Gradient(evaluator, objective.robustness, method == "gradient")
@@ -103,11 +116,39 @@ def falsify(
     except BudgetSpent:
         finished = False
     found = objective.smallest
-    broken: dict[str, float] = {}
+    say("running the counter-example by itself" if found is not None else "running the nominal scenario by itself")
+    broken, runs = dict[str, float](), (execute(evaluator.nominal),)
     if found is not None:
         names = [one.name for one in evaluator.requirements]
         broken = dict(zip(names, evaluator.each(found.departure[None])[0].tolist(), strict=True))
-    return Falsified(evaluator, objective, found, broken, method, gradient.differentiated, finished, seed)
+        counterexample = evaluator.built(found.departure)
+        assert counterexample is not None  # it has a robustness
+        runs = (*runs, execute(counterexample))
+    return Falsified(evaluator, objective, found, broken, runs, method, gradient.differentiated, finished, seed)
+
+
+def judged_alone(requirements: Sequence[Requirement], executed: Executed) -> dict[str, float]:
+    """Robustness of every requirement in one run of a scenario, by name."""
+    loop, names = executed.built.scenario.loop, needed_signals(requirements)
+    kept = judged(
+        requirements,
+        contiguous(executed.outcome.signals, names),
+        round(loop.record / loop.dt) * loop.dt,
+        executed.steady or {},
+        int(executed.status),
+        float(executed.outcome.ended),
+        loop.duration,
+    )
+    return {name: one.robustness for name, one in kept.items()}
+
+
+def _kept(evaluator: Evaluator, path: Path, resume: bool, how: tuple[str, int]) -> Callable[[np.ndarray], np.ndarray]:
+    """Robustness of departures, from the checkpoint as far as it goes."""
+    settings = evaluator.nominal.scenario.falsify.model_dump()
+    about = text_hash(dump({"how": list(how), "falsify": settings, **evaluator.nominal.resolved}))
+    checkpoint = Checkpoint(path, about, np.inf, resume, what="falsification")
+    numbers = lambda departures: np.minimum(evaluator.robustness(departures), _MOST).tolist()  # JSON has no infinity
+    return lambda departures: np.asarray(checkpoint.ask("robustness", departures, lambda: numbers(departures)))
 
 
 def evaluator_of(text: Text) -> Evaluator:
@@ -200,7 +241,7 @@ def as_data(found: Falsified) -> dict[str, Any]:
             "values": found.values(),
             "departure": dict(zip((axis.key for axis in box.axes), violation.departure.tolist(), strict=True)),
             "robustness": found.broken,
-            "repeatable": found.evaluator.repeatable,
+            "repeated": found.repeated(),
         },
         "history": [{"runs": one.runs, "size": one.size, "robustness": one.robustness} for one in objective.violations],
         "evaluations": {
