@@ -220,6 +220,8 @@ class _Reader:
         if not self._next_is("["):
             return name, None
         entry = self._upcoming()
+        if not entry or entry == "]":
+            raise self.wrong("name an entry")
         self._at += 1
         self._need("]")
         return name, entry

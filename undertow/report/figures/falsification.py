@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from undertow.analysis.metrics import output_groups
 from undertow.report.figures import style
 
-_TALL, _GAP = 1.5, 0.75  # height of a panel and space under it, in
+_TALL, _GAP = 1.3, 0.65  # height of a panel and space under it, in
 _CUT = 3.0  # least robustness that is shown: runs that failed have any
 
 
@@ -21,7 +21,7 @@ def search_figure(found: Mapping[str, Any]) -> Figure:
         found: contents of falsify.json.
     """
     vary, robustness = found["vary"], np.array(found["evaluations"]["robustness"], dtype=float)
-    figure = style.blank(6.4, 0.6 + (1 + len(vary)) * (_TALL + _GAP))
+    figure = style.blank(6.4, 0.4 + (1 + len(vary)) * (_TALL + _GAP))
     style.head(figure, "Search for a violation", {})
     runs = np.arange(1, len(robustness) + 1)
     broken = robustness <= 0
@@ -51,7 +51,7 @@ def beside_nominal_figure(nominal: xr.Dataset, broken: xr.Dataset) -> Figure:
     """
     units = [unit.strip() for unit in nominal["axis"].attrs["unit_of_each"].split(",")]
     groups = output_groups(units)
-    figure = style.blank(6.4, 0.6 + (1 + len(groups)) * (_TALL + _GAP))
+    figure = style.blank(6.4, 0.4 + (1 + len(groups)) * (_TALL + _GAP))
     style.head(figure, "Counter-example beside the nominal run", {"nominal": style.SOLID, "failing": style.DASHED})
     blocks: list[tuple[str, str, list[int] | None]] = [
         (f"{name} error, {unit}", "error", axes) for name, (unit, axes) in groups.items()
