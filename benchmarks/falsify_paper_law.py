@@ -90,7 +90,7 @@ def report(found: Falsified, folder: Path) -> None:
     path.write_text(trial_text(found.single_runs[-1].built, "Counter-example of the law of the paper."), "utf-8")
     again = execute(read(path))
     same = {name: one["robustness"] for name, one in requirements_of(again.dataset).items()} == found.broken
-    print(f"{path}: status {again.status.word}, judgement repeated bit for bit: {same}")
+    print(f"{path}: status {again.status.word}, verdict repeated bit for bit: {same}")
 
 
 def main(samples: int = 1000, budget: int = 2000, duration: float = 10.0, out: Path | None = None) -> None:

@@ -91,7 +91,7 @@ def falsify(
         resume: whether to resume from the checkpoint.
         seed: of the search.
         method: gradient or search.
-        say: told what is done.
+        say: called with the current stage.
         watch: called after every batch of runs.
 
     Raises:

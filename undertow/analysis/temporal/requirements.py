@@ -31,7 +31,7 @@ class Requirement(NamedTuple):
     below: float = math.inf
 
 
-class Judgement(NamedTuple):
+class Verdict(NamedTuple):
     """How a run keeps a requirement.
 
     Attributes:
@@ -98,8 +98,8 @@ def judged(
     status: int,
     ended: float,
     duration: float,
-) -> dict[str, Judgement]:
-    """Judgement of a run by each requirement.
+) -> dict[str, Verdict]:
+    """Verdict of a run by each requirement.
 
     A run that failed keeps none: its robustness is at most -1, less the share of the duration that it lacks.
 
@@ -120,7 +120,7 @@ def judged(
             value = bound_robustness(float(metrics.get(one.name, math.nan)), one.below)
         if status != int(Status.OK):
             value = min(value, _FAILED - max(0.0, 1.0 - ended / duration))
-        found[one.name] = Judgement(value, value > 0)
+        found[one.name] = Verdict(value, value > 0)
     return found
 
 
