@@ -146,6 +146,22 @@ def test_the_same_seed_gives_the_same_search(two):
     assert not first.finished and first.objective.runs == 150
 
 
+def test_the_worst_of_several_seeds():
+    """The smallest noise that breaks a requirement of all seeds is that of the seed for which it is smallest."""
+    loop = {
+        "navigation": {"kind": "white_noise", "velocity": 0.0},
+        "loop": {"dt": 0.05, "duration": 5.0, "record": 0.05},
+    }
+    text = scenario("always[2, 5] abs(error) < 0.5", {"navigation.velocity": {"between": [0.0, 20.0]}}, **loop)
+    several = text._replace(data=text.data | {"falsify": text.data["falsify"] | {"seeds": 3}, "seed": 5})
+    found = found_in(several, budget=900)
+    alone = [found_in(text._replace(data=text.data | {"seed": seed}), budget=300) for seed in (5, 6, 7)]
+    smallest = min(alone, key=lambda one: one.violation.size)
+    np.testing.assert_allclose(found.violation.size, smallest.violation.size, rtol=0.01)
+    assert found.single_runs[-1].built.scenario.seed == smallest.evaluator.nominal.scenario.seed
+    assert found.repeated() and found.objective.runs == 3 * len(found.objective.departures) <= 900
+
+
 def test_bounds_without_a_violation(two):
     vary = {key: {"between": [-0.01, 0.01]} for key in BOUNDS}
     found = found_in(two._replace(data=two.data | {"falsify": {"vary": vary}}), budget=60)

@@ -1,5 +1,6 @@
 """Falsify a scenario: break a requirement within bounds, then shrink what broke it."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -100,7 +101,7 @@ def falsify(
     checks.choice("--method", method, METHODS)
     evaluator = evaluator_of(text)
     compute = evaluator.robustness if checkpoint is None else _kept(evaluator, checkpoint, resume, (method, seed))
-    objective = Objective(compute, evaluator.box, budget, watch)
+    objective = Objective(compute, evaluator.box, budget, watch, len(evaluator.seeds))
     say("nominal run")
     _check_nominal(evaluator)
     gradient = Gradient(evaluator, objective.robustness, method == "gradient")
@@ -119,9 +120,10 @@ def falsify(
     say("running the counter-example by itself" if found is not None else "running the nominal scenario by itself")
     broken, runs = dict[str, float](), (execute(evaluator.nominal),)
     if found is not None:
-        names = [one.name for one in evaluator.requirements]
-        broken = dict(zip(names, evaluator.each(found.departure[None])[0].tolist(), strict=True))
-        counterexample = evaluator.built(found.departure)
+        names, at = [one.name for one in evaluator.requirements], found.departure[None]
+        worst = evaluator.seeds[int(evaluator.of_seeds(at)[0].argmin())]
+        broken = dict(zip(names, evaluator.each(at, [worst])[0].tolist(), strict=True))
+        counterexample = evaluator.built(found.departure, worst)
         assert counterexample is not None  # it has a robustness
         runs = (*runs, execute(counterexample))
     return Falsified(evaluator, objective, found, broken, runs, method, gradient.differentiated, finished, seed)
@@ -165,7 +167,7 @@ def evaluator_of(text: Text) -> Evaluator:
         box = box_of(settings.vary, built)
         # Metrics of a batch are of every control step.
         every = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
-        evaluator = Evaluator(every, build(every), box, _required(built, settings))
+        evaluator = Evaluator(every, build(every), box, _required(built, settings), settings.seeds)
         for axis in box.axes:
             with within(f"falsify.vary.{axis.key}"):
                 scenario_at(text, {axis.key: axis.high})
@@ -192,7 +194,8 @@ def _required(built: Built, settings: Falsify) -> tuple[Requirement, ...]:
 
 
 def _check_nominal(evaluator: Evaluator) -> None:
-    found = evaluator.each(np.zeros((1, len(evaluator.box.axes))))[0]
+    count = len(evaluator.seeds)
+    found = evaluator.each(np.zeros((count, len(evaluator.box.axes))), evaluator.seeds).min(axis=0)
     for one, robustness in zip(evaluator.requirements, found.tolist(), strict=True):
         if not robustness > 0:
             got = f"violated, robustness {robustness:.3g}"
@@ -211,7 +214,8 @@ def _break(
         order = np.argsort(costs, kind="stable")
         for start in order[:_DESCENTS] if method == "gradient" else ():
             descend(to_break, first[start], float(costs[start]), _ITERATIONS)
-        search(to_break, first[order[0]], _GENERATIONS, seed)
+        for number in itertools.count():  # where the population has converged, another one begins
+            search(to_break, first[order[0]], _GENERATIONS, seed + number)
     except Broken:
         return
 
@@ -230,8 +234,10 @@ def as_data(found: Falsified) -> dict[str, Any]:
         "method": found.method,
         "gradients": "differentiation" if found.differentiated else "differences",
         "seed": found.seed,
+        "seeds": found.evaluator.seeds,
         "budget": objective.budget,
         "runs": objective.runs,
+        "departures": len(objective.departures),
         "converged": found.finished,
         "least_robustness": float(least[-1]) if len(least) else None,
         "counterexample": None
@@ -239,6 +245,7 @@ def as_data(found: Falsified) -> dict[str, Any]:
         else {
             "size": violation.size,
             "values": found.values(),
+            "seed": found.single_runs[-1].built.scenario.seed,
             "departure": dict(zip((axis.key for axis in box.axes), violation.departure.tolist(), strict=True)),
             "robustness": found.broken,
             "repeated": found.repeated(),

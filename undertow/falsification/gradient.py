@@ -30,8 +30,8 @@ class Gradient:
     """Gradient of the smallest robustness with respect to a departure.
 
     It is computed by forward differentiation where the loop can be built and run with traced numbers in the place of
-    all that varies, and where all requirements are formulas. Otherwise it is computed by differences of the exact
-    robustness: where a delay varies, for example, which changes the size of a buffer.
+    all that varies, all requirements are formulas, and there is one seed. Otherwise it is computed by differences of the
+    exact robustness: where a delay varies, for example, which changes the size of a buffer.
 
     Args:
         evaluator: whose scenario it is.
@@ -69,7 +69,8 @@ class Gradient:
 
     def _differentiable(self) -> bool:
         """Whether the loop can be built and run with traced numbers."""
-        if self._smallest is None or any(axis.integer for axis in self._box.axes):
+        several = len(self._evaluator.seeds) > 1
+        if self._smallest is None or several or any(axis.integer for axis in self._box.axes):
             return False
         try:
             with runtime.on_processor(), runtime.in_precision(self._precision):

@@ -39,10 +39,14 @@ class Objective:
         box: what varies.
         budget: number of runs.
         watch: called after every batch.
+        runs_each: runs per departure.
     """
 
-    def __init__(self, compute: Callable[[Departures], np.ndarray], box: Box, budget: int, watch: Watch):
+    def __init__(
+        self, compute: Callable[[Departures], np.ndarray], box: Box, budget: int, watch: Watch, runs_each: int = 1
+    ):
         self._compute, self.box, self.budget, self._watch = compute, box, budget, watch
+        self._runs_each = runs_each
         self.departures: list[np.ndarray] = []
         self.robustnesses: list[float] = []
         self.violations: list[Violation] = []  # each smaller than the one before
@@ -50,7 +54,7 @@ class Objective:
     @property
     def runs(self) -> int:
         """Number of runs so far."""
-        return len(self.robustnesses)
+        return self._runs_each * len(self.robustnesses)
 
     @property
     def smallest(self) -> Violation | None:
@@ -63,7 +67,7 @@ class Objective:
         Raises:
             BudgetSpent: the budget allows only some of the runs, which are done and counted.
         """
-        allowed = departures[: self.budget - self.runs]
+        allowed = departures[: (self.budget - self.runs) // self._runs_each]
         if len(allowed):
             inside = np.clip(allowed, self.box.lower, self.box.upper)
             found = self._compute(inside)

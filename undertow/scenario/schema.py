@@ -242,6 +242,9 @@ class Falsify(Strict):
     requirements: list[str] | None = Field(
         None, min_length=1, description="names of the requirements to break any of; default: all"
     )
+    seeds: int = Field(
+        1, ge=1, le=1000, description="number of seeds that every departure is run with, from that of the scenario on"
+    )
 
 
 class Scenario(Strict):
