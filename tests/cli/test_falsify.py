@@ -46,7 +46,7 @@ def test_the_counterexample_repeats_the_failure(undertow, tmp_path):
         ("{between: [0, 2]}", "{between: [1, 2]}", "must be around the nominal value 0.2, but is 1 to 2"),
         ("{vary: {disturbance.amplitude: {between: [0, 2]}}}", "{}", "`falsify.vary` must name what varies"),
         ("disturbance.amplitude: {", "disturbance.amplitud: {", "must have a number for its nominal value"),
-        ("disturbance.amplitude: {", "seed: {", "must be the key path of a number of the scenario, not of its seed"),
+        ("disturbance.amplitude: {", "seed: {", "must be the key path of a number in plant, model, controller"),
         ("abs(error) < 0.3", "abs(eror) < 0.3", "`eror` (s.yaml, line 7). Did you mean `error`?"),
         ("within 4 s", "always[9, 10]", "must begin before the end of the run (8 s), but is 9 s"),
         ("position_rms", "position_rm", "must be a metric of this plant, or have a `formula`"),

@@ -18,6 +18,7 @@ from jax.core import Tracer
 from pydantic import BaseModel
 
 from undertow.campaign.batch_runner import Batch, batch_of, leaves, run_of
+from undertow.campaign.requirements import recorded
 from undertow.campaign.trials import Trials
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array
@@ -103,7 +104,7 @@ def build_trials(
             yield found._replace(places=places[found.places])
             places = np.delete(places, found.places)
         for place, built in valid_trials(several, part_cache, trials[places].tolist()):
-            yield Together(places[[place]], built, batch_of(built, several.campaign.series))
+            yield Together(places[[place]], built, batch_of(built, recorded(several.campaign, built)))
 
 
 def _fractions(several: Trials) -> list[str]:
@@ -154,7 +155,7 @@ def _together(
     if not alone:
         return None
     first = alone[min(alone)]
-    batch = batch_of(first, several.campaign.series)
+    batch = batch_of(first, recorded(several.campaign, first))
     try:
         form = structure(batch.first)
         numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.own.copy(), [])

@@ -13,6 +13,19 @@ from undertow.scenario.build import Built
 from undertow.scenario.reading import Text, key_path
 from undertow.scenario.schema import Bounds
 
+# Sections of a scenario whose numbers can vary; the others are settings of the run and what is required of it.
+_SECTIONS = (
+    "plant",
+    "model",
+    "controller",
+    "reference",
+    "disturbance",
+    "navigation",
+    "supervisor",
+    "faults",
+    "initial",
+)
+
 
 class Axis(NamedTuple):
     """One number that varies.
@@ -96,8 +109,10 @@ def box_of(vary: Mapping[str, Bounds], built: Built) -> Box:
 def _axis(key: str, bounds: Bounds, built: Built) -> Axis:
     low, high = bounds.between
     nominal, name = bounds.nominal, f"falsify.vary.{key}"
-    if key == "seed" or not key_path(key):
-        raise BadInput(name, "be the key path of a number of the scenario, not of its seed")
+    section = next(iter(key_path(key)), "")
+    if section not in _SECTIONS:
+        got = f"`{section}`" if section else "empty"
+        raise BadInput(name, f"be the key path of a number in {', '.join(_SECTIONS)}", got)
     if nominal is None:
         nominal = _number_at(built.resolved, key_path(key))
     if nominal is None:

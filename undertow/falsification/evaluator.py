@@ -12,6 +12,7 @@ from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.falsification.box import Box, scenario_at
 from undertow.scenario.build import Built, build
+from undertow.scenario.consistency import record_period
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
 
@@ -37,7 +38,7 @@ class Evaluator:
         self.seeds = [(built.scenario.seed + number) % 2**32 for number in range(seeds)]
         self._part_cache = PartCache()
         loop = built.scenario.loop
-        self.period = round(loop.record / loop.dt) * loop.dt
+        self.period = record_period(loop)
         self._names = needed_signals(requirements)
         self._series = Series(signals=list(self._names), every=loop.record) if self._names else None
         self._programs = ProgramCache(self._probes)

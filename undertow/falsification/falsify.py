@@ -16,6 +16,7 @@ from undertow.falsification.gradient import Gradient
 from undertow.falsification.objective import Broken, BudgetSpent, Objective, ToBreak, Violation, Watch
 from undertow.falsification.shrink import corners, shrink
 from undertow.scenario.build import Built, build
+from undertow.scenario.consistency import record_period
 from undertow.scenario.execute import Executed, execute
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -135,7 +136,7 @@ def judged_alone(requirements: Sequence[Requirement], executed: Executed) -> dic
     kept = judged(
         requirements,
         contiguous(executed.outcome.signals, names),
-        round(loop.record / loop.dt) * loop.dt,
+        record_period(loop),
         executed.steady or {},
         int(executed.status),
         float(executed.outcome.ended),

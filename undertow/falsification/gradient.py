@@ -30,8 +30,8 @@ class Gradient:
     """Gradient of the smallest robustness with respect to a departure.
 
     It is computed by forward differentiation where the loop can be built and run with traced numbers in the place of
-    all that varies, all requirements are formulas, and there is one seed. Otherwise it is computed by differences of the
-    exact robustness: where a delay varies, for example, which changes the size of a buffer.
+    all that varies, all requirements are formulas, and there is one seed. Otherwise it is computed by differences of
+    the exact robustness: where a delay varies, for example, which changes the size of a buffer.
 
     Args:
         evaluator: whose scenario it is.

@@ -19,6 +19,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.consistency import record_period
 from undertow.scenario.finished_run import Measuring, label, metrics_text
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
@@ -90,7 +91,7 @@ def finished(built: Built, outcome: Outcome, left_to_xla: Mapping[str, str], gat
         built.criterion(),
         gathered,
         built.requirements,
-        round(loop.record / loop.dt) * loop.dt,
+        record_period(loop),
         loop.duration,
     )
     return Executed(built, outcome, *label(built.closed_loop, outcome, how, attributes))
