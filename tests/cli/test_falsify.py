@@ -51,7 +51,7 @@ def test_the_counterexample_repeats_the_failure(undertow, tmp_path):
         ("within 4 s", "always[9, 10]", "must begin before the end of the run (8 s), but is 9 s"),
         ("position_rms", "position_rm", "must be a metric of this plant, or have a `formula`"),
         ("{below: 0.4}", "{below: 0.4, formula: a}", "must have one of below, formula"),
-        ("{below: 0.4}", "0.4", "must be a mapping with `below` (a bound of a metric) or `formula` (a text)"),
+        ("{below: 0.4}", "0.4", "`requirements.position_rms` must be a mapping of keys to values, but is 0.4"),
         ("< 0.3", "< 0.03", "`requirements.settles` must hold in the nominal scenario, but is violated"),
         ("falsify: {", "falsify: {requirements: [settle], ", "must name requirements of the scenario, but is settle"),
         ("disturbance: {", "navigation: {kind: degraded}\nmetrics: []\ndisturbnce: {", "must be a key of the scenario"),

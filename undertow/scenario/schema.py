@@ -196,13 +196,6 @@ class RunRequirement(Strict):
         None, description="temporal formula on the records, such as `within 10 s always position_error < 0.1`"
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _mapping(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            raise ValueError("be a mapping with `below` (a bound of a metric) or `formula` (a text)")
-        return given
-
     @model_validator(mode="after")
     def _one(self) -> "RunRequirement":
         if (self.below is None) == (self.formula is None):
