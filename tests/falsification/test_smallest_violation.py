@@ -115,7 +115,7 @@ def nearest_by_superposition(two):
 
 @pytest.mark.parametrize("method", ["gradient", "search"])
 def test_two_disturbances_by_superposition(two, method):
-    found = found_in(two, method=method)
+    found = found_in(two, method=method, budget=700)
     assert found.differentiated == (method == "gradient")
     exact = nearest_by_superposition(two)
     assert exact * (1 - 1e-6) < found.violation.size < 1.02 * exact
@@ -136,7 +136,8 @@ def test_a_single_run_repeats_the_counterexample(two):
 def test_a_gradient_by_differentiation_is_that_of_differences(two):
     evaluator = found_in(two, budget=8).evaluator
     at = np.array([0.31, 0.22])
-    exact, differences = (Gradient(evaluator, evaluator.robustness, way)(at) for way in (True, False))
+    one_seed = lambda points: evaluator.robustness(points, [0] * len(points))
+    exact, differences = (Gradient(evaluator, one_seed, way)(at) for way in (True, False))
     np.testing.assert_allclose(exact, differences, rtol=0.1)
 
 
@@ -146,20 +147,20 @@ def test_the_same_seed_gives_the_same_search(two):
     assert not first.finished and first.objective.runs == 150
 
 
-def test_the_worst_of_several_seeds():
-    """The smallest noise that breaks a requirement of all seeds is that of the seed for which it is smallest."""
+def test_the_seed_is_part_of_the_search():
+    """With three seeds, the smallest noise that breaks a requirement is that of the worst of them."""
     loop = {
         "navigation": {"kind": "white_noise", "velocity": 0.0},
         "loop": {"dt": 0.05, "duration": 5.0, "record": 0.05},
     }
     text = scenario("always[2, 5] abs(error) < 0.5", {"navigation.velocity": {"between": [0.0, 20.0]}}, **loop)
     several = text._replace(data=text.data | {"falsify": text.data["falsify"] | {"seeds": 3}, "seed": 5})
-    found = found_in(several, budget=900)
-    alone = [found_in(text._replace(data=text.data | {"seed": seed}), budget=300) for seed in (5, 6, 7)]
+    found = found_in(several, budget=450)
+    alone = [found_in(text._replace(data=text.data | {"seed": seed}), budget=150) for seed in (5, 6, 7)]
     smallest = min(alone, key=lambda one: one.violation.size)
-    np.testing.assert_allclose(found.violation.size, smallest.violation.size, rtol=0.01)
-    assert found.single_runs[-1].built.scenario.seed == smallest.evaluator.nominal.scenario.seed
-    assert found.repeated() and found.objective.runs == 3 * len(found.objective.departures) <= 900
+    np.testing.assert_allclose(found.violation.size, smallest.violation.size, rtol=0.05)
+    assert found.violation.seed == smallest.violation.seed
+    assert found.single_runs[-1].built.scenario.seed == found.violation.seed and found.repeated()
 
 
 def test_bounds_without_a_violation(two):
@@ -195,7 +196,9 @@ def test_a_curved_boundary_in_five_dimensions():
     axes = np.array([0.9, 0.8, 0.5, 0.7, 0.95])
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(5, 5)))[0]
     inside = lambda points: 1 - (((points @ turn) / axes) ** 2).sum(-1)
-    objective = Objective(inside, unit_box(5), 6000, lambda runs, least, smallest: None)
+    objective = Objective(
+        lambda points, seeds: inside(points), unit_box(5), [0], 6000, lambda runs, least, smallest: None
+    )
     start = np.full(5, 0.9)
     objective.robustness(start[None])
     assert isinstance(objective.smallest, Violation)

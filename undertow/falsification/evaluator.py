@@ -30,12 +30,12 @@ class Evaluator:
         built: the same, built.
         box: what varies.
         requirements: to be broken, any of them.
-        seeds: that every departure is run with, from that of the scenario on.
     """
 
-    def __init__(self, text: Text, built: Built, box: Box, requirements: Sequence[Requirement], seeds: int = 1):
+    def __init__(self, text: Text, built: Built, box: Box, requirements: Sequence[Requirement]):
         self.text, self.nominal, self.box, self.requirements = text, built, box, tuple(requirements)
-        self.seeds = [(built.scenario.seed + number) % 2**32 for number in range(seeds)]
+        settings, seed = built.scenario.falsify, built.scenario.seed
+        self.seeds = [(seed + number) % 2**32 for number in range(settings.seeds)]
         self._part_cache = PartCache()
         loop = built.scenario.loop
         self.period = record_period(loop)
@@ -57,15 +57,9 @@ class Evaluator:
         except BadInput:
             return None
 
-    def robustness(self, departures: Float[np.ndarray, "p k"]) -> Float[np.ndarray, " p"]:
-        """Smallest robustness of all requirements and all seeds at every departure."""
-        return self.of_seeds(departures).min(axis=1)
-
-    def of_seeds(self, departures: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p s"]:
-        """Smallest robustness of all requirements at every departure, with every seed."""
-        count = len(self.seeds)
-        found = self.each(np.repeat(departures, count, axis=0), self.seeds * len(departures))
-        return found.min(axis=1).reshape(len(departures), count)
+    def robustness(self, departures: Float[np.ndarray, "p k"], seeds: Sequence[int]) -> Float[np.ndarray, " p"]:
+        """Smallest robustness of all requirements at every departure, each with its seed."""
+        return self.each(departures, seeds).min(axis=1)
 
     def each(
         self, departures: Float[np.ndarray, "p k"], seeds: Sequence[int] | None = None

@@ -26,11 +26,16 @@ from undertow.tuning.search import descend, search, spread_points
 
 METHODS = ("gradient", "search")
 
+_NOMINAL = 32  # seeds of the nominal scenario that are checked at most
 _SPREAD = 32  # points of the initial design beside the corners
+_BIASED = 128  # points per round, many at bounds
 _DESCENTS = 2  # from the best points
 _ITERATIONS = 20  # of a descent
 _GENERATIONS = 1000
 _MOST = 1e300  # robustness of a departure whose scenario cannot be built, in a checkpoint
+
+
+Robustness = Callable[[np.ndarray, Sequence[int]], np.ndarray]  # departures and the seeds of their runs
 
 
 class Falsified(NamedTuple):
@@ -102,7 +107,7 @@ def falsify(
     checks.choice("--method", method, METHODS)
     evaluator = evaluator_of(text)
     compute = evaluator.robustness if checkpoint is None else _kept(evaluator, checkpoint, resume, (method, seed))
-    objective = Objective(compute, evaluator.box, budget, watch, len(evaluator.seeds))
+    objective = Objective(compute, evaluator.box, evaluator.seeds, budget, watch)
     say("nominal run")
     _check_nominal(evaluator)
     gradient = Gradient(evaluator, objective.robustness, method == "gradient")
@@ -121,10 +126,9 @@ def falsify(
     say("running the counter-example by itself" if found is not None else "running the nominal scenario by itself")
     broken, runs = dict[str, float](), (execute(evaluator.nominal),)
     if found is not None:
-        names, at = [one.name for one in evaluator.requirements], found.departure[None]
-        worst = evaluator.seeds[int(evaluator.of_seeds(at)[0].argmin())]
-        broken = dict(zip(names, evaluator.each(at, [worst])[0].tolist(), strict=True))
-        counterexample = evaluator.built(found.departure, worst)
+        names = [one.name for one in evaluator.requirements]
+        broken = dict(zip(names, evaluator.each(found.departure[None], [found.seed])[0].tolist(), strict=True))
+        counterexample = evaluator.built(found.departure, found.seed)
         assert counterexample is not None  # it has a robustness
         runs = (*runs, execute(counterexample))
     return Falsified(evaluator, objective, found, broken, runs, method, gradient.differentiated, finished, seed)
@@ -145,13 +149,17 @@ def judged_alone(requirements: Sequence[Requirement], executed: Executed) -> dic
     return {name: one.robustness for name, one in kept.items()}
 
 
-def _kept(evaluator: Evaluator, path: Path, resume: bool, how: tuple[str, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Robustness of departures, from the checkpoint as far as it goes."""
+def _kept(evaluator: Evaluator, path: Path, resume: bool, how: tuple[str, int]) -> Robustness:
+    """Robustness of departures with their seeds, from the checkpoint as far as it goes."""
     settings = evaluator.nominal.scenario.falsify.model_dump()
     about = text_hash(dump({"how": list(how), "falsify": settings, **evaluator.nominal.resolved}))
     checkpoint = Checkpoint(path, about, np.inf, resume, what="falsification")
-    numbers = lambda departures: np.minimum(evaluator.robustness(departures), _MOST).tolist()  # JSON has no infinity
-    return lambda departures: np.asarray(checkpoint.ask("robustness", departures, lambda: numbers(departures)))
+
+    def compute(departures: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
+        numbers = lambda: np.minimum(evaluator.robustness(departures, seeds), _MOST).tolist()  # JSON has no infinity
+        return np.asarray(checkpoint.ask("robustness", np.column_stack([departures, seeds]), numbers))
+
+    return compute
 
 
 def evaluator_of(text: Text) -> Evaluator:
@@ -168,7 +176,7 @@ def evaluator_of(text: Text) -> Evaluator:
         box = box_of(settings.vary, built)
         # Metrics of a batch are of every control step.
         every = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
-        evaluator = Evaluator(every, build(every), box, _required(built, settings), settings.seeds)
+        evaluator = Evaluator(every, build(every), box, _required(built, settings))
         for axis in box.axes:
             with within(f"falsify.vary.{axis.key}"):
                 scenario_at(text, {axis.key: axis.high})
@@ -195,8 +203,8 @@ def _required(built: Built, settings: Falsify) -> tuple[Requirement, ...]:
 
 
 def _check_nominal(evaluator: Evaluator) -> None:
-    count = len(evaluator.seeds)
-    found = evaluator.each(np.zeros((count, len(evaluator.box.axes))), evaluator.seeds).min(axis=0)
+    count = min(len(evaluator.seeds), _NOMINAL)
+    found = evaluator.each(np.zeros((count, len(evaluator.box.axes))), evaluator.seeds[:count]).min(axis=0)
     for one, robustness in zip(evaluator.requirements, found.tolist(), strict=True):
         if not robustness > 0:
             got = f"violated, robustness {robustness:.3g}"
@@ -215,10 +223,21 @@ def _break(
         order = np.argsort(costs, kind="stable")
         for start in order[:_DESCENTS] if method == "gradient" else ():
             descend(to_break, first[start], float(costs[start]), _ITERATIONS)
-        for number in itertools.count():  # where the population has converged, another one begins
+        chance = np.random.default_rng([seed, 1])
+        for number in itertools.count():  # until a requirement breaks or the budget is spent
+            to_break.costs(box.to_cube(_at_bounds(box, chance)))
             search(to_break, first[order[0]], _GENERATIONS, seed + number)
     except Broken:
         return
+
+
+def _at_bounds(box: Box, chance: np.random.Generator) -> np.ndarray:
+    """Departures at random, about half of whose numbers are at a bound: failures are often there."""
+    shape = (_BIASED, len(box.axes))
+    inside = box.of_cube(chance.random(shape))
+    both = (box.lower < 0) & (box.upper > 0)
+    upper = np.where(both, chance.random(shape) < 0.5, box.upper > 0)
+    return np.where(chance.random(shape) < 0.5, np.where(upper, box.upper, box.lower), inside)
 
 
 def as_data(found: Falsified) -> dict[str, Any]:
@@ -235,10 +254,9 @@ def as_data(found: Falsified) -> dict[str, Any]:
         "method": found.method,
         "gradients": "differentiation" if found.differentiated else "differences",
         "seed": found.seed,
-        "seeds": found.evaluator.seeds,
+        "seeds": len(found.evaluator.seeds),
         "budget": objective.budget,
         "runs": objective.runs,
-        "departures": len(objective.departures),
         "converged": found.finished,
         "least_robustness": float(least[-1]) if len(least) else None,
         "counterexample": None
@@ -246,7 +264,7 @@ def as_data(found: Falsified) -> dict[str, Any]:
         else {
             "size": violation.size,
             "values": found.values(),
-            "seed": found.single_runs[-1].built.scenario.seed,
+            "seed": violation.seed,
             "departure": dict(zip((axis.key for axis in box.axes), violation.departure.tolist(), strict=True)),
             "robustness": found.broken,
             "repeated": found.repeated(),

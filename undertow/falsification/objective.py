@@ -1,6 +1,6 @@
 """What the searches ask: robustness of departures, counted against the budget, and the smallest violation so far."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ class Violation(NamedTuple):
     """A departure that breaks a requirement."""
 
     departure: np.ndarray
+    seed: int  # of its run
     robustness: float
     size: float  # norm of the departure, relative to the bounds
     runs: int  # so far, when it was found
@@ -34,19 +35,26 @@ Watch = Callable[[int, float, Violation | None], None]  # runs so far, least rob
 class Objective:
     """Robustness of departures, with a budget of runs.
 
+    Until a requirement is broken, the runs have all seeds in turn: which realization of noise and sea breaks it is part
+    of the search. Afterwards all have the seed of the smallest violation, unless others are asked for.
+
     Args:
-        compute: robustness of departures, many at once.
+        compute: robustness of departures with their seeds, many at once.
         box: what varies.
+        seeds: of the runs.
         budget: number of runs.
         watch: called after every batch.
-        runs_each: runs per departure.
     """
 
     def __init__(
-        self, compute: Callable[[Departures], np.ndarray], box: Box, budget: int, watch: Watch, runs_each: int = 1
+        self,
+        compute: Callable[[Departures, Sequence[int]], np.ndarray],
+        box: Box,
+        seeds: Sequence[int],
+        budget: int,
+        watch: Watch,
     ):
-        self._compute, self.box, self.budget, self._watch = compute, box, budget, watch
-        self._runs_each = runs_each
+        self._compute, self.box, self.seeds, self.budget, self._watch = compute, box, tuple(seeds), budget, watch
         self.departures: list[np.ndarray] = []
         self.robustnesses: list[float] = []
         self.violations: list[Violation] = []  # each smaller than the one before
@@ -54,36 +62,46 @@ class Objective:
     @property
     def runs(self) -> int:
         """Number of runs so far."""
-        return self._runs_each * len(self.robustnesses)
+        return len(self.robustnesses)
 
     @property
     def smallest(self) -> Violation | None:
         """The smallest violation so far."""
         return self.violations[-1] if self.violations else None
 
-    def robustness(self, departures: Departures) -> Float[np.ndarray, " p"]:
+    def robustness(self, departures: Departures, seeds: Sequence[int] | None = None) -> Float[np.ndarray, " p"]:
         """Robustness of every departure, which is clipped to the box.
+
+        Args:
+            departures: where.
+            seeds: of the runs; None for those of the present phase.
 
         Raises:
             BudgetSpent: the budget allows only some of the runs, which are done and counted.
         """
-        allowed = departures[: (self.budget - self.runs) // self._runs_each]
+        allowed = departures[: self.budget - self.runs]
         if len(allowed):
             inside = np.clip(allowed, self.box.lower, self.box.upper)
-            found = self._compute(inside)
-            for departure, robustness in zip(inside, found.tolist(), strict=True):
-                self._note(departure, robustness)
+            chosen = list(seeds or self._present(len(departures)))[: len(allowed)]
+            found = self._compute(inside, chosen)
+            for departure, seed, robustness in zip(inside, chosen, found.tolist(), strict=True):
+                self._note(departure, seed, robustness)
             self._watch(self.runs, min(self.robustnesses), self.smallest)
             if len(allowed) == len(departures):
                 return found
         raise BudgetSpent
 
-    def _note(self, departure: np.ndarray, robustness: float) -> None:
+    def _present(self, count: int) -> list[int]:
+        if self.smallest is not None:
+            return [self.smallest.seed] * count
+        return [self.seeds[number % len(self.seeds)] for number in range(self.runs, self.runs + count)]
+
+    def _note(self, departure: np.ndarray, seed: int, robustness: float) -> None:
         self.departures.append(departure)
         self.robustnesses.append(robustness)
         size = float(self.box.size(departure))
         if robustness <= 0 and (self.smallest is None or size < self.smallest.size):
-            self.violations.append(Violation(departure, robustness, size, self.runs))
+            self.violations.append(Violation(departure, seed, robustness, size, self.runs))
 
 
 _WORST = 1e6  # cost of a departure whose scenario cannot be built

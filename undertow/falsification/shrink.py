@@ -26,6 +26,7 @@ _NEAR, _BACK = 0.95, 0.05  # a smaller violation is approached along its ray fro
 _RANDOM = 8  # directions per round
 _WIDE, _NARROW = 0.5, 0.02  # spread of random directions, first and last
 _ROUNDS = 60
+_SWITCHES, _TRIED, _NEARER = 4, 64, 0.95  # to other seeds: at most, seeds each time, at this share of the departure
 _GENERATIONS = 1000
 _REFINED = 0.01  # relative improvement by the global search that is worth another descent
 
@@ -58,9 +59,22 @@ def shrink(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], firs
     chance = np.random.default_rng(seed)
     _along(objective, np.concatenate([_smallest(objective).departure[None], first]))
     _descend(objective, slope, chance)
+    _other_seeds(objective, slope, chance)
     before = _smallest(objective)
     search(ToShrink(objective), objective.box.to_cube(before.departure[None])[0], _GENERATIONS, seed)
     if _smallest(objective).size < (1 - _REFINED) * before.size:
+        _descend(objective, slope, chance)
+
+
+def _other_seeds(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator) -> None:
+    """Try other seeds a little nearer to the nominal scenario, and go on with one that breaks a requirement there."""
+    for _ in range(_SWITCHES if len(objective.seeds) > 1 else 0):
+        best = _smallest(objective)
+        tried = chance.choice(objective.seeds, min(_TRIED, len(objective.seeds)), replace=False).tolist()
+        objective.robustness(np.repeat(_NEARER * best.departure[None], len(tried), axis=0), tried)
+        if _smallest(objective) is best:
+            return
+        _along(objective, _smallest(objective).departure[None])
         _descend(objective, slope, chance)
 
 

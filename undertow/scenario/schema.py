@@ -236,7 +236,7 @@ class Falsify(Strict):
         None, min_length=1, description="names of the requirements to break any of; default: all"
     )
     seeds: int = Field(
-        1, ge=1, le=1000, description="number of seeds that every departure is run with, from that of the scenario on"
+        1, ge=1, le=100_000, description="number of seeds that the runs have in turn, from that of the scenario on"
     )
 
 

@@ -23,7 +23,7 @@ def search_figure(found: Mapping[str, Any]) -> Figure:
     vary, robustness = found["vary"], np.array(found["evaluations"]["robustness"], dtype=float)
     figure = style.blank(6.4, 0.4 + (1 + len(vary)) * (_TALL + _GAP))
     style.head(figure, "Search for a violation", {})
-    runs = len(found["seeds"]) * np.arange(1, len(robustness) + 1)
+    runs = np.arange(1, len(robustness) + 1)
     broken = robustness <= 0
     panels = [("robustness", np.clip(robustness, -_CUT, _CUT), None)]
     panels += [(key, np.array(found["evaluations"]["values"][key]), vary[key]) for key in vary]
