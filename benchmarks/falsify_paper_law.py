@@ -4,7 +4,7 @@ The law has the gains of Table 1, and the vehicle is ODIN with the motors of Tab
 a winding of 1 mH. Of the box of bounds, the largest share is sought in which 1,000 samples, uniform and each with a
 seed of its own, break no requirement. `undertow falsify` then looks for a failure in the same box.
 
-    python benchmarks/falsify_paper_law.py [--samples 1000] [--budget 2000] [--duration 10] [--share S] [--out DIR]
+    python benchmarks/falsify_paper_law.py [--samples 1000] [--budget 2000] [--share S] [--seed N] [--out DIR]
 """
 
 import argparse
@@ -100,7 +100,12 @@ def report(found: Falsified, folder: Path) -> None:
 
 
 def main(
-    samples: int = 1000, budget: int = 2000, duration: float = 10.0, share: float | None = None, out: Path | None = None
+    samples: int = 1000,
+    budget: int = 2000,
+    duration: float = 10.0,
+    share: float | None = None,
+    seed: int = 0,
+    out: Path | None = None,
 ) -> None:
     chance = np.random.default_rng(0)
     points, seeds = chance.random((samples, len(VARY))), chance.integers(0, 2**32, samples).tolist()
@@ -118,7 +123,7 @@ def main(
     fixed = failures(evaluator_of(text), points, None)
     print(f"the same samples, all with the seed of the scenario: {fixed} fail; {time.perf_counter() - begun:.0f} s")
     begun = time.perf_counter()
-    found = falsify(text, budget=budget, method="search")
+    found = falsify(text, budget=budget, seed=seed, method="search")
     folder = Path(tempfile.mkdtemp()) if out is None else out
     folder.mkdir(parents=True, exist_ok=True)
     report(found, folder)
@@ -131,6 +136,7 @@ if __name__ == "__main__":
     parser.add_argument("--budget", type=int, default=2000)
     parser.add_argument("--duration", type=float, default=10.0)
     parser.add_argument("--share", type=float, help="of the full box; default: the largest without a failing sample")
+    parser.add_argument("--seed", type=int, default=0, help="of the search")
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
-    main(arguments.samples, arguments.budget, arguments.duration, arguments.share, arguments.out)
+    main(arguments.samples, arguments.budget, arguments.duration, arguments.share, arguments.seed, arguments.out)
