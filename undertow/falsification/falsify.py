@@ -28,10 +28,10 @@ METHODS = ("gradient", "search")
 
 _NOMINAL = 32  # seeds of the nominal scenario that are checked at most
 _SPREAD = 32  # points of the initial design beside the corners
-_BIASED = 128  # points per round, many at bounds
+_BIASED = 128  # points of the first round, many at bounds
 _DESCENTS = 2  # from the best points
 _ITERATIONS = 20  # of a descent
-_GENERATIONS = 1000
+_GENERATIONS = 10  # of the first population; about as many runs as points at bounds, and twice as many every round
 _MOST = 1e300  # robustness of a departure whose scenario cannot be built, in a checkpoint
 
 
@@ -225,15 +225,15 @@ def _break(
             descend(to_break, first[start], float(costs[start]), _ITERATIONS)
         chance = np.random.default_rng([seed, 1])
         for number in itertools.count():  # until a requirement breaks or the budget is spent
-            to_break.costs(box.to_cube(_at_bounds(box, chance)))
-            search(to_break, first[order[0]], _GENERATIONS, seed + number)
+            to_break.costs(box.to_cube(_at_bounds(box, _BIASED * 2**number, chance)))
+            search(to_break, first[order[0]], _GENERATIONS * 2**number, seed + number)
     except Broken:
         return
 
 
-def _at_bounds(box: Box, chance: np.random.Generator) -> np.ndarray:
+def _at_bounds(box: Box, count: int, chance: np.random.Generator) -> np.ndarray:
     """Departures at random, about half of whose numbers are at a bound: failures are often there."""
-    shape = (_BIASED, len(box.axes))
+    shape = (count, len(box.axes))
     inside = box.of_cube(chance.random(shape))
     both = (box.lower < 0) & (box.upper > 0)
     upper = np.where(both, chance.random(shape) < 0.5, box.upper > 0)

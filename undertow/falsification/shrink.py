@@ -57,8 +57,12 @@ def shrink(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], firs
         BudgetSpent: before the search has converged.
     """
     chance = np.random.default_rng(seed)
-    _along(objective, np.concatenate([_smallest(objective).departure[None], first]))
-    _descend(objective, slope, chance)
+    alone = objective.box.size(first) <= 1.0  # one number at its bound
+    for ends in filter(len, (np.concatenate([_smallest(objective).departure[None], first[alone]]), first[~alone])):
+        before = _smallest(objective)
+        _along(objective, ends)
+        if _smallest(objective) is not before:
+            _descend(objective, slope, chance)
     _other_seeds(objective, slope, chance)
     before = _smallest(objective)
     search(ToShrink(objective), objective.box.to_cube(before.departure[None])[0], _GENERATIONS, seed)
@@ -79,14 +83,16 @@ def _other_seeds(objective: Objective, slope: Callable[[np.ndarray], np.ndarray]
 
 
 def _along(objective: Objective, ends: Departures) -> None:
-    """Find where rays from the nominal scenario to some departures first break a requirement."""
+    """Find where rays from the nominal scenario to some departures, not beyond the best, first break a requirement."""
+    sizes = objective.box.size(ends)
+    ends = ends * np.minimum(1.0, _smallest(objective).size / sizes)[:, None]
     scales = np.arange(1, _SCALES + 1) / _SCALES
     found = objective.robustness((scales[:, None, None] * ends).reshape(-1, ends.shape[1])).reshape(_SCALES, len(ends))
     breaking = (found <= 0).any(axis=0)
     firsts = (found <= 0).argmax(axis=0)
     lengths = objective.box.size(ends)
     for ray in sorted(np.flatnonzero(breaking), key=lambda ray: firsts[ray] * lengths[ray]):
-        if objective.smallest is None or firsts[ray] / _SCALES * lengths[ray] < objective.smallest.size:
+        if firsts[ray] / _SCALES * lengths[ray] < _smallest(objective).size:
             _bisect(objective, ends[ray], firsts[ray] / _SCALES, (firsts[ray] + 1) / _SCALES)
 
 
