@@ -72,6 +72,25 @@ def test_a_continuous_loop(refused, tmp_path):
     assert "`loop.kind` must be sampled for `undertow falsify`, but is continuous" in refused("falsify", "s.yaml")
 
 
+def interrupted(*arguments):
+    raise KeyboardInterrupt
+
+
+def test_interrupted_and_resumed(undertow, tmp_path):
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    command = ("falsify", "s.yaml", "--method", "search", "--budget", "60", "--out")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("undertow.falsification.falsify.shrink", interrupted)
+        said = undertow(*command, "out")
+    assert said.code == 130 and "--resume" in said.err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["falsify.jsonl"]
+    assert undertow(*command, "out").code == 2
+    assert undertow(*command, "out", "--resume").code == 0
+    assert undertow(*command, "whole").code == 0
+    names = ("falsify.json", "counterexample.yaml")
+    assert all((tmp_path / "out" / name).read_text() == (tmp_path / "whole" / name).read_text() for name in names)
+
+
 @pytest.mark.parametrize(
     ("option", "said"),
     [

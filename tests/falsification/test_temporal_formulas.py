@@ -7,7 +7,9 @@ import pytest
 
 from undertow.analysis.temporal.formula import NUMPY, smooth
 from undertow.analysis.temporal.parsing import Entries, Known, parse_formula
+from undertow.analysis.temporal.requirements import Requirement, judged
 from undertow.core.errors import BadInput
+from undertow.core.status import Status
 
 PERIOD, SIZE = 0.1, 201  # s, to 20 s
 TIME = PERIOD * np.arange(SIZE)
@@ -142,3 +144,21 @@ def test_texts_that_are_no_formulas(text, said):
     with pytest.raises(BadInput) as error:
         parse_formula(text, KNOWN)
     assert said in str(error.value)
+
+
+def test_verdicts_of_runs():
+    """A bound of a metric, a run that failed, and what is not defined."""
+    formula = Requirement("settles", parse_formula("always[10, 20] position_error < 0.1", KNOWN))
+    bound = Requirement("energy", below=-2.0)
+    judge = lambda metrics, status, ended, signals=SIGNALS: judged(
+        (formula, bound), signals, PERIOD, metrics, int(status), ended, 20.0
+    )
+    kept = judge({"energy": -3.0}, Status.OK, 20.0)
+    assert kept["energy"] == (0.5, True) and kept["settles"].holds
+    np.testing.assert_allclose(kept["settles"].robustness, 1 - np.exp(-10) / 0.1, rtol=1e-12)
+    assert judge({"energy": -1.0}, Status.OK, 20.0)["energy"] == (-0.5, False)
+    assert judge({}, Status.OK, 20.0)["energy"] == (-1.0, False)
+    failed = judge({"energy": -3.0}, Status.NOT_FINITE, 5.0)
+    assert failed == {"settles": (-1.75, False), "energy": (-1.75, False)}
+    undefined = SIGNALS | {"error": np.full((SIZE, 2), np.nan)}
+    assert judge({"energy": -3.0}, Status.OK, 20.0, undefined)["settles"] == (-1.0, False)

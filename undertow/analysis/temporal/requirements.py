@@ -118,6 +118,8 @@ def judged(
             value = float(one.formula.robustness(signals, period)[0])
         else:
             value = bound_robustness(float(metrics.get(one.name, math.nan)), one.below)
+        if math.isnan(value):  # a signal that is not defined
+            value = _FAILED
         if status != int(Status.OK):
             value = min(value, _FAILED - max(0.0, 1.0 - ended / duration))
         found[one.name] = Verdict(value, value > 0)
