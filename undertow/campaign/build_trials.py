@@ -18,6 +18,7 @@ from jax.core import Tracer
 from pydantic import BaseModel
 
 from undertow.campaign.batch_runner import Batch, batch_of, leaves, run_of
+from undertow.campaign.requirements import recorded
 from undertow.campaign.trials import Trials
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array
@@ -103,7 +104,7 @@ def build_trials(
             yield found._replace(places=places[found.places])
             places = np.delete(places, found.places)
         for place, built in valid_trials(several, part_cache, trials[places].tolist()):
-            yield Together(places[[place]], built, batch_of(built, several.campaign.series))
+            yield Together(places[[place]], built, batch_of(built, recorded(several.campaign, built)))
 
 
 def _fractions(several: Trials) -> list[str]:
@@ -154,7 +155,7 @@ def _together(
     if not alone:
         return None
     first = alone[min(alone)]
-    batch = batch_of(first, several.campaign.series)
+    batch = batch_of(first, recorded(several.campaign, first))
     try:
         form = structure(batch.first)
         numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.own.copy(), [])
@@ -187,7 +188,7 @@ def _traced(
     def numbers(values: dict[str, Any]) -> tuple[list[Any], list[Any]]:
         scenario = first.scenario
         for key, value in values.items():
-            scenario = _with(scenario, key_path(key), value)
+            scenario = with_value(scenario, key_path(key), value)
         with checks.recorded_conditions() as conditions:
             run = run_of(build_scenario(scenario, first.text, part_cache.copy()))
         if structure(run) != form:
@@ -201,16 +202,16 @@ def _traced(
     return [next(columns) if varies else None for varies in vary], list(map(np.asarray, conditions))
 
 
-def _with(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
+def with_value(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
     """A scenario, or what is in it, with another value at a path; a list of numbers becomes an array."""
     if not path:
         return value
     step, *rest = path
     if isinstance(node, BaseModel):
-        return node.model_copy(update={str(step): _with(getattr(node, str(step)), tuple(rest), value)})
+        return node.model_copy(update={str(step): with_value(getattr(node, str(step)), tuple(rest), value)})
     if isinstance(node, jax.Array):
         return node.at[step].set(value)
     inner = node.copy()
-    inner[step] = _with(node[step], tuple(rest), value)
+    inner[step] = with_value(node[step], tuple(rest), value)
     numeric = isinstance(inner, list) and all(isinstance(entry, float | int | Tracer) for entry in inner)
     return jnp.stack([as_array(entry) for entry in inner]) if numeric else inner

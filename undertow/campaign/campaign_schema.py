@@ -11,7 +11,7 @@ from undertow.campaign.labels import by_name, words
 from undertow.core.errors import BadInput
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.reading import Text, dump, parse, read
-from undertow.scenario.schema import Scenario, Strict, complaint, kind_of
+from undertow.scenario.schema import RunRequirement, Scenario, Strict, complaint, kind_of
 
 # List entries in brackets only: each key has one spelling, so that duplicates are noticed.
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
@@ -56,10 +56,9 @@ class Distribution(Strict):
         return self
 
 
-class Requirement(Strict):
-    """A bound on a metric that a share of all trials must keep."""
+class Requirement(RunRequirement):
+    """A bound on a metric, or a temporal formula, that a share of all trials must keep."""
 
-    below: float = Field(description="upper bound of the metric")
     share: float = Field(0.95, gt=0, description="smallest share of the trials that must keep the bound")
 
     @field_validator("share")
@@ -106,7 +105,10 @@ class Campaign(Strict):
         default_factory=dict,
         description="name -> key paths and their values: whatever changes together; an axis after those of `cross`",
     )
-    requirements: dict[str, Requirement] = Field(default_factory=dict, description="metric -> bound that it must keep")
+    requirements: dict[str, Requirement] = Field(
+        default_factory=dict,
+        description="metric -> bound that it must keep; or any name -> formula that the run must keep",
+    )
     series: Series | None = Field(None, description="signals to record; none by default")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
     chunk: int | None = Field(
@@ -137,6 +139,11 @@ class Campaign(Strict):
     def axes(self) -> dict[str, dict[str, Any]]:
         """Values by names along every axis: the key paths of `cross`, then `variant`."""
         return self.cross | ({VARIANT: self.variants} if self.variants else {})
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Temporal formulas of the requirements, by name."""
+        return {name: one.formula for name, one in self.requirements.items() if one.formula is not None}
 
     @property
     def keys(self) -> list[str]:

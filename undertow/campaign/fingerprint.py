@@ -61,12 +61,14 @@ def samples(asked: str) -> int:
 
 
 def _decisive(asked: str) -> dict[str, Any]:
-    """The part of a campaign file that determines the rows, without requirements; 2 and 2.0 are equal.
+    """The part of a campaign file that determines the rows, without bounds of metrics; 2 and 2.0 are equal.
 
     The number of samples is part of it only for a Latin hypercube, where every point depends on it. The order of keys
     is part of it because it determines the numbers of the trials.
     """
-    data: dict[str, Any] = {**_plain(asked), "requirements": {}}
+    required = _plain(asked)["requirements"].items()
+    formulas = {name: one["formula"] for name, one in required if "formula" in one}
+    data: dict[str, Any] = {**_plain(asked), "requirements": formulas}
     orders = {"vary": data["vary"], "cross": data["cross"]}
     orders |= {f"cross.{key}": entries for key, entries in data["cross"].items()}
     data |= {f"order of {name}": ", ".join(entries) for name, entries in orders.items()}

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from undertow.campaign import task as tasks
 from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_schema import Campaign, read_campaign, whole
-from undertow.campaign.requirements import too_few
+from undertow.campaign.requirements import check_formulas, too_few
 from undertow.campaign.task import reasons
 from undertow.campaign.trials import Trials, trials
 from undertow.checks.vehicle_lint import vehicle_advice
@@ -102,6 +102,7 @@ def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> N
     for name in campaign.requirements:
         if name not in metrics:
             raise BadInput(f"requirements.{name}", "be a metric", "unknown", hint=did_you_mean(name, metrics))
+    check_formulas(campaign, built)
     if campaign.series is None:
         return
     for key in campaign.keys:
@@ -118,12 +119,17 @@ def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> N
 
 def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
     """Check that series have the same shape in all trials, because one array holds them."""
-    if campaign.series is None:
+    if campaign.series is None and not campaign.formulas:
         return
     hint = "Leave it out, or run a separate campaign for each of them"
+    name = "series" if campaign.series is not None else f"requirements.{next(iter(campaign.formulas))}"
     loops = [built.closed_loop for built in several]
     if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
-        raise BadInput("series", "be of plants with the same outputs and inputs", "of several", hint=hint)
-    if "weights" in campaign.series.signals and len({rules(law_of(loop)) for loop in loops}) > 1:
+        raise BadInput(name, "be of plants with the same outputs and inputs", "of several", hint=hint)
+    if (
+        campaign.series is not None
+        and "weights" in campaign.series.signals
+        and len({rules(law_of(loop)) for loop in loops}) > 1
+    ):
         must = "not contain weights where controllers have different numbers of rules"
         raise BadInput("series.signals", must, "with weights", hint=hint)

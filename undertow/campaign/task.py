@@ -12,6 +12,7 @@ from undertow.analysis.metrics import gathered_meanings
 from undertow.campaign.batch_runner import Batch, ProgramCache
 from undertow.campaign.build_trials import Kind, build_data, build_trial, build_trials, valid_trials
 from undertow.campaign.campaign_schema import read_text
+from undertow.campaign.requirements import formula_metrics, recorded, robustness
 from undertow.campaign.store_layout import Layout
 from undertow.campaign.trials import Trials, trials, varied_keys
 from undertow.core import runtime
@@ -42,7 +43,7 @@ class Site(NamedTuple):
         found: dict[str, Metric] = {}
         for built in (*self.probes().values(), *self.alternatives()):
             found = gathered_meanings(built.closed_loop, built.metrics) | found
-        return found
+        return found | formula_metrics(self.trials.campaign)
 
 
 @functools.lru_cache(maxsize=2)
@@ -73,15 +74,20 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["trial"], columns["seed"] = trials.astype(np.uint32), here.trials.seeds(trials)
     where: list[int] = []
     criteria: list[Mapping[str, float]] = []
+    firsts: list[Built] = []
 
     def batches() -> Iterator[Batch]:
         for found in build_trials(here.trials, here.part_cache, trials, sampled, here.traceable):
             where.extend(found.places.tolist())
+            firsts.extend([found.first] * len(found.places))
             judged = found.first.window()[0] < found.first.scenario.loop.duration
             criteria.extend([found.first.resolved["success"] if judged else {}] * len(found.places))
             yield found.batch
 
-    result = here.programs.run(batches(), here.trials.campaign.series)
+    campaign = here.trials.campaign
+    asked = recorded(campaign, next(iter(here.probes().values()))) if campaign.formulas else campaign.series
+    result = here.programs.run(batches(), asked)
+    robust = robustness(campaign, firsts, result.series, result.status, result.ended)
     scatter = functools.partial(_scatter, len(rows), where)
     columns["status"] = scatter(result.status, INVALID)
     columns["ended"] = scatter(result.ended, np.nan)
@@ -89,8 +95,10 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     columns["success"] = scatter(_success(criteria, result.metrics), NOT_JUDGED)
     undefined = np.full(len(where), np.nan)
     found = {name: result.metrics.get(name, undefined) for name in here.metrics()}
-    found |= {f"series:{name}": values for name, values in result.series.items()}
-    if "precision" in here.trials.campaign.keys:  # one array holds both
+    found |= robust
+    kept = campaign.series.signals if campaign.series is not None else ()
+    found |= {f"series:{name}": result.series[name] for name in kept}
+    if "precision" in campaign.keys:  # one array holds both
         found = {name: values.astype(np.float64) for name, values in found.items()}
     return columns | {name: scatter(values, np.nan) for name, values in found.items()}
 

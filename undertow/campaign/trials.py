@@ -66,7 +66,7 @@ class Trials(NamedTuple):
         """The scenario of this trial."""
         data = copy.deepcopy(self.scenario.data)
         for key, put in self.values(trial).items():
-            _put(data, key, copy.deepcopy(put))
+            put_value(data, key, copy.deepcopy(put))
         return data | {"seed": self.seed(trial)}
 
     def alternatives(self) -> Iterator[dict[str, Any]]:
@@ -74,7 +74,7 @@ class Trials(NamedTuple):
         for key, entries in varied_keys(self.campaign):
             for entry in (entries or {}).values():
                 data = self.data(0)
-                _put(data, key, copy.deepcopy(entry))
+                put_value(data, key, copy.deepcopy(entry))
                 yield data
 
     def location(self, name: str) -> str:
@@ -120,7 +120,7 @@ def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
     return Text(given, text.name, text.folder, lines)
 
 
-def _put(data: dict[str, Any], key: str, put: Any) -> None:
+def put_value(data: dict[str, Any], key: str, put: Any) -> None:
     """Set the value at a key path; a part given by its name alone becomes a mapping."""
     path = key_path(key)
     node: Any = data

@@ -147,7 +147,8 @@ def sentences(found: dict) -> list[str]:
         of = "".join(f", {key} {value}" for key, value in one["values"].items())
         for requirement in one["requirements"]:
             low, high = (100 * bound for bound in requirement["interval"])
-            bound = f"{requirement['metric']} < {requirement['below']:g}"
+            formula, name = requirement["formula"], requirement["metric"]
+            bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
             text.append(
                 f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
                 f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."

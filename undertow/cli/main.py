@@ -195,6 +195,38 @@ def tune(
 
 
 @app.command()
+def falsify(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-falsified, or the next free one."),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="gradient (by differentiation where possible, and search), or search (without differentiation).",
+        ),
+    ] = "gradient",
+    budget: Annotated[int, typer.Option(metavar="RUNS", help="Largest number of runs.")] = 2000,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search, not of the runs.")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted falsification.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
+    allow_code: AllowCode = False,
+    pdf: Pdf = None,
+) -> int:
+    """Find the smallest departure from a scenario, within bounds, that breaks a requirement.
+
+    The section `falsify` of the scenario gives the bounds of what varies, and `requirements` what every run must keep.
+    The command first breaks a requirement, then shrinks the departure that broke it. It writes falsify.json, figures/
+    and counterexample.yaml, a scenario with which `undertow simulate` repeats the failure.
+    """
+    from undertow.cli.falsify import falsify_scenario
+
+    return falsify_scenario(scenario, out, method, budget, seed, resume, overwrite, allow_code, pdf)
+
+
+@app.command()
 def analyze(
     scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
     out: Annotated[

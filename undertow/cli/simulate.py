@@ -21,7 +21,14 @@ from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.scenario.build import Built, build, own_parts
 from undertow.scenario.execute import Executed, execute, write
-from undertow.scenario.finished_run import Repetition, certificate_of, compare, metrics_of, transitions_of
+from undertow.scenario.finished_run import (
+    Repetition,
+    certificate_of,
+    compare,
+    metrics_of,
+    requirements_of,
+    transitions_of,
+)
 from undertow.scenario.reading import read
 
 if TYPE_CHECKING:
@@ -118,6 +125,9 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
         console.print(terminal_table(transition_rows(transitions)))
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
+    for name, one in requirements_of(executed.dataset).items():
+        said = "holds" if one["holds"] else "is violated"
+        console.print(f"Requirement {name} {said}: robustness {one['robustness']:.4g}", highlight=False, soft_wrap=True)
     own = own_parts(executed.built.scenario, executed.built.text.folder).get("controller")
     if own and (executed.status is not Status.OK or (executed.success and not executed.success.within)):
         typer.echo(f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {own}", err=True)

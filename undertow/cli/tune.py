@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -15,12 +14,12 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
-from undertow.tuning.checkpoint import has_answers
 from undertow.tuning.objective import Step
 from undertow.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
@@ -45,9 +44,9 @@ def tune_scenario(
     console = wide_console()
     text, first = read(scenario, allow_code=allow_code), Path("runs") / f"{scenario.stem}-tuned"
     with (
-        output_folder(_unfinished(first) if resume and out is None else out, first) as folder,
+        output_folder(unfinished(first, _CHECKPOINT) if resume and out is None else out, first) as folder,
         results_folder(folder, _WRITTEN, "tuning.json", overwrite) as draft,
-        _checkpoint(folder) as checkpoint,
+        checkpoint_in(folder, _CHECKPOINT, "tune") as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
             run = lambda: tune(text, checkpoint, method=method, budget=budget, resume=resume, say=say, watch=watch)
@@ -63,32 +62,6 @@ def tune_scenario(
         console.print(line, highlight=False, soft_wrap=True)
     console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
     return DONE
-
-
-def _unfinished(first: Path) -> Path:
-    """The folder of the last unfinished tuning."""
-    begun = [path.parent for path in first.parent.glob(f"{first.name}*/{_CHECKPOINT}")]
-    return max(begun, key=lambda path: (path / _CHECKPOINT).stat().st_mtime, default=first)
-
-
-@contextlib.contextmanager
-def _checkpoint(folder: Path) -> Iterator[Path]:
-    """The checkpoint, kept only when a tuning is interrupted after its first evaluation."""
-    existed = folder.exists()
-    folder.mkdir(parents=True, exist_ok=True)
-    checkpoint = folder / _CHECKPOINT
-    before = checkpoint.exists()
-    try:
-        yield checkpoint
-    except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) and has_answers(checkpoint):
-            typer.echo(f"Interrupted. To resume: undertow tune ... --out {folder} --resume", err=True)
-        elif not before:
-            checkpoint.unlink(missing_ok=True)
-            if not existed:
-                with contextlib.suppress(OSError):
-                    folder.rmdir()
-        raise
 
 
 @contextlib.contextmanager

@@ -182,9 +182,13 @@ def requirements(results: Results, found: Mapping[str, Any]) -> Html:
     for one in found["combinations"]:
         for required in one["requirements"]:
             low, high = required["interval"]
-            bound = quantity(required["below"], results.unit(required["metric"]))
             share = f"{100 * required['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-            words = join(_metric(required["metric"]), " < ", bound, f" in {100 * required['share']:g} % of the trials")
+            of = f" in {100 * required['share']:g} % of the trials"
+            if required["formula"] is None:
+                bound = quantity(required["below"], results.unit(required["metric"]))
+                words = join(_metric(required["metric"]), " < ", bound, of)
+            else:
+                words = join(f"{required['metric']}: ", tag("code", prose(required["formula"])), of)
             rows.append((words, named(one), chip(required["verdict"]), share))
     head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
     return table(head, rows) if rows else Html("")

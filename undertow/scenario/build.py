@@ -12,6 +12,7 @@ import numpy as np
 
 from undertow.analysis.metrics import meanings
 from undertow.analysis.success import criterion_of
+from undertow.analysis.temporal.requirements import Requirement, requirements_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.catalogue import KIND_OF
@@ -67,6 +68,7 @@ class Built(NamedTuple):
     metrics: tuple[AbstractMetric, ...]  # the scenario's own
     text: Text  # of the scenario, whose lines advice names
     reference: AbstractReference  # as the scenario gives it: that of the loop begins where its plant does
+    requirements: tuple[Requirement, ...] = ()
 
     @in_its_precision
     def advice(self) -> tuple[Advice, ...]:
@@ -241,7 +243,21 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         loop.signals()
     with within("success"):
         criterion = criterion_of(scenario.success, built.known_metrics())
-    return built._replace(resolved=resolved | {"success": criterion})
+    resolved["success"] = criterion
+    if not scenario.requirements:
+        return built
+    resolved["requirements"] = {name: one.model_dump(exclude_none=True) for name, one in scenario.requirements.items()}
+    with within("requirements"):
+        return built._replace(requirements=_required(built))
+
+
+def _required(built: Built) -> tuple[Requirement, ...]:
+    """The requirements of a scenario."""
+    given = built.scenario.requirements
+    formulas = {name: one.formula for name, one in given.items() if one.formula is not None}
+    bounds = {name: one.below for name, one in given.items() if one.below is not None}
+    found = requirements_of(formulas, bounds, built.closed_loop, built.known_metrics(), built.scenario.loop.duration)
+    return tuple(sorted(found, key=lambda one: list(given).index(one.name)))
 
 
 @eqx.filter_jit

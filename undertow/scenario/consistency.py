@@ -190,3 +190,8 @@ def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
 
     with within(key):
         yield traced
+
+
+def record_period(loop: Loop) -> float:
+    """Time between records of a sampled loop, a whole number of control steps, s."""
+    return round(loop.record / loop.dt) * loop.dt

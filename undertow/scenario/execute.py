@@ -19,6 +19,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.consistency import record_period
 from undertow.scenario.finished_run import Measuring, label, metrics_text
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
@@ -82,7 +83,17 @@ def finished(built: Built, outcome: Outcome, left_to_xla: Mapping[str, str], gat
             "seed": scenario.seed,
         }
     )
-    how = Measuring(built.window(), scenario.loop.dt, built.metrics, built.criterion(), gathered)
+    loop = scenario.loop
+    how = Measuring(
+        built.window(),
+        loop.dt,
+        built.metrics,
+        built.criterion(),
+        gathered,
+        built.requirements,
+        record_period(loop),
+        loop.duration,
+    )
     return Executed(built, outcome, *label(built.closed_loop, outcome, how, attributes))
 
 

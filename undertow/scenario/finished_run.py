@@ -12,6 +12,8 @@ import xarray as xr
 from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
 from undertow.analysis.success import Success, judged
+from undertow.analysis.temporal.requirements import Requirement, contiguous, needed_signals
+from undertow.analysis.temporal.requirements import judged as required
 from undertow.core.contracts import AbstractController
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
@@ -37,6 +39,9 @@ class Measuring(NamedTuple):
         own: metrics of the scenario's own.
         criterion: of success.
         gathered: what has gathered the steady metrics along the run; () where the record is what counts.
+        requirements: on the run.
+        record: time between records, s.
+        duration: asked for, s.
     """
 
     window: tuple[float, float]
@@ -44,6 +49,9 @@ class Measuring(NamedTuple):
     own: tuple[AbstractMetric, ...] = ()
     criterion: Mapping[str, float] = MappingProxyType({})
     gathered: Gathered = ()
+    requirements: tuple[Requirement, ...] = ()
+    record: float = math.nan
+    duration: float = math.nan
 
 
 class Labelled(NamedTuple):
@@ -93,6 +101,10 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
     dataset.attrs["metric_meanings"] = to_json({n: one._asdict() for n, one in known.items() if n in shown})
     if success is not None:
         dataset.attrs["success"] = to_json(success._asdict())
+    if how.requirements:
+        kept = contiguous(outcome.signals, needed_signals(how.requirements))
+        found = required(how.requirements, kept, how.record, steady or {}, int(status), ended, how.duration)
+        dataset.attrs["requirements"] = to_json({name: one._asdict() for name, one in found.items()})
     if (supervised := state_in(outcome.final[1])) is not None:
         dataset.attrs["transitions"] = to_json([one._asdict() for one in transitions(supervised.log)])
     dataset.attrs["content_hash"] = content_hash(dataset)
@@ -116,13 +128,19 @@ def metrics_text(dataset: xr.Dataset, further: Mapping[str, Any]) -> str:
     ending = {"status": dataset.attrs["status"], "ended": dataset.attrs["ended"]}
     metrics = json.loads(dataset.attrs["metrics"]) | further
     success = json.loads(dataset.attrs.get("success", "null"))
-    found = ending | {"success": success} | metrics | {"certificate": certificate_of(dataset)}
+    kept = {"requirements": requirements_of(dataset)} if "requirements" in dataset.attrs else {}
+    found = ending | {"success": success} | kept | metrics | {"certificate": certificate_of(dataset)}
     return to_json(found, indent=2) + "\n"
 
 
 def metrics_of(dataset: xr.Dataset) -> dict[str, Metric]:
     """Unit and meaning of the metrics of a run, by name, in the order of tables."""
     return {name: Metric(**one) for name, one in json.loads(dataset.attrs["metric_meanings"]).items()}
+
+
+def requirements_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """Robustness of a run by requirement, and whether it holds, from its attributes; {} without requirements."""
+    return json.loads(dataset.attrs.get("requirements", "{}"))
 
 
 def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
 from undertow.core.errors import BadInput, joined, known_key
 from undertow.scenario.reading import Text, wrong_file
@@ -188,6 +188,58 @@ class Tune(Strict):
     weights: Weights = Field(default_factory=Weights, description="weights of the cost")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
 
 
+class RunRequirement(Strict):
+    """A requirement on a run: exactly one of these keys."""
+
+    below: float | None = Field(None, description="upper bound of the metric of this name in the steady window")
+    formula: str | None = Field(
+        None, description="temporal formula on the records, such as `within 10 s always position_error < 0.1`"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> "RunRequirement":
+        if (self.below is None) == (self.formula is None):
+            raise ValueError("have one of below, formula")
+        return self
+
+
+class Bounds(Strict):
+    """Bounds of a number that `undertow falsify` varies."""
+
+    between: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(description="low, high")
+    nominal: float | None = Field(None, description="value of the intact loop; default: that of the scenario")
+    integer: bool = Field(False, description="whether only whole numbers are allowed")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mapping(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+            raise ValueError(f"be bounds, such as {{between: [{low}, {high}]}}")
+        return given
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Bounds":
+        low, high = self.between
+        if not low < high:
+            raise ValueError("have low below high")
+        if self.nominal is not None and not low <= self.nominal <= high:
+            raise ValueError("have the nominal value within its bounds")
+        return self
+
+
+class Falsify(Strict):
+    """Settings of `undertow falsify`; other commands ignore them."""
+
+    vary: dict[str, Bounds] = Field(default_factory=dict, description="key path of the scenario -> its bounds")
+    requirements: list[str] | None = Field(
+        None, min_length=1, description="names of the requirements to break any of; default: all"
+    )
+    seeds: int = Field(
+        1, ge=1, le=100_000, description="number of seeds that the runs have in turn, from that of the scenario on"
+    )
+
+
 class Scenario(Strict):
     """One closed loop."""
 
@@ -222,7 +274,11 @@ class Scenario(Strict):
         description="metric -> what it must stay below in the steady window; default: position_rms 0.05 m and "
         "attitude_rms 0.05 rad",
     )
+    requirements: dict[str, RunRequirement] = Field(
+        default_factory=dict, description="what every run must keep: name -> a bound of a metric, or a temporal formula"
+    )
     tune: Tune = Field(default_factory=Tune, description="settings of `undertow tune`")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
+    falsify: Falsify = Field(default_factory=Falsify, description="settings of `undertow falsify`")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all random numbers")
     precision: Literal["float64", "float32"] = Field("float64", description="precision of all arithmetic")
 

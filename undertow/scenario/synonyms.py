@@ -25,7 +25,9 @@ WORDS: dict[str, dict[str, str]] = {
         "initial.velocity": "initial_velocity nu0 v0",
         "seed": "random_seed rng_seed rng",
         "precision": "dtype float",
-        "success": "criterion criteria requirements",
+        "success": "criterion criteria",
+        "requirements": "specifications specification",
+        "falsify.vary": "search_space",
     },
     "campaign": {
         "trials": "monte_carlo montecarlo samples runs n n_trials n_samples n_runs num_trials num_samples num_runs "

@@ -1,4 +1,4 @@
-"""Checkpoint of a tuning: every evaluation is written to disk, so that an interrupted tuning can be resumed.
+"""Checkpoint of a tuning or another search: every evaluation is written to disk, so that it can be resumed.
 
 The methods are deterministic functions of the evaluations, so a tuning is resumed by running them again: the
 evaluations come from the checkpoint as far as it goes. The result is the same as without the interruption, bit for bit.
@@ -31,15 +31,18 @@ class Checkpoint:
         budget: s, of all sessions together.
         resume: whether to continue an earlier checkpoint.
         started: `time.perf_counter()` of the start, so that preparations count.
+        what: is resumed, for messages.
 
     Raises:
         BadInput: there is nothing to resume, or another tuning; or there is an unfinished tuning without `resume`.
     """
 
-    def __init__(self, path: Path, about: str, budget: float, resume: bool, started: float | None = None):
+    def __init__(
+        self, path: Path, about: str, budget: float, resume: bool, started: float | None = None, what: str = "tuning"
+    ):
         self._path, self._budget = path, budget
         self._started = time.perf_counter() if started is None else started
-        self._known = _read(path, about, resume)
+        self._known = _read(path, about, resume, what)
         self._asked, self._spent = 0, self._known[-1]["elapsed"] if self._known else 0.0
         self._longest: dict[str, float] = {}
         if not self._known:
@@ -97,15 +100,15 @@ def has_answers(path: Path) -> bool:
         return False
 
 
-def _read(path: Path, about: str, resume: bool) -> list[dict[str, Any]]:
+def _read(path: Path, about: str, resume: bool, what: str) -> list[dict[str, Any]]:
     if not path.exists():
         if resume:
             hint = "Leave --resume out to start one"
-            raise BadInput("--resume", "find an unfinished tuning", f"nothing in {path.parent}", hint=hint)
+            raise BadInput("--resume", f"find an unfinished {what}", f"nothing in {path.parent}", hint=hint)
         return []
     if not resume:
         hint = "Add --resume to continue it, or choose another folder"
-        raise BadInput("--out", "be a folder without an unfinished tuning", str(path.parent), hint=hint)
+        raise BadInput("--out", f"be a folder without an unfinished {what}", str(path.parent), hint=hint)
     try:
         lines = path.read_bytes().decode().splitlines(keepends=True)
         entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be incomplete

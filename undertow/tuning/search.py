@@ -1,11 +1,25 @@
 """Search methods: gradient descent in a box, several step lengths per batch; differential evolution (SciPy)."""
 
+from typing import Protocol
+
 import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
 from undertow.tuning.evaluator import AT_ONCE
-from undertow.tuning.objective import Objective
+
+
+class Searched(Protocol):
+    """What the methods minimise, over the unit cube; it keeps the best point itself."""
+
+    def costs(self, points: np.ndarray) -> np.ndarray:
+        """Cost of each point."""
+        ...
+
+    def slope(self, point: np.ndarray) -> np.ndarray:
+        """Gradient of the cost at a point."""
+        ...
+
 
 _LENGTHS = np.array([2.0, 1.0, 0.4, 0.15, 0.04, 0.005])  # of the quasi-Newton step
 _FIRST = 0.2  # largest change of a variable in a step without curvature; the box is 1 wide
@@ -16,7 +30,7 @@ _PATIENCE = 3
 _NARROWER, _NEAREST = 0.5, 0.01  # radius of the random search: halved after every failure, down to the smallest
 
 
-def descend(objective: Objective, start: np.ndarray, cost: float, iterations: int) -> None:
+def descend(objective: Searched, start: np.ndarray, cost: float, iterations: int) -> None:
     """From a certified point to a local minimum of the cost in [0, 1]^k; the objective keeps the best.
 
     Nocedal and Wright (2006), ch. 6. Variables at a bound stay there while the gradient points outward. Instead of a
@@ -92,7 +106,7 @@ def spread_points(count: int, parameters: int, seed: int) -> np.ndarray:
         return sequence.random_base2(int(np.ceil(np.log2(count))))[:count]
 
 
-def search(objective: Objective, start: np.ndarray, iterations: int, seed: int) -> None:
+def search(objective: Searched, start: np.ndarray, iterations: int, seed: int) -> None:
     """Best of a population that mixes its differences, Storn and Price (1997); the objective keeps the best.
 
     Args:

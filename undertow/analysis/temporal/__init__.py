@@ -1,0 +1,1 @@
+"""Temporal requirements: formulas of signal temporal logic, their text and their robustness."""

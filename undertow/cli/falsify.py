@@ -1,0 +1,128 @@
+"""`undertow falsify`: find the smallest departure from a scenario that breaks a requirement."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from undertow.cli.exit_codes import DONE, warn_of
+from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
+from undertow.cli.results_folder import output_folder, results_folder
+from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.trials import trial_text
+from undertow.cli.unfinished import checkpoint_in, unfinished
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.falsification.falsify import METHODS, Falsified, as_data, falsify
+from undertow.falsification.objective import Violation
+from undertow.report.figures import save_all
+from undertow.report.figures.falsification import beside_nominal_figure, search_figure
+from undertow.scenario.finished_run import to_json
+from undertow.scenario.reading import read
+
+_WRITTEN = ("falsify.json", "counterexample.yaml", "figures")
+_CHECKPOINT = "falsify.jsonl"
+
+
+def falsify_scenario(
+    scenario: Path,
+    out: Path | None,
+    method: str,
+    budget: int,
+    seed: int,
+    resume: bool,
+    overwrite: bool,
+    allow_code: bool,
+    pdf: str | None,
+) -> int:
+    """Falsify a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    check_pdf(pdf)
+    checks.choice("--method", method, METHODS)
+    if budget < 1:
+        raise BadInput("--budget", "be at least 1 run", budget)
+    if not 0 <= seed < 2**32:
+        raise BadInput("--seed", "be between 0 and 2^32 - 1", seed)
+    console = wide_console()
+    text, first = read(scenario, allow_code=allow_code), Path("runs") / f"{scenario.stem}-falsified"
+    with (
+        output_folder(unfinished(first, _CHECKPOINT) if resume and out is None else out, first) as folder,
+        results_folder(folder, _WRITTEN, "falsify.json", overwrite) as draft,
+        checkpoint_in(folder, _CHECKPOINT, "falsify") as checkpoint,
+    ):
+        with _live(console, budget) as (say, watch):
+            options = {"budget": budget, "seed": seed, "method": method, "checkpoint": checkpoint, "resume": resume}
+            found = interruptible(lambda: falsify(text, **options, say=say, watch=watch))
+        data = as_data(found)
+        (draft.path / "falsify.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
+        if found.violation is not None:
+            sentence = f"Counter-example of {scenario.name}: {_violated(found)}."
+            written = trial_text(found.single_runs[-1].built, sentence)
+            (draft.path / "counterexample.yaml").write_text(written, encoding="utf-8")
+        draft.publish()  # before the figures, which may fail
+        checkpoint.unlink()
+        plots = {"search": lambda: search_figure(data)}
+        if found.violation is not None:
+            nominal, broken = (one.dataset for one in found.single_runs)
+            plots["counterexample"] = lambda: beside_nominal_figure(nominal, broken)
+        warn_of(save_all(lambda: plots, draft.path / "figures", pdf).failures)
+    if found.violation is not None:
+        console.print(_table(found))
+    for line in _sentences(found, folder):
+        console.print(line, highlight=False, soft_wrap=True)
+    return DONE
+
+
+@contextlib.contextmanager
+def _live(
+    console: Console, budget: int
+) -> Iterator[tuple[Callable[[str], None], Callable[[int, float, Violation | None], None]]]:
+    """Show the current stage, the number of runs and the best so far."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        task = live.add_task("reading", total=budget, best="")
+
+        def say(stage: str) -> None:
+            live.update(task, description=stage)
+            if not console.is_terminal:
+                console.print(stage, markup=False, highlight=False)
+
+        def watch(runs: int, least: float, smallest: Violation | None) -> None:
+            size = "" if smallest is None else f", smallest violation {smallest.size:.4g}"
+            live.update(task, completed=runs, best=f"{runs} runs, least robustness {least:.3g}{size}")
+
+        yield say, watch
+
+
+def _violated(found: Falsified) -> str:
+    broken = [f"{name} (robustness {value:.3g})" for name, value in found.broken.items() if not value > 0]
+    return f"violates {', '.join(broken)}"
+
+
+def _table(found: Falsified) -> Table:
+    assert found.violation is not None
+    table = titled("Counter-example", "key", *map(numbers, ("low", "nominal", "value", "high", "departure")))
+    for axis, away in zip(found.box.axes, found.violation.departure.tolist(), strict=True):
+        row = (axis.low, axis.nominal, found.values()[axis.key], axis.high)
+        table.add_row(axis.key, *(f"{value:.5g}" for value in row), f"{100 * away:.3g} %")
+    return table
+
+
+def _sentences(found: Falsified, folder: Path) -> list[str]:
+    runs, objective = found.objective.runs, found.objective
+    how = "by differentiation" if found.differentiated else "by differences"
+    ended = "the search converged" if found.finished else "the budget is used up"
+    if found.violation is None:
+        least = min(objective.robustnesses)
+        none = f"No violation in {runs} runs within the bounds; least robustness {least:.4g}. This proves nothing"
+        return [f"{none}: {ended}, gradients {how}.", f"Results: {folder}"]
+    alone = "repeats" if found.repeated() else "does not repeat"
+    return [
+        f"The counter-example {_violated(found)}. Its departure is {found.violation.size:.4g} of the bounds (norm). "
+        f"{runs} runs: {ended}, gradients {how}.",
+        f"A single run {alone} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
+        f"Results: {folder}",
+    ]
