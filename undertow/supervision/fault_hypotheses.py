@@ -19,7 +19,7 @@ _OFF_LEAST, _OFF_MOST = 0.35, 1.15
 # Part of its own square by which the best hypothesis is at least ahead of the second best.
 _AHEAD = 0.3
 # Least part of what is more than noise that one thruster explains.
-_EXPLAINED = 0.7
+_EXPLAINED = 0.6
 # Factor with which what is left unexplained counts where it is more than noise.
 _EXCESS = 2.0
 # Factors by which a pair must explain more, and be further ahead, than a single thruster, and the part it explains.
