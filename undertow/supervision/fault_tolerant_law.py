@@ -90,9 +90,7 @@ class FaultTolerantController(AbstractRestartable):
     def advance(self, z: FaultTolerantState, y: Measurement, r: Target, u_applied, dt) -> FaultTolerantState:
         used = self._used(z.monitor, y)
         law = self._reduced(used).advance(z.law, y, r, u_applied, dt)
-        return FaultTolerantState(
-            law, self.monitor.advance(z.monitor, self.body_model, y, u_applied, used, dt)
-        )
+        return FaultTolerantState(law, self.monitor.advance(z.monitor, self.body_model, y, u_applied, used, dt))
 
     def known_acceleration(self, z: FaultTolerantState, y: Measurement, u_applied):
         return known_acceleration(self._reduced(self._used(z.monitor, y)), z.law, y, u_applied)

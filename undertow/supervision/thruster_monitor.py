@@ -84,19 +84,16 @@ class ThrusterMonitor(eqx.Module):
     rho = w (nu - p) is the paper's series-parallel identification model, and rho is nu_dot - F - E f behind a low-pass
     of bandwidth w; a second one suppresses noise. A fault of thruster i adds E_i a_i.
 
-    Every `interval` the residual is examined. D = rho(t) - 2 rho(t - L) + rho(t - 2 L), L five intervals, is what a
-    linear extrapolation of the residual does not predict: loads, waves and errors of the model change slowly and
-    disappear in it, a thruster that stops does not, until 2 L later. D is weighed by its own covariance without faults,
-    which sea, noise and errors of the model raise, and by what errors of the thruster model add to it when forces
-    change (`mismatch`). `fault_hypotheses` compares thrusters, and pairs of them, with it.
+    Every `interval` the residual is examined (`fault_onset`). Its second difference e is what a linear extrapolation
+    does not predict: loads, waves and errors of the model change slowly and almost disappear in it. e is weighed by its
+    own covariance without faults, which sea, noise and errors of the model raise, and by what errors of the thruster
+    model add to it when forces change (`mismatch`).
 
-    A thruster is suspected where it explains D as a fault can: J_i = (E_i . P D)^2 / (E_i . P E_i), P the inverse
-    covariance, is the part of D . P D that direction i explains, and a_i = E_i . P D / (E_i . P E_i) its force. J_i
-    must be above `threshold`^2 (`other_threshold`^2 unless a_i is that of a thruster that is off), explain the share
-    `explained` of D, and be above that of the second best thruster by `margin` and by half of what it leaves. Two
-    thrusters are suspected where both are off and explain what no single one does. A suspicion that persists is an
-    alarm. Where actuators report their speed, one whose reported force differs from that predicted of its command is
-    suspected as well.
+    A thruster is suspected where it explains the innovations since one of the last ten examinations as one that is off
+    does, but for a factor: `fault_hypotheses.one_thruster`. It must explain `threshold`^2, and more than every other
+    thruster by `margin`. Two thrusters are suspected where both are off and explain what no single one does. A
+    suspicion that persists is an alarm. Where actuators report their speed, one whose reported force differs from that
+    predicted of its command is suspected as well.
 
     This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
     by what does not happen afterwards: the nominal force without its slow part, phi, has no effect on the residual
@@ -104,7 +101,8 @@ class ThrusterMonitor(eqx.Module):
     Its log-likelihood ratio to a healthy thruster, -2 phi_i E_i . P D - phi_i^2 E_i . P E_i per independent residual,
     is summed with fading memory (Page's cumulative sum, 1954); the thruster is suspected where it exceeds `likely` and
     that of every other by `clearly` and by the factor 1 / `likely_rival`. The same ratio of a pair, with the effect of
-    both missing, finds two thrusters that stopped at once at little thrust, where no single one explains what follows.
+    both missing and D the wide difference of `fault_onset`, finds two thrusters that stopped at once at little thrust,
+    where no single one explains what follows.
 
     Raises:
         BadInput: a value that is not positive.
