@@ -92,7 +92,7 @@ class Noting(AbstractLink):
 def made(late=(), durations=(), measures=lambda k: True, stop=lambda: False, **settings):
     clock = Stalling(late)
     autopilot, link = Counting(clock, durations), Noting(clock, measures)
-    loop = RealTimeLoop(autopilot, link, clock, LoopSettings(safe=SAFE, **settings), stop)  # type: ignore[arg-type]
+    loop = RealTimeLoop(autopilot, link, clock, LoopSettings(safe=SAFE, **settings), stop)
     return loop, autopilot, link
 
 
@@ -125,7 +125,7 @@ def test_every_one_of_1000_stalls_is_counted_within_two_periods(where):
         return step(*motion, **more)
 
     autopilot.step = noted
-    loop = RealTimeLoop(autopilot, link, clock, LoopSettings(safe=SAFE))  # type: ignore[arg-type]
+    loop = RealTimeLoop(autopilot, link, clock, LoopSettings(safe=SAFE))
     loop.run(5000)
     assert loop.statistics.overruns == 1000
     # A stall that begins in step k is known in step k + 1, which begins within one period after it.
@@ -247,4 +247,4 @@ def test_it_stops_when_it_is_asked():
 def test_settings_that_cannot_be_used(settings, said):
     clock = Stalling()
     with pytest.raises(BadInput, match=said):
-        RealTimeLoop(Counting(), Noting(clock), clock, LoopSettings(**settings))  # type: ignore[arg-type]
+        RealTimeLoop(Counting(), Noting(clock), clock, LoopSettings(**settings))

@@ -99,7 +99,7 @@ def examine(
     residual: PerAxis,
     forces: Float[Array, "3 m"],
     effect: Float[Array, "n m"],
-    doubt: PerActuator,
+    error_share: PerActuator,
     remains: Float[Array, "11 3"],
     learned: Float[Array, ""],
 ) -> tuple[OnsetState, Seen]:
@@ -115,14 +115,14 @@ def examine(
         residual: of now, in units.
         forces: nominal ones of now behind two, one and no low-pass, N.
         effect: acceleration per force, in units.
-        doubt: share of a change of the nominal force of each thruster that the model may miss.
+        error_share: share of a change of the nominal force of each thruster that the model may miss.
         remains: that of `transients`.
         learned: part of the covariance that is replaced by this innovation.
     """
     before, unit = past.forces[:, 0], jnp.eye(len(residual))
     innovation = residual - 2 * past.residuals[0] + past.residuals[1]
     change = forces[0] - 2 * before[0] + before[1]
-    now = weighed(effect, past.covariance + _FLOOR * unit + _unknown(effect, doubt * change), innovation)
+    now = weighed(effect, past.covariance + _FLOOR * unit + _unknown(effect, error_share * change), innovation)
     # Second difference of the missing force, which is zero at the onset and before.
     bent = jnp.concatenate([remains[1:2], remains[2:] - 2 * remains[1:-1] + remains[:-2]])
     first = (jnp.arange(ONSETS) == 0)[:, None]
@@ -130,7 +130,7 @@ def examine(
     missing = forces[:1] - (remains[1:, :, None] * past.forces).sum(1)
     difference = residual - 2 * past.residuals[WIDE - 1] + past.residuals[-1]
     changes = forces[0] - 2 * before[WIDE - 1] + before[-1]
-    spread = past.wide_covariance + _WIDE_FLOOR * unit + _unknown(effect, doubt * changes)
+    spread = past.wide_covariance + _WIDE_FLOOR * unit + _unknown(effect, error_share * changes)
     wide = weighed(effect, spread, difference)
     after = OnsetState(
         residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),

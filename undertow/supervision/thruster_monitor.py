@@ -235,10 +235,10 @@ class ThrusterMonitor(eqx.Module):
             elapsed: time since the examination before, s.
         """
         scaled = effect / self.unit[:, None]
-        doubt = jnp.where(used > 0, self.mismatch, _UNUSED)
+        error_share = jnp.where(used > 0, self.mismatch, _UNUSED)
         remains = transients(self.bandwidth, self.decay, elapsed)
         learned = first_weight(past.examinations, elapsed, self.memory)
-        onsets, seen = examine(past.onsets, residual / self.unit, forces, scaled, doubt, remains, learned)
+        onsets, seen = examine(past.onsets, residual / self.unit, forces, scaled, error_share, remains, learned)
         since = jnp.maximum(past.examinations, 1.0) * elapsed  # while it is short, the covariance is not well known
         bounds = Bounds(
             ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest

@@ -1,7 +1,7 @@
 """Formulas of signal temporal logic and their robustness: how far a series is from the boundary of a formula.
 
 A formula has a robustness at every instant of a series: positive where the formula holds, negative where it does not
-(Donzé and Maler 2010). It is computed for all instants at once, from the leaves to the root; that of a run is the first
+(Donze and Maler 2010). It is computed for all instants at once, from the leaves to the root; that of a run is the first
 entry. The same code computes the exact value with NumPy and a smooth one with JAX, in which the minimum and the
 maximum are replaced by their log-sum-exp approximations.
 """
@@ -211,7 +211,7 @@ class Until(Formula):
     """The second formula holds at an instant of the interval, and the first up to and at that instant.
 
     Of an interval that begins later, the first formula holds up to its beginning, and from there the unbounded one
-    (Donzé, Ferrère and Maler 2013, lemma 1).
+    (Donze, Ferrere and Maler 2013, lemma 1).
     """
 
     first: Formula
