@@ -1,9 +1,12 @@
-"""Latency of one step: the controller by itself, and the navigation filter by itself.
+"""Latency of one step: the controller, the same under supervision, and the navigation filter by itself.
 
 BlueROV2 Heavy with eight T200s under preset `robust`, and the Kalman filter of the vehicle's own sensors. A step
 includes everything that a caller waits for: checks of the numbers given, the law, the output in volts.
 
     python benchmarks/autopilot_latency.py [--steps 50000] [--json]
+
+`gated` is the controller with a supervisor that does not watch the thrusters, `supervised` with one that does. Readings
+are those of a vehicle that moves by millimetres, as the supervisor takes nothing else for one.
 
 `wall` is the time that passes, `processor` that in which the step computes: they differ where other processes take the
 processor away (`preempted`), which on a busy machine makes the longest steps.
@@ -37,15 +40,27 @@ SHARES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 BARS = {"p50": 50.0, "p99.9": 500.0}  # us, of a step of the controller
 
 
-def controller() -> Callable[[int], object]:
+def controller(supervisor: Any = False) -> Callable[[int], object]:
     """A step of the controller, compiled and started."""
     import undertow as ut
 
-    autopilot, chance = ut.Autopilot(SCENARIO), np.random.default_rng(0)
-    positions, velocities = 0.1 * chance.normal(size=(64, 3)), 0.1 * chance.normal(size=(64, 6))
-    angles, target = 0.1 * chance.normal(size=(64, 3)), np.array([2.0, 1.0, 1.0, 0.0, 0.0, 0.5])
-    autopilot.start(positions[0], velocities[0], angles[0], target=target)
-    return lambda k: autopilot.step(positions[k % 64], velocities[k % 64], angles[k % 64], target=target)
+    autopilot, chance = ut.Autopilot(SCENARIO | {"supervisor": supervisor}), np.random.default_rng(0)
+    phase = 0.4 * np.pi * DT * np.arange(500)[:, None] + np.arange(6.0)  # a period of 5 s
+    outputs, rates = 0.003 * np.sin(phase), 0.003 * 0.4 * np.pi * np.cos(phase)
+    outputs, rates = (motion + 1e-4 * chance.normal(size=motion.shape) for motion in (outputs, rates))
+    target = np.zeros(6)
+    autopilot.start(outputs[0, :3], rates[0], outputs[0, 3:], target=target)
+    return lambda k: autopilot.step(outputs[k % 500, :3], rates[k % 500], outputs[k % 500, 3:], target=target)
+
+
+def gated() -> Callable[[int], object]:
+    """A step of the controller with a supervisor that does not watch the thrusters."""
+    return controller({"thruster_faults": False})
+
+
+def supervised() -> Callable[[int], object]:
+    """A step of the controller with a supervisor."""
+    return controller(True)
 
 
 def navigation() -> Callable[[int], object]:
@@ -60,7 +75,7 @@ def navigation() -> Callable[[int], object]:
     return lambda k: navigation.step(alone if k % 10 else usual)
 
 
-STEPS = {"controller": controller, "navigation": navigation}
+STEPS = {"controller": controller, "gated": gated, "supervised": supervised, "navigation": navigation}
 
 
 def latency(name: str, steps: int) -> dict[str, Any]:
@@ -115,6 +130,13 @@ def main() -> None:
             print(f"{name:<12}{clock:<12}" + "".join(f"{row[clock][share]:9.1f}" for share in SHARES))
         seconds = f"compiled in {row['compile_cold']:.1f} s, with kept code in {row['compile_kept']:.1f} s"
         print(f"{name}: preempted {row['preempted']} times in {given.steps} steps; {seconds}")
+    p50 = {name: row["wall"]["p50"] for name, row in found.items()}
+    for name in ("gated", "supervised"):
+        more = p50[name] - p50["controller"]
+        alone, whole = more / p50["controller"], more / (p50["controller"] + p50["navigation"])
+        print(
+            f"{name}: {more:+.1f} us, {alone:+.0%} of the controller, {whole:+.0%} of controller and navigation filter"
+        )
     for clock in ("wall", "processor"):
         met = all(found["controller"][clock][share] <= bar for share, bar in BARS.items())
         print(f"controller, p50 <= 50 us and p99.9 <= 500 us by the {clock} clock: {'met' if met else 'missed'}")
