@@ -46,10 +46,19 @@ class Problem(NamedTuple):
         listed = {name: np.asarray(value) for name, value in self.options(point).items()}
         return {name: _rounded(value).tolist() for name, value in listed.items()}
 
+    def gains(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Options as a scenario has them: None for those that are equivalent to one of them."""
+        return _left_out(_law_of(self.built), options) | dict(options)
+
     def scenario(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """The resolved scenario with these options of the controller."""
-        left_out = _left_out(_law_of(self.built), options)
-        return self.built.resolved | {"controller": self.built.resolved["controller"] | left_out | dict(options)}
+        return self.built.resolved | {"controller": self.built.resolved["controller"] | self.gains(options)}
+
+
+def is_tunable(built: Built) -> bool:
+    """Whether there are gains to tune: those of the section `tune`, or those that the controller has itself."""
+    scenario = built.scenario
+    return bool(scenario.tune.parameters or _law_of(built.of_the_law()).ranges(scenario.loop.dt))
 
 
 def problem(text: Text) -> Problem:
