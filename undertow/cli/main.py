@@ -170,7 +170,8 @@ def tune(
         str,
         typer.Option(
             metavar="METHOD",
-            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
+            help="gradient (quasi-Newton); search (differential evolution, for costs that are not smooth); or "
+            "evolution (mutation and selection around the best gains, for few evaluations).",
         ),
     ] = "gradient",
     budget: Annotated[

@@ -1,6 +1,6 @@
 """Tune every controller of a comparison with the same optimiser and the same number of evaluations.
 
-Each law is tuned on the training runs of the scenario's section `tune` by differential evolution, which needs no
+Each law is tuned on the training runs of the scenario's section `tune` by mutation and selection, which needs no
 gradient and therefore treats a law with switching like any other. What is found is kept in a folder, a file for each
 law, so that an interrupted comparison is resumed and gives what it would have given.
 """
@@ -24,7 +24,7 @@ from undertow.tuning.stability import NoCertificate
 from undertow.tuning.training_runs import Trials
 from undertow.tuning.tune import INITIAL_DESIGN, Tuned, tune
 
-METHOD = "search"
+METHOD = "evolution"
 
 FOLDER = "tuning"  # beside the results
 
@@ -77,6 +77,7 @@ class TunedLaw(NamedTuple):
         if self.untuned or self.train is None or self.held_out is None:
             return f"judged as it is: {self.untuned}"
         words = ", ".join(f"{name} {_short(value)}" for name, value in self.gains.items() if value is not None)
+        words = words or "the gains before are kept: none of the others has a lower cost"
         return (
             f"tuned with {self.evaluations} evaluations of {self.parameters} numbers, cost on training runs "
             f"{self.train[0]:.3g} before and {self.train[1]:.3g} after, on held-out runs {self.held_out[0]:.3g} and "

@@ -18,10 +18,10 @@ from undertow.tuning.cost import Shares
 from undertow.tuning.evaluator import AT_ONCE, Evaluation
 from undertow.tuning.objective import Objective, Step, Watch
 from undertow.tuning.problem import Problem, problem
-from undertow.tuning.search import descend, search, spread_points
+from undertow.tuning.search import descend, evolve, search, spread_points
 from undertow.tuning.stability import Certificate, Certifier, no_certificate
 
-METHODS = ("gradient", "search")
+METHODS = ("gradient", "search", "evolution")
 
 # Share of the budget for the search; the rest is for the final evaluation.
 _FOR_THE_SEARCH = 0.85
@@ -77,11 +77,12 @@ def tune(
     Args:
         text: the scenario.
         checkpoint: file from which an interrupted tuning is resumed.
-        method: `gradient`, gradient descent by forward differentiation, or `search`, differential evolution.
+        method: `gradient`, gradient descent by forward differentiation; `search`, differential evolution; or
+            `evolution`, mutation and selection around the best point, for few evaluations.
         budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
         evaluations: budget in evaluations of gains instead, at least those of the initial design, so that the result
             does not depend on the speed of the machine. All of them are used: where the method has converged,
-            differential evolution goes on from the best point. A gradient counts as one for each parameter.
+            `evolution` goes on from the best point. A gradient counts as one for each parameter.
         resume: whether to resume from the checkpoint.
         say: called with the current stage.
         watch: called with the best so far after every batch.
@@ -128,11 +129,13 @@ def tune(
         iterations = task.built.scenario.tune.iterations
         if method == "gradient":
             descend(objective, np.array(start.point), start.cost, iterations)
+        elif method == "evolution":
+            evolve(objective, np.array(start.point), start.cost, iterations, seed)
         else:
             search(objective, np.array(start.point), iterations, seed)
-        while evaluations is not None:  # until it is used up
-            seed = (seed + 1) % 2**32
-            search(objective, np.array((objective.best or start).point), iterations, seed)
+        while evaluations is not None:  # until they are used up
+            at, seed = objective.best or start, (seed + 1) % 2**32
+            evolve(objective, np.array(at.point), at.cost, iterations, seed)
     except OutOfTime:
         finished = evaluations is not None
     say("evaluating on held-out runs")
