@@ -16,6 +16,7 @@ from undertow.scenario.reading import from_data, read
 from undertow.tuning.evaluator import Evaluation
 
 BUDGET = 20
+OPTIONAL = "def law(model, frequency=1.0):\n    return pid(model, frequency={})\n"
 FIXED = "def fixed(model):\n    from undertow.controllers import pid\n    return pid(model, frequency=2.0)\n"
 
 
@@ -119,6 +120,20 @@ def test_trials_are_held_out():
     assert text.data["vary"]["disturbance[1].height"] == {"uniform": [1.0, 2.0]} and SET in text.data["vary"]
     untouched, same = held_out(base, base, found, EqualBudgets(BUDGET, (), None, None))
     assert untouched == base and same == found
+
+
+def test_parameters_hold_for_the_scenarios_own_controller(scenario, capsys):
+    """Its function is traced with arrays; one that is not made for that says so."""
+    Path("mine.py").write_text("from undertow.controllers import pid\n\n" + OPTIONAL.format("frequency"))
+    own = {"controller": {"kind": "mine.py:law", "frequency": 2.0}, "tune": {"parameters": {"frequency": [0.5, 8.0]}}}
+    path = Path(scenario(**own))
+    found = controllers(["scenario", "pid"], read(path), path)
+    asked = [budgets._scenario_with(one, read(path)).data["tune"] for one in found]
+    assert asked == [{"parameters": {"frequency": [0.5, 8.0]}}, {}]
+    Path("mine.py").write_text("from undertow.controllers import pid\n\n" + OPTIONAL.format("float(frequency)"))
+    assert run(["compare", str(path), "--controllers", "scenario,pid", "--tune", "20", "--out", "out"]) == 2
+    assert "takes as arrays of JAX, one number for each axis" in capsys.readouterr().err
+    assert not Path("out").exists()
 
 
 def test_bad_budgets(scenario, capsys):

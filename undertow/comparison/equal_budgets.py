@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.comparison.candidates import Candidate, file_stem
+from undertow.comparison.candidates import Candidate, file_stem, part_of
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.finished_run import to_json
@@ -163,7 +163,7 @@ def _scenario_with(one: Candidate, scenario: Text) -> Text:
     data, part = dict(scenario.data), one.changes["controller"]
     asked = data.get("tune")
     if isinstance(asked, dict) and "parameters" in asked:
-        own = validate(scenario).controller.model_dump()
+        own = part_of(validate(scenario).controller, scenario.folder)
         if any(own.get(key) != part.get(key) for key in ("kind", "preset")):
             data["tune"] = {key: value for key, value in asked.items() if key != "parameters"}
     return scenario._replace(data=data | one.changes)

@@ -4,6 +4,8 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -92,8 +94,14 @@ def _problem(text: Text, built: Built) -> Problem:
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
     begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
     found = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
-    with within("controller"):
-        found.law(found.options(found.start))
+    try:
+        with within("controller"):
+            found.law(found.options(found.start))
+            jax.eval_shape(lambda point: eqx.filter(law(found.options(point)), eqx.is_array), found.start)
+    except TypeError as error:
+        must = "be options that the controller takes as arrays of JAX, one number for each axis"
+        hint = "Compute with jax.numpy, without float() and without `if` on a gain"
+        raise BadInput("tune.parameters", must, str(error).partition("\n")[0], hint=hint) from None
     return found
 
 
