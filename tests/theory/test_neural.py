@@ -28,7 +28,7 @@ def test_with_hidden_weights_of_zero_it_is_a_pid():
     """sigma = 1/2 then, so that the output layer is an integral of r with gain I = F (hidden / 4 + 1):
     k_p = K_v Lambda + I, k_d = K_v + Lambda, k_i = I Lambda, from a start without error."""
     plant, load = double_integrator(2), sinusoid(2.0, 3.0, offset=[1.0, -0.5])
-    gains = {"slope": 2.0, "feedback": 3.0, "adaptation": 0.5}
+    gains = {"slope": 2.0, "gain": 3.0, "adaptation": 0.5}
     off = {"hidden_adaptation": 0.0, "e_modification": 0.0, "robust_gain": 0.0}
     law = neural(plant.model(), sampling_time=DT, hidden=6, **gains, **off)
     law = eqx.tree_at(lambda law: law.start, law, jnp.zeros_like(law.start))
@@ -56,7 +56,7 @@ def test_the_network_learns_gravity_and_coriolis_forces_of_an_arm():
     """As in the source's example: both links of an arm follow sines of period 2 pi; the law has no model of weight and
     Coriolis forces. Its gains are K_v = 20, Lambda = 5 and kappa = 0.1, ten neurons, as there."""
     plant, reference = two_link_arm(), sine(amplitude=[0.5, 0.5], frequency=1.0)
-    same = {"slope": 5.0, "feedback": 20.0, "hidden": 10, "feedforward": False, "reference_frequency": 0.0}
+    same = {"slope": 5.0, "gain": 20.0, "hidden": 10, "feedforward": False, "reference_frequency": 0.0}
     same |= {"sampling_time": DT, "robust_gain": 0.0}
     late = []
     for gain in (0.0, 50.0):

@@ -91,7 +91,7 @@ class EqualBudgets(NamedTuple):
     Attributes:
         budget: evaluations of gains for each law.
         laws: in the order of the candidates.
-        train, held_out: runs of each evaluation, and those of the judgement by cost; None where no law was tuned.
+        train, held_out: runs that the gains are tuned on, and runs for the cost of the tuned gains; None where no law was tuned.
     """
 
     budget: int

@@ -56,8 +56,8 @@ def step_time(built: Built) -> StepTime:
     memory, _ = first_step(law, y, target)
 
     def step(numbers: Any, memory: Any, inputs: Any) -> tuple[Any, Any]:
-        measured, wanted, was_applied, elapsed = inputs
-        return next_step(eqx.combine(numbers, rest), memory, measured, wanted, was_applied, elapsed)
+        measured, desired, was_applied, elapsed = inputs
+        return next_step(eqx.combine(numbers, rest), memory, measured, desired, was_applied, elapsed)
 
     compiled = Step(step, own(numbers), own(memory), own((y, target, applied, interval)))
     taken, begun = [], time.perf_counter()

@@ -23,11 +23,11 @@ def pareto_figure(found: Findings) -> Figure:
     for number, front in enumerate(found.fronts):
         row, column = divmod(number, _COLUMNS)
         panel = style.place(figure, 0.62 + 4.75 * column, 0.5 + row * (_HEIGHT + 0.6), _WIDTH, _HEIGHT)
-        _draw(panel, found, front)
+        _plot(panel, found, front)
     return figure
 
 
-def _draw(panel: Axes, found: Findings, front: Front) -> None:
+def _plot(panel: Axes, found: Findings, front: Front) -> None:
     scales = [for_people(1.0, found.units[metric]) for metric in (front.effort, front.error)]
     of = lambda name, metric, scale: scale * np.array(found.medians[metric][name][:3])
     for name, look in looks_of(found.names).items():
