@@ -91,7 +91,8 @@ class EqualBudgets(NamedTuple):
     Attributes:
         budget: evaluations of gains for each law.
         laws: in the order of the candidates.
-        train, held_out: runs that the gains are tuned on, and runs for the cost of the tuned gains; None where no law was tuned.
+        train: runs that the gains are tuned on; None where no law was tuned.
+        held_out: runs for the held-out cost of the tuned gains; None where no law was tuned.
     """
 
     budget: int
