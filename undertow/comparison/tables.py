@@ -45,8 +45,15 @@ def medians(found: Findings, times: Mapping[str, StepTime] | None = None) -> Row
         cells = (f"{median(by_name[name], found.units[metric])}{'*' * (name in marked)}" for name in found.names)
         rows.append((titled(found, metric), *cells))
     if times:
-        rows.append((STEP, *(digits(1e6 * times[name].median) if name in times else _NOTHING for name in found.names)))
+        rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
     return Rows(("metric", *found.names), rows)
+
+
+def _time(one: StepTime | None) -> str:
+    """A time in microseconds, marked where the step could not be compiled by the batch compiler."""
+    if one is None:
+        return _NOTHING
+    return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
 
 
 def paired(found: Findings) -> Rows:
