@@ -85,7 +85,10 @@ def test_mistake_is_one_exact_line(refused, tmp_path, old, new, said):
 
 def test_wrong_options(refused, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    assert refused("tune", "s.yaml", "--method", "luck") == "`--method` must be one of gradient, search, but is luck"
+    assert (
+        refused("tune", "s.yaml", "--method", "luck")
+        == "`--method` must be one of gradient, search, evolution, but is luck"
+    )
     assert refused("tune", "s.yaml", "--budget", "0") == "`--budget` must be positive, but is 0 s"
     assert (
         refused("tune", "s.yaml", "--out", "out", "--resume")

@@ -67,3 +67,24 @@ def test_paths_have_one_scale_and_the_second_half_another(compared):
         shown, size = panel.get_position(), panel.figure.get_size_inches()
         east, north = np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim())
         assert shown.width * size[0] / east == pytest.approx(shown.height * size[1] / north)
+
+
+def test_dominated_candidates_are_pale_and_failed_ones_hollow(compared):
+    """`a` has the smaller error and the smaller effort; `c` neither; `b` failed in one trial."""
+    dataset, _ = compared
+    third = dataset.isel(controller=[0]).assign_coords(controller=["c"])
+    third["position_rms"] = 2 * third["position_rms"]
+    dataset = xr.concat([dataset, third], "controller")
+    effort = np.stack([np.full(TRIALS, size) for size in (1.0, 0.5, 3.0)])
+    dataset["input_rms"] = (("controller", "sample"), effort, {"units": "V"})
+    found = find(dataset, "controller", ["position_rms", "input_rms"], dict.fromkeys(["a", "b", "c"], ""), {})
+    (front,) = found.fronts
+    assert (front.front, front.incomplete) == (("a",), ("b",))
+    (panel,) = comparison_plots(dataset, found)["pareto"]().axes
+    points = {line.get_color(): line for line in panel.lines if line.get_marker() == "o"}
+    a, b, c = points.values()
+    assert (a.get_alpha(), c.get_alpha()) == (1.0, 0.3)
+    assert b.get_markerfacecolor() == "white" != a.get_markerfacecolor()
+    assert [float(a.get_xdata()[0]), float(c.get_xdata()[0])] == [1.0, 3.0]
+    assert float(a.get_ydata()[0]) == found.medians["position_rms"]["a"].value
+    assert [text.get_text() for text in panel.texts] == ["a", "b", "c"]

@@ -9,6 +9,7 @@ import xarray as xr
 
 from undertow.comparison.findings import Median, find
 from undertow.comparison.sentences import digits, sentences
+from undertow.comparison.step_time import StepTime
 from undertow.comparison.tables import median, medians, table
 from undertow.core.metric import Metric
 from undertow.report.run_tables import metrics_rows
@@ -55,6 +56,13 @@ def test_medians(findings):
     assert rows["position rms per axis (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
     assert rows["attitude rms per axis (deg)"][0] == "5.5 [2, 9]"
     assert rows["saturated fraction"] == ("0 [0, 0]",) * 3
+
+
+def test_computing_time_is_the_last_row(findings):
+    """In microseconds; a step by XLA is marked, a law without a time has a dash."""
+    times = {"a": StepTime(1.5e-6, "simd"), "b_1": StepTime(4.893e-4, "xla")}
+    assert medians(findings, times).rows[-1] == ("computing time per step (\u00b5s)", "1.5", "489 (XLA)", "-")
+    assert medians(findings).rows == medians(findings, times).rows[:-1]
 
 
 def test_what_never_happens_is_never():

@@ -75,6 +75,7 @@ ALLOWED = {
     "undertow/core/contracts.py": {r"health"},
     "undertow/core/measurement.py": {r"health"},
     "undertow/faults/injected.py": {r"health"},
+    "undertow/comparison/step_time.py": {r"health"},
     "undertow/supervision/": {r"health"},
     "undertow/autopilot/": {r"health"},
     "undertow/realtime/": {r"health"},

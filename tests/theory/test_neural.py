@@ -28,7 +28,7 @@ def test_with_hidden_weights_of_zero_it_is_a_pid():
     """sigma = 1/2 then, so that the output layer is an integral of r with gain I = F (hidden / 4 + 1):
     k_p = K_v Lambda + I, k_d = K_v + Lambda, k_i = I Lambda, from a start without error."""
     plant, load = double_integrator(2), sinusoid(2.0, 3.0, offset=[1.0, -0.5])
-    gains = {"slope": 2.0, "feedback": 3.0, "adaptation": 0.5}
+    gains = {"slope": 2.0, "gain": 3.0, "adaptation": 0.5}
     off = {"hidden_adaptation": 0.0, "e_modification": 0.0, "robust_gain": 0.0}
     law = neural(plant.model(), sampling_time=DT, hidden=6, **gains, **off)
     law = eqx.tree_at(lambda law: law.start, law, jnp.zeros_like(law.start))
@@ -43,7 +43,7 @@ def test_with_hidden_weights_of_zero_it_is_a_pid():
 def test_at_the_start_it_is_the_outer_loop_alone():
     """W = 0: a = a_d + (K_v + K_z (|V| + Z_M)) r + Lambda e_dot."""
     model = double_integrator(2).model()
-    law = neural(model, sampling_time=DT, slope=2.0, feedback=3.0, robust_gain=0.1, reference_frequency=0.0)
+    law = neural(model, sampling_time=DT, slope=2.0, gain=3.0, robust_gain=0.1, reference_frequency=0.0)
     y = Measurement(jnp.array([0.1, -0.2]), jnp.array([0.3, 0.1]))
     goal = Target(jnp.array([1.0, 0.5]), jnp.zeros(2), jnp.array([0.2, 0.0]))
     u, _ = law.command(law.init(y, goal), y, goal)
@@ -56,7 +56,7 @@ def test_the_network_learns_gravity_and_coriolis_forces_of_an_arm():
     """As in the source's example: both links of an arm follow sines of period 2 pi; the law has no model of weight and
     Coriolis forces. Its gains are K_v = 20, Lambda = 5 and kappa = 0.1, ten neurons, as there."""
     plant, reference = two_link_arm(), sine(amplitude=[0.5, 0.5], frequency=1.0)
-    same = {"slope": 5.0, "feedback": 20.0, "hidden": 10, "feedforward": False, "reference_frequency": 0.0}
+    same = {"slope": 5.0, "gain": 20.0, "hidden": 10, "feedforward": False, "reference_frequency": 0.0}
     same |= {"sampling_time": DT, "robust_gain": 0.0}
     late = []
     for gain in (0.0, 50.0):
@@ -73,14 +73,14 @@ def test_e_modification_bounds_the_weights_against_a_load_that_nothing_can_remov
     plant, load = double_integrator(1), sinusoid(5.0, 30.0, offset=20.0)
     sizes = []
     for kappa in (0.0, 5.0):
-        law = neural(plant.model(), sampling_time=DT, slope=2.0, feedback=3.0, adaptation=1.0, e_modification=kappa)
+        law = neural(plant.model(), sampling_time=DT, slope=2.0, gain=3.0, adaptation=1.0, e_modification=kappa)
         sizes.append(float(run(plant, law, [0.0], load, duration=60.0).signals["weights_size"].max()))
     assert sizes[1] < 0.5 * sizes[0]
 
 
 def test_nothing_is_learnt_while_limits_bind():
     plant = double_integrator(1, limit=0.5)
-    law = neural(plant.model(), sampling_time=DT, slope=2.0, feedback=3.0, reference_frequency=0.0)
+    law = neural(plant.model(), sampling_time=DT, slope=2.0, gain=3.0, reference_frequency=0.0)
     found = run(plant, law, [50.0], duration=3.0, simulate=sampled.simulate)
     assert found.signals["attained_share"][:-1].max() < 0.5
     np.testing.assert_allclose(found.signals["estimate"], 0.0, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Both methods on costs whose minimum is known; certificates and journals."""
+"""The methods on costs whose minimum is known; certificates and journals."""
 
 import json
 
@@ -8,7 +8,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.objective import Objective
-from undertow.tuning.search import descend, search
+from undertow.tuning.search import descend, evolve, search
 from undertow.tuning.stability import Certificate, no_certificate
 
 RNG = np.random.default_rng(4)
@@ -46,12 +46,14 @@ def tune(asked, method, iterations=60):
     asked.costs(START[None])
     if method == "gradient":
         descend(asked, START, asked.best.cost, iterations)
+    elif method == "evolution":
+        evolve(asked, START, asked.best.cost, iterations, seed=1)
     else:
         search(asked, START, iterations, seed=1)
     return asked.best
 
 
-@pytest.mark.parametrize("method", ["gradient", "search"])
+@pytest.mark.parametrize("method", ["gradient", "search", "evolution"])
 def test_minimum_of_a_quadratic(tmp_path, method):
     best = tune(objective(tmp_path, Bowl()), method)
     np.testing.assert_allclose(best.point, CENTRE, atol=2e-2)
@@ -66,7 +68,7 @@ def test_slope_that_lies(tmp_path):
     assert best.cost - 1 < 0.1 * (Bowl().costs(START[None])[0] - 1)
 
 
-@pytest.mark.parametrize("method", ["gradient", "search"])
+@pytest.mark.parametrize("method", ["gradient", "search", "evolution"])
 def test_minimum_at_a_bound(tmp_path, method):
     """Outside the box in one direction: against a grid."""
     bowl = Bowl(np.array([-0.3, 0.5, 0.5]))
@@ -77,7 +79,7 @@ def test_minimum_at_a_bound(tmp_path, method):
     np.testing.assert_allclose(best.point, [0.0, *rest], atol=2e-2)
 
 
-@pytest.mark.parametrize("method", ["gradient", "search"])
+@pytest.mark.parametrize("method", ["gradient", "search", "evolution"])
 def test_nothing_is_accepted_without_certificate(tmp_path, method):
     """Unstable below x_1 = 0.5, where the minimum lies."""
     fenced = lambda point: Certificate((0.9 if point[0] >= 0.5 else 1.01,), ("",))
@@ -88,7 +90,7 @@ def test_nothing_is_accepted_without_certificate(tmp_path, method):
     assert best.cost < asked.steps[0].cost
 
 
-@pytest.mark.parametrize("method", ["gradient", "search"])
+@pytest.mark.parametrize("method", ["gradient", "search", "evolution"])
 @pytest.mark.parametrize("lines", [1, 5, 8])
 def test_resumed_is_the_same_as_uninterrupted(tmp_path, method, lines):
     """The checkpoint as a kill leaves it: cut off after some lines, and in the middle of the next."""
@@ -114,6 +116,24 @@ def test_budget_ends_it(tmp_path):
     with pytest.raises(OutOfTime):
         for _ in range(3):
             asked.costs(START[None])
+
+
+def test_budget_in_evaluations(tmp_path):
+    """Points that were evaluated before take none, of a batch only as many as are left; a gradient takes one each."""
+    bowl = Bowl()
+    asked = Objective(bowl, stable, Checkpoint(tmp_path / "j", "bowl", 1e9, False), lambda best, count: None, most=8)
+    points = np.random.default_rng(0).random((6, 3))
+    first = asked.costs(points[:3])
+    np.testing.assert_array_equal(asked.costs(points[[2, 0, 2]]), first[[2, 0, 2]])
+    assert asked.evaluations == 3
+    asked.slope(points[0])
+    assert asked.evaluations == 6
+    found = asked.costs(points[2:])
+    assert asked.evaluations == 8 and np.isfinite(found[:3]).all() and np.isinf(found[3])
+    np.testing.assert_array_equal(asked.costs(points[:5]), np.append(first, found[1:3]))  # nothing new
+    for ask in (lambda: asked.costs(points[5:]), lambda: asked.slope(points[0])):
+        with pytest.raises(OutOfTime):
+            ask()
 
 
 def test_journal_of_something_else(tmp_path):

@@ -1,24 +1,32 @@
 """`undertow compare`: compare controllers on one scenario, or several scenarios, trial by trial."""
 
-import re
+import contextlib
+import shlex
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import typer
 from rich.console import Console
 
 from undertow.campaign.build_trials import build_trial
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import load
+from undertow.cli import results_folder
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
+from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
+from undertow.comparison.budget_tables import budget_sentences
+from undertow.comparison.candidates import file_stem
 from undertow.comparison.comparison import Comparison, read_comparison
-from undertow.comparison.prepare import PreparedComparison, prepare_comparison
+from undertow.comparison.equal_budgets import FOLDER, check_budget, equal_budgets
+from undertow.comparison.prepare import PreparedComparison, Tuner, prepare_comparison
 from undertow.comparison.sentences import sentences
+from undertow.comparison.step_time import HOW_LONG, step_times
 from undertow.comparison.tables import NOTE, medians
 from undertow.core import checks
 from undertow.core.status import Status
@@ -28,7 +36,8 @@ from undertow.scenario.part_cache import PartCache
 
 # File of each style of table.
 _TABLES = {"markdown": "comparison.md", "latex": "comparison.tex", "csv": "comparison.csv"}
-_WRITTEN = (STORE, "comparison.html", "comparison.json", *_TABLES.values(), "figures", "scenarios")
+_TIMES = "step_times.json"
+_WRITTEN = (STORE, "comparison.html", "comparison.json", *_TABLES.values(), _TIMES, "figures", "scenarios")
 
 
 def compare(
@@ -42,9 +51,12 @@ def compare(
     allow_code: bool,
     pdf: str | None,
     replay: bool,
+    budget: int | None = None,
 ) -> int:
     """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
     check_pdf(pdf)
+    if budget is not None:
+        check_budget(budget)
     count = worker_count(workers)
     if trials is not None:
         checks.positive("--trials", trials)
@@ -52,9 +64,14 @@ def compare(
     again = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
     again += ["--trials", str(trials)] if trials is not None else []
     again += ["--replay"] if replay else []
-    with trials_folder(out, f"{paths[0].stem}-comparison", _WRITTEN, resume, overwrite) as folder:
+    again += ["--tune", str(budget)] if budget is not None else []
+    with trials_folder(out, f"{paths[0].stem}-comparison", (*_WRITTEN, FOLDER), resume, overwrite, FOLDER) as folder:
         console = wide_console()
-        ready = built_with_advice(console, lambda: prepare_comparison(paths, several, trials, allow_code))
+        if not resume:
+            results_folder.remove(folder / FOLDER)
+        with _tuning(console, folder, budget, again) as tuner:
+            prepare = lambda: prepare_comparison(paths, several, trials, allow_code, tuner)
+            ready = built_with_advice(console, prepare)
         if replay:
             check_replay(ready.built)
         with resumable(folder, again):
@@ -62,10 +79,44 @@ def compare(
             return _conclude(console, ready, folder, pdf, replay)
 
 
+@contextlib.contextmanager
+def _tuning(console: Console, folder: Path, budget: int | None, again: Sequence[str]) -> Iterator[Tuner | None]:
+    """What tunes the controllers, with its progress; None without a budget. Stopped, it says how to continue."""
+    if budget is None:
+        yield None
+        return
+    place = folder / FOLDER
+    said: list[str] = []
+
+    def say(words: str) -> None:
+        if words not in said[-1:]:
+            said.append(words)
+            console.print(words, markup=False, highlight=False)
+
+    try:
+        yield lambda candidates, scenario: equal_budgets(candidates, scenario, budget, place, say)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and place.is_dir() and any(place.iterdir()):
+            line = shlex.join(["undertow", *again, "--out", str(folder), "--resume"])
+            typer.echo(f"Stopped while tuning; what was evaluated is kept. To continue: {line}", err=True)
+        elif not (folder / STORE).exists():
+            _remove_empty(place, folder)
+        raise
+
+
+def _remove_empty(*folders: Path) -> None:
+    """Remove folders in which nothing was kept."""
+    for one in folders:
+        with contextlib.suppress(OSError):
+            one.rmdir()
+
+
 def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: str | None, replay: bool) -> int:
     """Write page, tables and scenarios; print the findings."""
     firsts = dict(zip(ready.names, ready.built, strict=True)) if replay else {}
     replays, missing = run_again(console, firsts)
+    with stage(console, "time of a step"):
+        times = interruptible(lambda: step_times(dict(zip(ready.names, ready.built, strict=True))))
     with stage(console, "statistics and page"):
         results = load(folder)
         comparison = read_comparison(folder, results, ready)
@@ -73,20 +124,26 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
         files = _write_scenarios(ready, comparison, folder / "scenarios")
         for style, name in _TABLES.items():
             (folder / name).write_text(comparison.table(style), encoding="utf-8")
-        (folder / "comparison.json").write_text(to_json(found.data(), indent=1) + "\n", encoding="utf-8")
-        page, failures = write_comparison(comparison, results, ready.subject, folder, pdf, replays)
+        tuned = {} if ready.budgets is None else {"budgets": ready.budgets.data()}
+        (folder / "comparison.json").write_text(to_json(found.data() | tuned, indent=1) + "\n", encoding="utf-8")
+        written = {name: one._asdict() for name, one in times.items()}  # apart: they differ from run to run
+        (folder / _TIMES).write_text(to_json(written, indent=1) + "\n", encoding="utf-8")
+        page, failures = write_comparison(
+            comparison, results, ready.subject, folder, pdf, replays, times, ready.budgets
+        )
     warn_of([*missing, *failures])
-    rows = medians(found)
+    rows = medians(found, times)
     table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:
         table.add_row(*row)
     console.print(table)
-    for sentence in (NOTE, *sentences(found)):
+    said = [] if ready.budgets is None else budget_sentences(ready.budgets)
+    for sentence in (NOTE, HOW_LONG, *sentences(found), *said):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     for name, note in found.tuning.items():
         console.print(f"{name}: {note}.", markup=False, highlight=False, soft_wrap=True)
     for name, note in zip(ready.names, ready.notes, strict=True):
-        if not note.tuned and name in files:
+        if not note.tuned and name in files and ready.budgets is None:
             said = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
             console.print(said, markup=False, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
@@ -102,7 +159,7 @@ def _write_scenarios(ready: PreparedComparison, comparison: Comparison, folder: 
     folder.mkdir()
     files, part_cache = {}, PartCache()
     for i, (name, first) in enumerate(zip(ready.names, ready.built, strict=True)):
-        file = folder / f"{i + 1}-{re.sub(r'[^a-zA-Z0-9_-]+', '-', name).strip('-')}.yaml"
+        file = folder / f"{file_stem(i, name)}.yaml"
         files[name] = file
         file.write_text(
             trial_text(first, f"{name}, in one trial: {comparison.findings.tuning[name]}."), encoding="utf-8"

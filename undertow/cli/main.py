@@ -170,7 +170,8 @@ def tune(
         str,
         typer.Option(
             metavar="METHOD",
-            help="gradient (quasi-Newton), or search (differential evolution, for costs that are not smooth).",
+            help="gradient (quasi-Newton); search (differential evolution, for costs that are not smooth); or "
+            "evolution (mutation and selection around the best gains, for few evaluations).",
         ),
     ] = "gradient",
     budget: Annotated[
@@ -324,16 +325,25 @@ def compare(
     allow_code: AllowCode = False,
     pdf: Pdf = None,
     replay: Replay = False,
+    tune: Annotated[
+        int | None,
+        typer.Option(
+            metavar="EVALUATIONS",
+            help="Tune the gains of every controller first, with this number of evaluations for each, at least 12. The "
+            "trials then have held-out seeds, parameter sets and wave heights.",
+        ),
+    ] = None,
 ) -> int:
     """Compare controllers on one scenario, or several scenarios, on the same seeds.
 
     The command runs all of them on the same samples and seeds. It reports the medians, the paired differences with
-    confidence intervals and a rank test, and the failures. It writes comparison.html, .json, .csv, .tex and .md,
-    figures/, trials.zarr, and scenarios/ with the scenario of each controller.
+    confidence intervals and a rank test, the Pareto fronts of error against effort, the computing time of a step, and
+    the failures. It writes comparison.html, .json, .csv, .tex and .md, step_times.json, figures/, trials.zarr, and
+    scenarios/ with the scenario of each controller.
     """
     from undertow.cli.compare import compare
 
-    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay)
+    return compare(scenarios, controllers, trials, out, resume, workers, overwrite, allow_code, pdf, replay, tune)
 
 
 for command in (*outside_commands.ALL, soak):

@@ -46,7 +46,9 @@ def worker_count(workers: int | None) -> int:
 
 
 @contextlib.contextmanager
-def trials_folder(out: Path | None, name: str, written: Sequence[str], resume: bool, overwrite: bool) -> Iterator[Path]:
+def trials_folder(
+    out: Path | None, name: str, written: Sequence[str], resume: bool, overwrite: bool, before: str = STORE
+) -> Iterator[Path]:
     """The folder of a campaign, locked while it runs: `out`, or a free folder of that name under runs/.
 
     Args:
@@ -55,6 +57,7 @@ def trials_folder(out: Path | None, name: str, written: Sequence[str], resume: b
         written: the files and folders that the command writes.
         resume: whether the campaign in the folder is continued.
         overwrite: whether it is replaced.
+        before: what the command writes before the trials, from which it is resumed too.
 
     Raises:
         BadInput: the folder cannot be used.
@@ -66,8 +69,9 @@ def trials_folder(out: Path | None, name: str, written: Sequence[str], resume: b
             raise BadInput("--resume", "be without --overwrite", "given together with it", hint=hint)
         if not resume:
             hint = "Add --resume to continue it, or --overwrite to replace it"
-            results_folder.check_folder(folder, written, STORE, overwrite, hint)
-        elif not (folder / STORE).exists():
+            marker = STORE if (folder / STORE).exists() else before
+            results_folder.check_folder(folder, written, marker, overwrite, hint)
+        elif not any((folder / one).exists() for one in (STORE, before)):
             hint = "Leave --resume out to start one"
             raise BadInput("--resume", "find a campaign to continue", f"none in {folder}", hint=hint)
         yield folder

@@ -1,5 +1,6 @@
 """Candidates of a comparison: controllers by name, file or options, and whole scenarios."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -158,6 +159,11 @@ def _named(entry: str) -> dict[str, Any]:
 def label(part: Mapping[str, Any]) -> str:
     """Short name of a controller: its preset, its function or its kind."""
     return str(part.get("preset") or part["kind"].rpartition(":")[2])
+
+
+def file_stem(number: int, name: str) -> str:
+    """Name of the files of a candidate: its number, from 0, and its name in letters of every file system."""
+    return f"{number + 1}-{re.sub(r'[^a-zA-Z0-9_-]+', '-', name).strip('-')}"
 
 
 def _unique(found: Sequence[Candidate]) -> list[Candidate]:

@@ -96,6 +96,7 @@ def compare(
     controllers: Sequence[str] | Mapping[str, Any] | None = None,
     trials: int | None = None,
     *,
+    tune: int | None = None,
     workers: int | None = None,
     allow_code: bool = False,
 ) -> Comparison:
@@ -108,6 +109,7 @@ def compare(
         controllers: such as `["robust", "pid", "./mine.py:smc", "runs/heavy-tuned/tuned.yaml"]`, or name -> entry,
             where an entry may also be a mapping such as `{"kind": "pid", "frequency": 2}`.
         trials: samples for each; None for 20, or the number of the campaign file. One where nothing is random.
+        tune: evaluations with which the gains of every controller are tuned first; None to compare them as they are.
         workers: number of threads; None for all cores.
         allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
@@ -117,6 +119,7 @@ def compare(
     from undertow.campaign.executors import chosen
     from undertow.campaign.run_campaign import run_campaign
     from undertow.campaign.store_results import load
+    from undertow.comparison.equal_budgets import equal_budgets
     from undertow.comparison.prepare import prepare_comparison
 
     given: Any = scenario
@@ -124,7 +127,11 @@ def compare(
         given = [Path(scenario)]
     elif not isinstance(scenario, Mapping):
         given = list(map(Path, scenario))
-    ready = prepare_comparison(given, controllers, trials, allow_code)
+    with tempfile.TemporaryDirectory() as kept:
+        tuner = None
+        if tune is not None:
+            tuner = lambda candidates, base: equal_budgets(candidates, base, tune, Path(kept))
+        ready = prepare_comparison(given, controllers, trials, allow_code, tuner)
     for sentence in ready.advice:
         warnings.warn(sentence, stacklevel=2)
     with tempfile.TemporaryDirectory() as folder, chosen(None, workers or os.cpu_count() or 1) as executor:

@@ -12,6 +12,7 @@ from undertow.campaign.campaign_summary import median_interval
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.campaign.store_layout import SAMPLES
 from undertow.comparison.paired import FEWEST, Completion, Difference, completions, differences
+from undertow.comparison.pareto import Front, fronts
 from undertow.core.status import Status
 
 COMPLETED = Status.OK.word
@@ -49,6 +50,7 @@ class Findings(NamedTuple):
         successes: candidate -> trials within the scenario's criterion of success, and trials that were judged.
         tuning: candidate -> how its gains came about.
         differing: of scenarios that are compared as a whole: key -> the value in each.
+        fronts: Pareto fronts of medians of an error against medians of an effort.
     """
 
     dimension: str
@@ -64,6 +66,7 @@ class Findings(NamedTuple):
     successes: dict[str, tuple[int, int]]
     tuning: dict[str, str]
     differing: dict[str, list[str]]
+    fronts: tuple[Front, ...]
 
     def completed(self, name: str) -> int:
         """Number of completed trials of a candidate."""
@@ -85,6 +88,7 @@ class Findings(NamedTuple):
         }
         plain["differences"] = [one._asdict() | {"established": one.established} for one in self.differences]
         plain["completions"] = [one._asdict() for one in self.completions]
+        plain["fronts"] = [one.data() for one in self.fronts]
         return plain
 
 
@@ -104,13 +108,15 @@ def find(
     if all_equal:  # many copies of one trial prove no more than that trial
         values = {metric: {name: one[:1] for name, one in each.items()} for metric, each in values.items()}
     ended = {name: one["ended"].values[~lasted[name]] for name, one in rows.items()}
+    medians = {metric: {name: _median(one) for name, one in each.items()} for metric, each in values.items()}
+    plain = {metric: {name: one.value for name, one in each.items()} for metric, each in medians.items()}
     return Findings(
         dimension=dimension,
         names=names,
         trials=dataset.sizes[SAMPLES],
         all_equal=all_equal,
         units={metric: dataset[metric].attrs["units"].removesuffix("1") for metric in metrics},
-        medians={metric: {name: _median(one) for name, one in each.items()} for metric, each in values.items()},
+        medians=medians,
         differences=tuple(differences({metric: each for metric, each in values.items() if _finite(each)})),
         completions=tuple(completions(lasted)) if not all_equal else (),
         endings={name: _counts(one["status"].values, ENDINGS) for name, one in rows.items()},
@@ -118,6 +124,7 @@ def find(
         successes={name: _successes(one["success"].values) for name, one in rows.items()},
         tuning=dict(tuning),
         differing=dict(differing),
+        fronts=fronts(plain, {name: bool(each.all()) for name, each in lasted.items()}),
     )
 
 

@@ -1,6 +1,6 @@
 """The campaign of a comparison: one axis with the candidates, the same samples and seeds for each."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,9 @@ from undertow.campaign import task as tasks
 from undertow.campaign.campaign_schema import Campaign, validate
 from undertow.campaign.prepare import Prepared, prepare_campaign
 from undertow.campaign.trials import trials as trials_of
-from undertow.comparison.candidates import controllers, scenarios
+from undertow.comparison.candidates import Candidate, controllers, scenarios
+from undertow.comparison.equal_budgets import EqualBudgets
+from undertow.comparison.held_out import held_out
 from undertow.comparison.tuning_note import TuningNote, tuning_note
 from undertow.core.errors import BadInput
 from undertow.numerics.random_keys import key_of_seed
@@ -41,6 +43,7 @@ class PreparedComparison(NamedTuple):
         notes: how the gains of each came about.
         differing: of scenarios that are compared as a whole: key -> the value in each.
         advice: warnings about the comparison or its first trials.
+        budgets: tuning of the controllers with equal budgets; None without.
     """
 
     prepared: Prepared
@@ -50,6 +53,7 @@ class PreparedComparison(NamedTuple):
     notes: tuple[TuningNote, ...]
     differing: dict[str, list[str]]
     advice: tuple[str, ...]
+    budgets: EqualBudgets | None = None
 
     @property
     def subject(self) -> str:
@@ -70,6 +74,10 @@ class _Asked(NamedTuple):
     dimension: str
     sources: list[Path | None]  # scenario files that the gains of the candidates come from
     differing: dict[str, list[str]]
+    budgets: EqualBudgets | None = None
+
+
+Tuner = Callable[[Sequence[Candidate], Text], tuple[list[Candidate], EqualBudgets]]
 
 
 def prepare_comparison(
@@ -77,6 +85,7 @@ def prepare_comparison(
     entries: Sequence[str] | Mapping[str, Any] | None = None,
     trials: int | None = None,
     allow_code: bool = False,
+    tuner: Tuner | None = None,
 ) -> PreparedComparison:
     """A comparison of controllers on one scenario, of several scenarios, or of what a campaign file sweeps.
 
@@ -85,11 +94,12 @@ def prepare_comparison(
         entries: controllers, see `controllers`; None for several scenarios, or for a campaign with one axis.
         trials: number of samples; None for that of the campaign file, else 20. One where nothing is random.
         allow_code: whether the code that an earlier run.nc names may run.
+        tuner: tunes controllers for a scenario, see `equal_budgets`; None to compare them as they are.
 
     Raises:
         BadInput: anything wrong with the scenarios, the controllers or the number of trials.
     """
-    asked = _asked(given, entries, allow_code)
+    asked = _asked(given, entries, allow_code, tuner)
     source = asked.text._replace(data=asked.text.data | ({} if trials is None else {"trials": trials}))
     campaign = validate(source)
     prepared, advice = _prepared(campaign, source, allow_code)
@@ -99,11 +109,16 @@ def prepare_comparison(
     names, built = tuple(next(iter(campaign.axes.values()))), _firsts(prepared)
     pairs = enumerate(zip(built, asked.sources, strict=True))
     notes = tuple(_note(prepared, number, one, file) for number, (one, file) in pairs)
-    advice = (*prepared.advice, *advice, *_fair(names, notes))
-    return PreparedComparison(prepared, asked.dimension, names, built, notes, asked.differing, advice)
+    if asked.budgets is not None:
+        notes = tuple(TuningNote(law.sentence, not law.untuned) for law in asked.budgets.laws)
+    advice = (*prepared.advice, *advice, *(_fair(names, notes) if asked.budgets is None else ()))
+    return PreparedComparison(prepared, asked.dimension, names, built, notes, asked.differing, advice, asked.budgets)
 
 
-def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: bool) -> _Asked:
+def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: bool, tuner: Tuner | None) -> _Asked:
+    budgets = None
+    if tuner is not None and entries is None:
+        raise BadInput("--tune", "be given with --controllers, whose gains are tuned", "given without")
     differing: dict[str, list[str]] = {}
     dimension, path = "controller", None
     if not isinstance(given, Mapping) and len(given) > 1:
@@ -126,13 +141,17 @@ def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: 
         if entries is None:
             hint = "For example: --controllers robust,pid; or a second scenario file"
             raise BadInput("--controllers", "name what is compared", "not given", hint=hint)
-        found = controllers(entries, _scenario_of(text, allow_code), path)
+        base = _scenario_of(text, allow_code)
+        found = controllers(entries, base, path)
+        if tuner is not None:
+            found, budgets = tuner(found, base)
+            text, found = held_out(text, base, found, budgets)
     if "scenario" not in text.data:
         lines = {("scenario", *place): line for place, line in text.lines.items()}
         text = text._replace(data={"scenario": text.data}, lines=lines)
     variants = {"variants": {one.name: one.changes for one in found}}
     text = text._replace(data={"trials": TRIALS} | text.data | variants | {"requirements": {}})
-    return _Asked(text, dimension, [one.source for one in found], differing)
+    return _Asked(text, dimension, [one.source for one in found], differing, budgets)
 
 
 def _of_file(text: Text) -> _Asked:

@@ -5,6 +5,7 @@ import math
 from undertow.analysis.metrics import for_people
 from undertow.comparison.findings import COMPLETED, Findings
 from undertow.comparison.paired import FEWEST, LEVEL, Completion, Difference
+from undertow.comparison.pareto import Front
 
 HOW = (
     "A difference counts as established where the two-sided Wilcoxon signed-rank test is below 5 % with Holm's "
@@ -15,10 +16,10 @@ HOW = (
 
 
 def sentences(found: Findings) -> list[str]:
-    """Sentences on failures, then one for every two candidates."""
+    """Sentences on failures, one for every two candidates, then the Pareto fronts."""
     failures = [sentence for name in found.names if (sentence := failed(found, name))]
     alone = [_alone(one) for one in found.completions if one.only_candidate or one.only_baseline]
-    return [*failures, *alone, *(_between(found, *pair) for pair in found.pairs())]
+    return [*failures, *alone, *(_between(found, *pair) for pair in found.pairs()), *map(_front, found.fronts)]
 
 
 def failed(found: Findings, name: str) -> str:
@@ -39,6 +40,16 @@ def _alone(one: Completion) -> str:
         f"{one.only_baseline} that {one.candidate} did not; this difference {verb} (McNemar's exact test, "
         f"p = {one.p_holm:.2g})."
     )
+
+
+def _front(one: Front) -> str:
+    others = [name for name in one.points if name not in one.front and name not in one.incomplete]
+    said = (
+        f"Pareto front of {metric_name(one.error)} against {metric_name(one.effort)}: {', '.join(one.front) or 'none'}"
+    )
+    said += f"; dominated: {', '.join(others)}" if others else ""
+    missing = f"; not judged because trials failed: {', '.join(one.incomplete)}" if one.incomplete else ""
+    return f"{said}{missing}."
 
 
 def metric_name(metric: str) -> str:

@@ -4,18 +4,20 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite, titled_name
 from undertow.comparison.findings import Findings, Median
 from undertow.comparison.paired import Difference
 from undertow.comparison.sentences import digits, relative
+from undertow.comparison.step_time import StepTime
 
 NOTE = (
     "Median over completed trials [95 % interval of the median]; metrics of the steady window. "
     "* marks an established difference from the first column (Wilcoxon signed-rank test with Holm's correction)."
 )
+STEP = "computing time per step (\u00b5s)"
 _NOTHING = "-"
 
 
@@ -26,8 +28,13 @@ class Rows(NamedTuple):
     rows: list[tuple[str, ...]]
 
 
-def medians(found: Findings) -> Rows:
-    """Metrics by candidate, below the number of completed trials."""
+def medians(found: Findings, times: Mapping[str, StepTime] | None = None) -> Rows:
+    """Metrics by candidate, below the number of completed trials.
+
+    Args:
+        found: what a comparison found.
+        times: computing time of a step of each law, for a last row; None where it was not measured.
+    """
     first = found.names[0]
     rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
     if any(judged for _, judged in found.successes.values()):
@@ -37,7 +44,16 @@ def medians(found: Findings) -> Rows:
         marked = {one.candidate for one in found.differences if one.baseline == first and _is(one, metric)}
         cells = (f"{median(by_name[name], found.units[metric])}{'*' * (name in marked)}" for name in found.names)
         rows.append((titled(found, metric), *cells))
+    if times:
+        rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
     return Rows(("metric", *found.names), rows)
+
+
+def _time(one: StepTime | None) -> str:
+    """A time in microseconds, marked where the step could not be compiled by the batch compiler."""
+    if one is None:
+        return _NOTHING
+    return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
 
 
 def paired(found: Findings) -> Rows:

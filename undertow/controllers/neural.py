@@ -55,7 +55,7 @@ class Neural(AbstractAccelerationLaw):
     actuation: Actuation
     start: Float[Array, "inputs hidden"]  # V at the start
     slope: Float[Param, "..."] = param("1/s", "pole of the filtered error", symbol="Lambda", range=(0.1, 15.0))
-    feedback: Float[Param, "..."] = param("1/s", "feedback of the filtered error", symbol="K_v", range=(0.1, 30.0))
+    gain: Float[Param, "..."] = param("1/s", "gain of the filtered error", symbol="K_v", range=(0.1, 30.0))
     adaptation: Float[Param, "..."] = param(
         "1/s^2", "adaptation gain of the output layer", symbol="F", range=(1e-3, 30.0)
     )
@@ -65,11 +65,11 @@ class Neural(AbstractAccelerationLaw):
     weights_bound: Float[Param, ""] = param("", "bound of the size of the ideal weights", symbol="Z_M")
 
     def __check_init__(self):
-        for name in ("slope", "feedback"):
+        for name in ("slope", "gain"):
             checks.positive(name, getattr(self, name), "1/s")
         for name in ("adaptation", "hidden_adaptation", "e_modification", "robust_gain", "weights_bound"):
             checks.not_negative(name, getattr(self, name))
-        for name in ("slope", "feedback", "adaptation"):
+        for name in ("slope", "gain", "adaptation"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
     def begin(self, y: Measurement, r: Target) -> Weights:
@@ -79,7 +79,7 @@ class Neural(AbstractAccelerationLaw):
         seen = self._seen(own, y, off)
         learnt = own.output[0] + matvec(own.output[1:].T, seen.layer)
         robust = self.robust_gain * (seen.size + self.weights_bound) * seen.filtered
-        demanded = off.acceleration + self.slope * off.rate + self.feedback * seen.filtered + learnt + robust
+        demanded = off.acceleration + self.slope * off.rate + self.gain * seen.filtered + learnt + robust
         return demanded, {"estimate": -learnt, "robust_term": robust, "weights_size": seen.size}
 
     def adapt(self, own: Weights, y: Measurement, off: TrackingError, given: Given, dt) -> Weights:
@@ -117,7 +117,7 @@ def neural(
     hidden: int = 8,
     seed: int = 0,
     slope=None,
-    feedback=None,
+    gain=None,
     adaptation=None,
     hidden_adaptation=1.0,
     e_modification=0.1,
@@ -146,7 +146,7 @@ def neural(
         hidden: neurons of the hidden layer.
         seed: of the hidden weights at the start, uniform within 0.5 over the root of the number of inputs.
         slope: Lambda, pole of the filtered error, 1/s; one number or one per axis. None: the frequency of `pid`.
-        feedback: K_v, feedback of the filtered error, 1/s; None: the frequency of `pid`.
+        gain: K_v, gain of the filtered error, 1/s; None: the frequency of `pid`.
         adaptation: F, adaptation gain of the output layer, 1/s^2; None: a quarter of K_v Lambda over hidden / 4 + 1,
             so that the bias and the neurons together act on a constant load as an integral gain of that quarter.
         hidden_adaptation: G, adaptation gain of the hidden layer.
@@ -166,13 +166,13 @@ def neural(
     if hidden < 1:
         raise BadInput("hidden", "be at least 1", hidden)
     model = model.in_body_axes()
-    if slope is None or feedback is None:
+    if slope is None or gain is None:
         axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
         w = alike([pid_frequency(axis) for axis in axes])
-        slope, feedback = w if slope is None else slope, w if feedback is None else feedback
-    for name, value in (("slope", slope), ("feedback", feedback)):
+        slope, gain = w if slope is None else slope, w if gain is None else gain
+    for name, value in (("slope", slope), ("gain", gain)):
         checks.positive(name, value, "1/s")
-    stiffness = jnp.asarray(slope, dtype=float) * jnp.asarray(feedback, dtype=float)
+    stiffness = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
     still = jnp.zeros(len(model.coordinates.angles))
     resting = model.coordinates.measurement(still, still)
     count = eqx.filter_eval_shape(_inputs, model, resting, TrackingError(still, still, still)).shape[0]
@@ -190,7 +190,7 @@ def neural(
         ),
         start=jnp.asarray(np.random.default_rng(seed).uniform(-spread, spread, (count, hidden))),
         slope=slope,
-        feedback=feedback,
+        gain=gain,
         adaptation=stiffness / (hidden + 4) if adaptation is None else adaptation,
         hidden_adaptation=hidden_adaptation,
         e_modification=e_modification,

@@ -7,9 +7,12 @@ from pathlib import Path
 import xarray as xr
 
 from undertow.campaign.store_results import Results
+from undertow.comparison.budget_tables import budget_rows, budget_sentences
 from undertow.comparison.comparison import Comparison
+from undertow.comparison.equal_budgets import EqualBudgets
 from undertow.comparison.findings import Findings
 from undertow.comparison.sentences import HOW, sentences
+from undertow.comparison.step_time import HOW_LONG, StepTime
 from undertow.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import alike, comparison_plots
@@ -23,6 +26,9 @@ _CAPTIONS = {
     "differences": "Each point is one trial: the metric of a {one} less that of the first {one}, with the same sample "
     "and seed. The diamond is the median, the bar its 95 % bootstrap interval. Left of zero the {one} has the smaller "
     "value.",
+    "pareto": "Medians over the completed trials with their 95 % intervals. A {one} is on the front (bold, joined by a "
+    "line) if no other one is at least as good in both and better in one; the others are pale. A hollow point is a "
+    "{one} that did not complete every trial, and is not judged.",
     "histories": "Tracking error per axis: the root of its mean square over the axes, whose rms over the steady window "
     "is the metric of the table. Lines end where a run failed. The area holds 5 % to 95 % of the trials that were "
     "running at that time.",
@@ -48,6 +54,8 @@ def write_comparison(
     folder: Path,
     pdf: str | None = None,
     replays: Sequence[Replay] = (),
+    times: Mapping[str, StepTime] | None = None,
+    budgets: EqualBudgets | None = None,
 ) -> tuple[Path, list[str]]:
     """Write `comparison.html`, and every figure into `figures/`; return a sentence for each figure that failed.
 
@@ -58,6 +66,8 @@ def write_comparison(
         folder: of the page.
         pdf: width of PDF files; None for none.
         replays: of one trial of the controllers; none for a page without a replay.
+        times: computing time of a step of each law; None where it was not measured.
+        budgets: tuning of the controllers with equal budgets; None without.
 
     Raises:
         OSError: the folder cannot be written.
@@ -78,12 +88,12 @@ def write_comparison(
         tag("h1", prose(title)),
         tag("p", prose(_lead(found, subject)), class_="lead"),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
-        _rows(medians(found)),
-        tag("p", prose(NOTE), class_="small"),
+        _rows(medians(found, times)),
+        tag("p", prose(f"{NOTE}{f' {HOW_LONG}' if times else ''}"), class_="small"),
         bullets([prose(sentence) for sentence in sentences(found)]),
         *([_differing(found)] if found.differing else []),
         *([replay_section(replays, _replayed(replays, found))] if replays else []),
-        section("tuning", "Tuning", tag("p", prose(_FAIR.format(one=one))), _tuning(one, found.tuning)),
+        section("tuning", "Tuning", *_how_tuned(one, found, budgets)),
         section("figures", "Figures", *figures),
         section("endings", "Status of the trials", _endings(found)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
@@ -130,6 +140,17 @@ def _differing(found: Findings) -> Html:
     """What differs between scenarios."""
     rows = [(prose(f"`{key}`"), *values) for key, values in found.differing.items()]
     return section("scenarios", "What differs", table(("key", *found.names), rows, wide=len(found.names) > 2))
+
+
+def _how_tuned(one: str, found: Findings, budgets: EqualBudgets | None) -> list[Html]:
+    if budgets is None:
+        return [tag("p", prose(_FAIR.format(one=one))), _tuning(one, found.tuning)]
+    rows = budget_rows(budgets)
+    return [
+        *(tag("p", prose(sentence)) for sentence in budget_sentences(budgets)),
+        _rows(rows),
+        _tuning(one, found.tuning),
+    ]
 
 
 def _tuning(one: str, tuning: Mapping[str, str]) -> Html:

@@ -4,6 +4,8 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -46,10 +48,19 @@ class Problem(NamedTuple):
         listed = {name: np.asarray(value) for name, value in self.options(point).items()}
         return {name: _rounded(value).tolist() for name, value in listed.items()}
 
+    def gains(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Options as a scenario has them: None for those that are equivalent to one of them."""
+        return _left_out(_law_of(self.built), options) | dict(options)
+
     def scenario(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """The resolved scenario with these options of the controller."""
-        left_out = _left_out(_law_of(self.built), options)
-        return self.built.resolved | {"controller": self.built.resolved["controller"] | left_out | dict(options)}
+        return self.built.resolved | {"controller": self.built.resolved["controller"] | self.gains(options)}
+
+
+def is_tunable(built: Built) -> bool:
+    """Whether there are gains to tune: those of the section `tune`, or those that the controller has itself."""
+    scenario = built.scenario
+    return bool(scenario.tune.parameters or _law_of(built.of_the_law()).ranges(scenario.loop.dt))
 
 
 def problem(text: Text) -> Problem:
@@ -83,8 +94,14 @@ def _problem(text: Text, built: Built) -> Problem:
     law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
     begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
     found = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
-    with within("controller"):
-        found.law(found.options(found.start))
+    try:
+        with within("controller"):
+            found.law(found.options(found.start))
+            jax.eval_shape(lambda point: eqx.filter(law(found.options(point)), eqx.is_array), found.start)
+    except TypeError as error:
+        must = "be options that the controller takes as arrays of JAX, one number for each axis"
+        hint = "Compute with jax.numpy, without float() and without `if` on a gain"
+        raise BadInput("tune.parameters", must, str(error).partition("\n")[0], hint=hint) from None
     return found
 
 

@@ -1,4 +1,6 @@
-"""Search methods: gradient descent in a box, several step lengths per batch; differential evolution (SciPy)."""
+"""Search methods: gradient descent in a box, several step lengths per batch; mutation and selection; differential
+evolution (SciPy).
+"""
 
 from typing import Protocol
 
@@ -93,6 +95,35 @@ def _updated(inverse: np.ndarray | None, moved: np.ndarray, change: np.ndarray) 
         inverse = identity * along / float(change @ change)
     left = identity - np.outer(moved, change) / along
     return left @ inverse @ left.T + np.outer(moved, moved) / along
+
+
+_GROWTH, _SHRINKAGE = 1.5, 0.6  # of the spread after a success and after a failure
+
+
+def evolve(objective: Searched, start: np.ndarray, cost: float, iterations: int, seed: int) -> None:
+    """From a certified point to a minimum by mutation and selection, without gradients; the objective keeps the best.
+
+    Rechenberg (1973): the best of six mutations of a point replaces it where it is better; the spread of the mutations
+    grows after a success and shrinks after a failure, until it is too small to matter.
+
+    Args:
+        objective: gives the costs.
+        start: shape (k,).
+        cost: at the start.
+        iterations: at most.
+        seed: seed of all random numbers.
+    """
+    x, spread, chance = start, _FIRST, np.random.default_rng(seed)
+    for _ in range(iterations):
+        points = np.clip(x + spread * chance.normal(size=(AT_ONCE, len(x))), 0.0, 1.0)
+        costs = objective.costs(points)
+        best = int(np.argmin(costs))
+        if costs[best] < cost:
+            x, cost, spread = points[best], float(costs[best]), min(_GROWTH * spread, _LARGEST)
+        else:
+            spread *= _SHRINKAGE
+        if spread < _NEAREST:
+            return
 
 
 _HOPELESS = 1e6  # cost of a point without a certificate

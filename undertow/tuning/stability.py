@@ -83,7 +83,11 @@ def _plant(trials: Trials, number: int) -> Any:
     return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)
 
 
-def no_certificate(given: Certificate, tried: Mapping[str, Certificate], points: int) -> BadInput:
+class NoCertificate(BadInput):
+    """None of the tried points is certified."""
+
+
+def no_certificate(given: Certificate, tried: Mapping[str, Certificate], points: int) -> NoCertificate:
     """The error where none of the tried points is certified, with the point that came nearest.
 
     Args:
@@ -104,7 +108,7 @@ def no_certificate(given: Certificate, tried: Mapping[str, Certificate], points:
         remedies += ["use another nominal model", f"leave variant {variant}{often} out of tune.train.sets"]
     must, got = "allow gains for which the loop is stable", f"ranges in which none of {points} points is certified"
     hint = f"{', '.join(says)}. {', or '.join(remedies)}"
-    return BadInput("tune.parameters", must, got, hint=hint)
+    return NoCertificate("tune.parameters", must, got, hint=hint)
 
 
 def _on(found: Certificate) -> str:

@@ -1,5 +1,6 @@
 """Tune the controller of a scenario: certified gains, and their evaluation on held-out runs."""
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,15 +18,15 @@ from undertow.tuning.cost import Shares
 from undertow.tuning.evaluator import AT_ONCE, Evaluation
 from undertow.tuning.objective import Objective, Step, Watch
 from undertow.tuning.problem import Problem, problem
-from undertow.tuning.search import descend, search, spread_points
+from undertow.tuning.search import descend, evolve, search, spread_points
 from undertow.tuning.stability import Certificate, Certifier, no_certificate
 
-METHODS = ("gradient", "search")
+METHODS = ("gradient", "search", "evolution")
 
 # Share of the budget for the search; the rest is for the final evaluation.
 _FOR_THE_SEARCH = 0.85
 
-_INITIAL_DESIGN = 2 * AT_ONCE  # points that are evaluated before the search, including the given gains
+INITIAL_DESIGN = 2 * AT_ONCE  # points that are evaluated before the search, including the given gains
 
 
 class Evaluated(NamedTuple):
@@ -50,7 +51,7 @@ class Tuned(NamedTuple):
     evaluations: int
     rejected: int  # points that would have been better, but have no certificate
     elapsed: float  # s
-    finished: bool  # whether the search converged within the budget
+    finished: bool  # whether the search converged within the time, or used up the evaluations
     searched: int  # points that were evaluated after the initial design
 
     @property
@@ -66,6 +67,7 @@ def tune(
     *,
     method: str = "gradient",
     budget: float = 240.0,
+    evaluations: int | None = None,
     resume: bool = False,
     say: Callable[[str], None] = lambda stage: None,
     watch: Watch = lambda best, evaluations: None,
@@ -75,19 +77,30 @@ def tune(
     Args:
         text: the scenario.
         checkpoint: file from which an interrupted tuning is resumed.
-        method: `gradient`, gradient descent by forward differentiation, or `search`, differential evolution.
+        method: `gradient`, gradient descent by forward differentiation; `search`, differential evolution; or
+            `evolution`, mutation and selection around the best point, for few evaluations.
         budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
+        evaluations: budget in evaluations of gains instead, at least those of the initial design, so that the result
+            does not depend on the speed of the machine. All of them are used: where the method has converged,
+            `evolution` goes on from the best point. A gradient counts as one for each parameter.
         resume: whether to resume from the checkpoint.
         say: called with the current stage.
         watch: called with the best so far after every batch.
 
     Raises:
         BadInput: the scenario, or the checkpoint to resume, is invalid.
+        NoCertificate: no point of the initial design has a certificate.
     """
+    if evaluations is not None:
+        if evaluations < INITIAL_DESIGN:
+            raise BadInput("evaluations", f"be at least {INITIAL_DESIGN}, the initial design", evaluations)
+        budget = math.inf
     begun = time.perf_counter()
     say("building")
     task = problem(text)
-    about = text_hash(dump({"method": method, "tune": task.built.scenario.tune.model_dump(), **task.built.resolved}))
+    counted = {} if evaluations is None else {"evaluations": evaluations}
+    asked = {"method": method, "tune": task.built.scenario.tune.model_dump(), **counted}
+    about = text_hash(dump({**asked, **task.built.resolved}))
     notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
     first, evaluation = _programs(task)
     if method == "gradient" and not notes.is_over:
@@ -101,25 +114,30 @@ def tune(
         tried[words] = certifier(evaluation.law(point))
         return tried[words]
 
-    objective = Objective(evaluation, certify, notes, watch)
+    objective = Objective(evaluation, certify, notes, watch, evaluations)
     say("compiling and evaluating the initial design")
     seed = task.built.scenario.seed
-    others = spread_points(_INITIAL_DESIGN - 1, len(task.parameters), seed)
+    others = spread_points(INITIAL_DESIGN - 1, len(task.parameters), seed)
     objective.costs(np.vstack([task.start, others]), must=True)  # otherwise slow compiling would leave no result
     start = objective.best
     if start is None:
         with within(location=text.location):
-            raise no_certificate(certifier(first), tried, _INITIAL_DESIGN)
+            raise no_certificate(certifier(first), tried, INITIAL_DESIGN)
     say("tuning")
     finished = True
     try:
         iterations = task.built.scenario.tune.iterations
         if method == "gradient":
             descend(objective, np.array(start.point), start.cost, iterations)
+        elif method == "evolution":
+            evolve(objective, np.array(start.point), start.cost, iterations, seed)
         else:
             search(objective, np.array(start.point), iterations, seed)
+        while evaluations is not None:  # until they are used up
+            at, seed = objective.best or start, (seed + 1) % 2**32
+            evolve(objective, np.array(at.point), at.cost, iterations, seed)
     except OutOfTime:
-        finished = False
+        finished = evaluations is not None
     say("evaluating on held-out runs")
     best = objective.best or start
     chosen = {name: task.rounded(np.array(step.point)) for name, step in (("start", start), ("tuned", best))}
@@ -135,7 +153,7 @@ def tune(
         rejected=objective.rejected,
         elapsed=notes.elapsed,
         finished=finished,
-        searched=objective.evaluations - _INITIAL_DESIGN,
+        searched=objective.evaluations - INITIAL_DESIGN,
     )
 
 

@@ -12,6 +12,7 @@ from undertow.core.status import Status
 from undertow.report.figures import style
 from undertow.report.figures.campaign import beside, distributions_figure, key_height, looks_of
 from undertow.report.figures.limits import fit_log
+from undertow.report.figures.pareto import pareto_figure
 from undertow.report.figures.paths import PLANE, plan_figure
 
 _COLUMNS = 3
@@ -23,6 +24,8 @@ def comparison_plots(dataset: xr.Dataset, found: Findings) -> dict[str, Callable
     plots: dict[str, Callable[[], Figure]] = {}
     if _differing(dataset, found):
         plots["differences"] = lambda: differences_figure(dataset, found)
+    if found.fronts:
+        plots["pareto"] = lambda: pareto_figure(found)
     if "series:error" in dataset:
         plots["histories"] = lambda: histories_figure(dataset, found)
         if set(PLANE) <= set(map(str, dataset["axis"].values)):

@@ -1,0 +1,61 @@
+"""Figure: Pareto fronts of a comparison, error against effort, with the name of every candidate."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from undertow.analysis.metrics import for_people, titled_name
+from undertow.comparison.findings import Findings
+from undertow.comparison.pareto import Front
+from undertow.report.figures import style
+from undertow.report.figures.campaign import looks_of
+
+_COLUMNS, _PALE = 2, 0.3
+_WIDE = 30.0  # ratio of largest and smallest from which on an axis is logarithmic
+_WIDTH, _HEIGHT = 4.0, 2.4  # of a panel, in
+
+
+def pareto_figure(found: Findings) -> Figure:
+    """Medians with their 95 % intervals; dominated ones pale, those with failed trials hollow."""
+    rows = -(-len(found.fronts) // _COLUMNS)
+    figure = style.blank(9.6, 0.45 + rows * (_HEIGHT + 0.6))
+    style.head(figure, "Pareto fronts: median error against median effort", {})
+    for number, front in enumerate(found.fronts):
+        row, column = divmod(number, _COLUMNS)
+        panel = style.place(figure, 0.62 + 4.75 * column, 0.5 + row * (_HEIGHT + 0.6), _WIDTH, _HEIGHT)
+        _plot(panel, found, front)
+    return figure
+
+
+def _plot(panel: Axes, found: Findings, front: Front) -> None:
+    scales = [for_people(1.0, found.units[metric]) for metric in (front.effort, front.error)]
+    of = lambda name, metric, scale: scale * np.array(found.medians[metric][name][:3])
+    for name, look in looks_of(found.names).items():
+        if name not in front.points:
+            continue
+        (x, *across), (y, *along) = of(name, front.effort, scales[0][0]), of(name, front.error, scales[1][0])
+        strong = name in front.front
+        alpha, fill = (1.0 if strong else _PALE), ("white" if name in front.incomplete else look.colour)
+        panel.plot(across, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)
+        panel.plot([x, x], along, color=look.colour, alpha=alpha, linewidth=1.2)
+        panel.plot(x, y, "o", color=look.colour, markerfacecolor=fill, alpha=alpha, markersize=5)
+        weight = "bold" if strong else "normal"
+        panel.annotate(
+            name,
+            (x, y),
+            xytext=(4, 4),
+            textcoords="offset points",
+            fontsize=style.SMALL,
+            color=style.INK,
+            alpha=max(alpha, 0.55),
+            fontweight=weight,
+        )
+    steps = np.array([front.points[name] for name in front.front]).reshape(-1, 2)
+    panel.step(scales[0][0] * steps[:, 1], scales[1][0] * steps[:, 0], where="pre", color=style.INK, linewidth=0.7)
+    for axis, values in ((panel.set_xscale, 1), (panel.set_yscale, 0)):
+        column = np.array([point[values] for point in front.points.values()])
+        if column.min() > 0 and column.max() > _WIDE * column.min():
+            axis("log")
+    panel.margins(0.14)
+    words = lambda metric, unit: ", ".join([titled_name(metric), *([style.power(unit)] if unit else [])])
+    style.label(panel, words(front.effort, scales[0][1]), words(front.error, scales[1][1]))
