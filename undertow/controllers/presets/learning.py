@@ -24,10 +24,10 @@ def learning(
     actuator_rate=None,
     direction=1.0,
     regressor: str = "rules",
-    rules: int = 3,
-    speeds=None,
+    rules: int = 5,
+    speeds=0.5,
     horizon=300.0,
-    learning_rate=1.0,
+    learning_rate=10.0,
     memory_bound=10.0,
     knowledge: str | None = None,
 ) -> RobustRCAF:
@@ -50,7 +50,7 @@ def learning(
         direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
         regressor: `rules`, fuzzy rules of each velocity, or `linear`, v and v |v|.
         rules: fuzzy sets of each velocity, an odd number from 3.
-        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis; None: 1.
+        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which motions that are repeated are forgotten, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         memory_bound: largest weight of the memory, m/s^2 and rad/s^2.

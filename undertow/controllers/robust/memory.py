@@ -59,7 +59,7 @@ class Memory(eqx.Module):
     speeds: Float[Param, " n"] = param("m/s, rad/s", "velocities at the outermost sets")
     horizon: Float[Param, ""] = param("s", "time over which excited directions forget", symbol="tau", default=300.0)
     learning_rate: Float[Param, ""] = param(
-        "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=1.0
+        "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=10.0
     )
     bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=10.0)
     start: Float[Array, "k n"] | None = None
@@ -156,10 +156,10 @@ def memory(
     axes: int,
     *,
     regressor: str = "rules",
-    rules: int = 3,
-    speeds=None,
+    rules: int = 5,
+    speeds=0.5,
     horizon=300.0,
-    learning_rate=1.0,
+    learning_rate=10.0,
     bound=10.0,
     knowledge=None,
 ) -> Memory:
@@ -169,7 +169,7 @@ def memory(
         axes: number of axes.
         regressor: `rules`, or `linear` for v and v |v|.
         rules: sets of each velocity, an odd number from 3.
-        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis. None: 1.
+        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which what is excited forgets, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         bound: largest weight, m/s^2 and rad/s^2.
@@ -183,7 +183,7 @@ def memory(
     learnt = (None, None) if knowledge is None else load_knowledge(knowledge)
     return Memory(
         fuzzy=gaussian_sets(rules),
-        speeds=np.broadcast_to(1.0 if speeds is None else np.asarray(speeds, dtype=float), (axes,)),
+        speeds=np.broadcast_to(np.asarray(speeds, dtype=float), (axes,)),
         horizon=horizon,
         learning_rate=learning_rate,
         bound=bound,
