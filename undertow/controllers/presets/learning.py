@@ -1,10 +1,12 @@
 """Preset `learning`: the robust variant with a memory of the uncertainty along the reference."""
 
 import dataclasses
+from typing import Annotated
 
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.memory import memory
 from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core import catalogue
 from undertow.core.contracts import Model
 
 
@@ -29,7 +31,7 @@ def learning(
     horizon=300.0,
     learning_rate=10.0,
     memory_bound=10.0,
-    knowledge: str | None = None,
+    knowledge: Annotated[str | None, catalogue.FILE] = None,
 ) -> RobustRCAF:
     """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.
 

@@ -52,7 +52,7 @@ class Memory(eqx.Module):
     in the same step.
 
     Raises:
-        BadInput: a number that is not positive, or knowledge of another shape.
+        BadInput: a number that is not positive, or an unknown regressor.
     """
 
     fuzzy: FuzzySystem
@@ -71,19 +71,27 @@ class Memory(eqx.Module):
         for name in ("speeds", "horizon", "learning_rate", "bound"):
             checks.positive(name, getattr(self, name))
 
-    def init(self, axes: int, body: bool) -> MemoryState:
-        """State before the first step: `start` and `doubt`, or nothing known.
+    def check_fit(self, axes: int, body: bool) -> None:
+        """Check that this memory fits a plant.
 
         Raises:
-            BadInput: knowledge for another number of regressors or axes.
+            BadInput: velocities or knowledge for another number of axes or regressors.
         """
+        checks.length("speeds", self.speeds, axes, "axes")
+        shapes, count = (
+            tuple(None if one is None else one.shape for one in (self.start, self.doubt)),
+            self.size(axes, body),
+        )
+        if shapes not in ((None, None), ((count, axes), (count,))):
+            must = f"have {count} regressors for {axes} axes"
+            raise BadInput("knowledge", must, shapes[0], hint="Take the rules and the regressor it was learnt with")
+
+    def init(self, axes: int, body: bool) -> MemoryState:
+        """State before the first step: `start` and `doubt`, or nothing known."""
         count = self.size(axes, body)
         nothing = jnp.zeros(count)
         weights = jnp.zeros((count, axes)) if self.start is None else self.start
         doubt = jnp.ones(count) if self.doubt is None else self.doubt
-        if weights.shape != (count, axes) or doubt.shape != (count,):
-            must = f"have {count} regressors for {axes} axes"
-            raise BadInput("knowledge", must, weights.shape, hint="Was it learnt with the same sets and regressor?")
         return MemoryState(weights, jnp.diag(self.learning_rate * doubt), nothing, nothing)
 
     def size(self, axes: int, body: bool) -> int:
@@ -183,7 +191,7 @@ def memory(
     learnt = (None, None) if knowledge is None else load_knowledge(knowledge)
     return Memory(
         fuzzy=gaussian_sets(rules),
-        speeds=np.broadcast_to(np.asarray(speeds, dtype=float), (axes,)),
+        speeds=np.broadcast_to(speeds, (axes,)) if np.ndim(speeds) == 0 else speeds,
         horizon=horizon,
         learning_rate=learning_rate,
         bound=bound,

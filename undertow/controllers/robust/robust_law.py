@@ -47,7 +47,7 @@ class Plan(NamedTuple):
     robust: PerAxis  # u_r
     forces: Float[Array, " m"]  # for the desired acceleration, without limits
     phi: Float[Array, " k"] | None  # regressor of the memory
-    remembered: PerAxis | float  # m, m/s^2, rad/s^2; zero without a memory
+    remembered: PerAxis  # m, m/s^2, rad/s^2; zero without a memory
 
 
 class RobustRCAF(AbstractInformedController):
@@ -87,6 +87,8 @@ class RobustRCAF(AbstractInformedController):
         own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
         estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
         check_gains(self.feedback, self.weight, own | estimators, len(self.model.coordinates.angles))
+        if self.memory is not None:
+            self.memory.check_fit(len(self.model.coordinates.angles), bool(self.model.coordinates.axes))
 
     @property
     def fuzzy(self) -> FuzzySystem:
@@ -136,8 +138,7 @@ class RobustRCAF(AbstractInformedController):
             rest, free = plan.seen.uncertainty - plan.remembered, jnp.where(share < _WHOLE, 0.0, 1.0)
             gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
             remembered, gained = self.memory.advance(z.memory, plan.phi, rest, gains, free, dt)
-            # The basis sums to one, so that d_hat does not jump.
-            estimator = estimator._replace(weights=estimator.weights - gained[:, None])
+            estimator = self.estimator.lowered(estimator, gained)
         return RobustState(
             estimator=estimator,
             actuators=actuators.advance(plan.actuators, u_applied, dt),
@@ -178,12 +179,13 @@ class RobustRCAF(AbstractInformedController):
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        off, phi, remembered = tracking(coordinates, self.lyapunov(), y, target), None, 0.0
+        off, phi = tracking(coordinates, self.lyapunov(), y, target), None
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
-        seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))
+        velocity = coordinates.velocity(y)
+        seen, remembered = self.estimator.estimate(z.estimator, velocity), jnp.zeros_like(velocity)
         if self.memory is not None and z.memory is not None:
             at = TrackingError(off.error, off.rate, off.acceleration)
-            phi = self.memory.regressors(y, coordinates.velocity(y), at, bool(coordinates.axes))
+            phi = self.memory.regressors(y, velocity, at, bool(coordinates.axes))
             remembered = self.memory.value(z.memory, phi)
             seen = seen._replace(uncertainty=seen.uncertainty + remembered)
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
