@@ -6,10 +6,11 @@ lap to the end. In waves (JONSWAP Hs 0.25 m at 3 m depth, current 0.18 m/s) and 
 are means over seeds.
 
     python benchmarks/learning.py [--seeds 2] [--laps 4] [--motions lissajous,lawn_mower,six_axis]
-        [--models wu2018,px4] [--rates 50,100] [--seas calm,waves,navigation] [--long] [--next-dive]
+        [--models wu2018,px4] [--rates 50,100] [--seas still,waves,navigation] [--long] [--next-dive]
 
 `--long` runs the first motion for 2,000 s more and compares its last lap with the second. `--next-dive` saves what was
-learnt in three laps, loads it and reports the first lap of the next run. Both are in still water at 50 Hz.
+learnt in three laps, loads it and reports the first lap of the next run, without its first 20 s: the lissajous and the
+six-axis motion begin with a jump of the velocity, which costs every law the same. Both are in still water at 50 Hz.
 """
 
 import argparse
@@ -34,7 +35,8 @@ from undertow.scenario.reading import from_data
 
 jax.config.update("jax_enable_x64", True)
 
-PATHS = {"calm": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
+PATHS = {"still": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
+START = 20.0  # s
 SEA = [{"kind": "current", "velocity": [0.15, 0.1, 0.0]}, {"kind": "waves", "height": 0.25, "depth": 3.0}]
 LAWS = {
     "robust": {"preset": "robust"},
@@ -128,7 +130,7 @@ def compared(options) -> None:
                     base = None
                     for law, given in LAWS.items():
                         loop = loop_of(given, motion, model, rate, sea)
-                        seeds = range(1 if sea == "calm" else options.seeds)
+                        seeds = range(1 if sea == "still" else options.seeds)
                         each = [run(loop, rate, duration, 1000 + seed) for seed in seeds]
                         if not all(int(one.status) == 0 for one in each):
                             print(name, model, rate, sea, law, "did not reach its end")
@@ -149,7 +151,7 @@ def long_run(options) -> None:
     motion, lap = motions()[name]
     for model in options.models.split(","):
         for law in ("rules", "linear"):
-            loop = loop_of(LAWS[law], motion, model, 50, "calm")
+            loop = loop_of(LAWS[law], motion, model, 50, "still")
             end = np.round(2 * lap + 2000)
             found = run(loop, 50, end, 0)
             second, last = errors(found, lap, 2 * lap), errors(found, end - lap, end)
@@ -165,15 +167,15 @@ def next_dive(options) -> None:
     for name in options.motions.split(","):
         motion, lap = motions()[name]
         for model in options.models.split(","):
-            first = errors(run(loop_of(LAWS["robust"], motion, model, 50, "calm"), 50, np.round(lap), 0), 0.0, lap)
+            first = errors(run(loop_of(LAWS["robust"], motion, model, 50, "still"), 50, np.round(lap), 0), START, lap)
             for law in ("rules", "linear"):
-                loop = loop_of(LAWS[law], motion, model, 50, "calm")
+                loop = loop_of(LAWS[law], motion, model, 50, "still")
                 learnt = run(loop, 50, np.round(3 * lap), 0)
                 with tempfile.TemporaryDirectory() as folder:
                     path = Path(folder) / "learnt.npz"
                     save_knowledge(path, to_dataset(learnt, loop))
-                    again = loop_of(LAWS[law] | {"knowledge": str(path)}, motion, model, 50, "calm")
-                value = errors(run(again, 50, np.round(lap), 0), 0.0, lap)
+                    again = loop_of(LAWS[law] | {"knowledge": str(path)}, motion, model, 50, "still")
+                value = errors(run(again, 50, np.round(lap), 0), START, lap)
                 print(
                     f"{name} {model} {law}: first lap of the next dive {1e3 * value[0]:.1f} mm, "
                     f"{1e3 * value[1]:.1f} mrad; ratios to robust {value[0] / first[0]:.2f}, {value[1] / first[1]:.2f}"
@@ -187,7 +189,7 @@ if __name__ == "__main__":
     parser.add_argument("--motions", default="lissajous,lawn_mower,six_axis")
     parser.add_argument("--models", default="wu2018,px4")
     parser.add_argument("--rates", default="50,100")
-    parser.add_argument("--seas", default="calm,waves,navigation")
+    parser.add_argument("--seas", default="still,waves,navigation")
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--next-dive", action="store_true")
     chosen = parser.parse_args()

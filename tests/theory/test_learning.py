@@ -161,19 +161,19 @@ def test_knowledge_is_saved_and_the_next_run_begins_with_it(dive, tmp_path):
     loop, one = dive
     file = tmp_path / "learnt.npz"
     save_knowledge(file, to_dataset(one, loop))
-    weights, doubt = load_knowledge(file)
+    weights, variance = load_knowledge(file)
     np.testing.assert_array_equal(weights, one.signals["memory_weights"][-1])
-    np.testing.assert_array_equal(doubt, one.signals["memory_doubt"][-1])
+    np.testing.assert_array_equal(variance, one.signals["memory_variance"][-1])
     options = {"preset": "learning", "sampling_time": DT, "bandwidth": 4.0, "tracking": 2.0, "regressor": "linear"}
     again = loop_of(rcaf(loop.plant.model(), knowledge=str(file), **options))
     found = simd_batch.simulate(again, duration=60.0, dt=DT, record_every=5)
     np.testing.assert_array_equal(found.signals["memory_weights"][0], weights)
-    np.testing.assert_allclose(found.signals["memory_doubt"][0], doubt, rtol=1e-12)
+    np.testing.assert_allclose(found.signals["memory_variance"][0], variance, rtol=1e-12)
 
 
 def test_bad_options_are_refused(tmp_path):
     model, wrong = double_integrator(1).model(), tmp_path / "wrong.npz"
-    np.savez(wrong, weights=np.zeros((3, 1)), doubt=np.ones(3))
+    np.savez(wrong, weights=np.zeros((3, 1)), variance=np.ones(3))
     made = lambda **options: rcaf(model, preset="learning", **options)
     for name, value in {"rules": 4, "regressor": "cubic", "horizon": 0.0, "learning_rate": -1.0, "speeds": 0.0}.items():
         with pytest.raises(BadInput, match=name):

@@ -27,7 +27,9 @@ ATTAINED_SHARE = {"attained_share": Signal((), "1", "share of the desired accele
 MEMORY = {
     "memory": Signal(("axis",), "[axis]/s^2", "share of the estimate that the memory gives"),
     "memory_weights": Signal(("regressor", "axis"), "[axis]/s^2", "weights of the memory"),
-    "memory_doubt": Signal(("regressor",), "1", "variance of a weight over that before learning: 1 where not excited"),
+    "memory_variance": Signal(
+        ("regressor",), "1", "variance of a weight over that before learning: 1 where not excited"
+    ),
 }
 ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | ATTAINED_SHARE
 

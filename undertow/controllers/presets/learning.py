@@ -30,7 +30,7 @@ def learning(
     speeds=0.5,
     horizon=300.0,
     learning_rate=10.0,
-    memory_bound=10.0,
+    memory_bound=20.0,
     knowledge: Annotated[str | None, catalogue.FILE] = None,
 ) -> RobustRCAF:
     """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.

@@ -61,9 +61,9 @@ class Memory(eqx.Module):
     learning_rate: Float[Param, ""] = param(
         "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=10.0
     )
-    bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=10.0)
+    bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=20.0)
     start: Float[Array, "k n"] | None = None
-    doubt: Float[Array, " k"] | None = None
+    variance: Float[Array, " k"] | None = None
     regressor: str = eqx.field(static=True, default="rules")
 
     def __check_init__(self):
@@ -79,7 +79,7 @@ class Memory(eqx.Module):
         """
         checks.length("speeds", self.speeds, axes, "axes")
         shapes, count = (
-            tuple(None if one is None else one.shape for one in (self.start, self.doubt)),
+            tuple(None if one is None else one.shape for one in (self.start, self.variance)),
             self.size(axes, body),
         )
         if shapes not in ((None, None), ((count, axes), (count,))):
@@ -87,12 +87,12 @@ class Memory(eqx.Module):
             raise BadInput("knowledge", must, shapes[0], hint="Take the rules and the regressor it was learnt with")
 
     def init(self, axes: int, body: bool) -> MemoryState:
-        """State before the first step: `start` and `doubt`, or nothing known."""
+        """State before the first step: `start` and `variance`, or nothing known."""
         count = self.size(axes, body)
         nothing = jnp.zeros(count)
         weights = jnp.zeros((count, axes)) if self.start is None else self.start
-        doubt = jnp.ones(count) if self.doubt is None else self.doubt
-        return MemoryState(weights, jnp.diag(self.learning_rate * doubt), nothing, nothing)
+        variance = jnp.ones(count) if self.variance is None else self.variance
+        return MemoryState(weights, jnp.diag(self.learning_rate * variance), nothing, nothing)
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
@@ -168,7 +168,7 @@ def memory(
     speeds=0.5,
     horizon=300.0,
     learning_rate=10.0,
-    bound=10.0,
+    bound=20.0,
     knowledge=None,
 ) -> Memory:
     """A memory beside an observer.
@@ -196,7 +196,7 @@ def memory(
         learning_rate=learning_rate,
         bound=bound,
         start=learnt[0],
-        doubt=learnt[1],
+        variance=learnt[1],
         regressor=regressor,
     )
 
@@ -206,23 +206,23 @@ def save_knowledge(path, run) -> None:
 
     Args:
         path: of the file.
-        run: dataset with the signals `memory_weights` and `memory_doubt`.
+        run: dataset with the signals `memory_weights` and `memory_variance`.
     """
-    weights, doubt = (run[name].values[-1] for name in ("memory_weights", "memory_doubt"))
-    np.savez(path, weights=weights, doubt=doubt)
+    weights, variance = (run[name].values[-1] for name in ("memory_weights", "memory_variance"))
+    np.savez(path, weights=weights, variance=variance)
 
 
 def load_knowledge(path) -> tuple[Array, Array]:
-    """Weights and doubt of a file of `save_knowledge`.
+    """Weights and variance of a file of `save_knowledge`.
 
     Raises:
         BadInput: the file cannot be read, or holds something else.
     """
     try:
         with np.load(path) as held:
-            weights, doubt = np.asarray(held["weights"], dtype=float), np.asarray(held["doubt"], dtype=float)
+            weights, variance = np.asarray(held["weights"], dtype=float), np.asarray(held["variance"], dtype=float)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput("knowledge", "be a file of `save_knowledge`", str(path)) from error
     checks.finite("knowledge", weights)
-    checks.finite("knowledge", doubt)
-    return jnp.asarray(weights), jnp.asarray(doubt)
+    checks.finite("knowledge", variance)
+    return jnp.asarray(weights), jnp.asarray(variance)

@@ -122,7 +122,7 @@ class RobustRCAF(AbstractInformedController):
             signals |= {
                 "memory": plan.remembered,
                 "memory_weights": z.memory.weights,
-                "memory_doubt": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
+                "memory_variance": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
             }
         return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
 
