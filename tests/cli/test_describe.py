@@ -43,8 +43,9 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
 
 
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
-    rcaf, sound = describing.describe("rcaf")
-    assert [option.default for one in (rcaf, sound) for option in one.options[:1]] == ["paper", "robust"]
+    rcaf, sound, learning = describing.describe("rcaf")
+    presets = [option.default for one in (rcaf, sound, learning) for option in one.options[:1]]
+    assert presets == ["paper", "robust", "learning"]
     assert "bandwidth" in {option.name for option in sound.options}
     options = {option.name: option for option in rcaf.options}
     assert "model" not in options

@@ -195,7 +195,7 @@ def test_schema_completes(schema):
         for one in schema["$defs"]["controllers"]["allOf"]
     }
     assert options["pid"]["integral_share"]["default"] == 0.1 and "model" not in options["pid"]
-    assert options["rcaf"]["preset"] == {"enum": ["paper", "robust"]} and "bandwidth" in options["rcaf"]
+    assert options["rcaf"]["preset"] == {"enum": ["paper", "robust", "learning"]} and "bandwidth" in options["rcaf"]
 
 
 def test_schema_is_printed(capsys, schema):

@@ -24,6 +24,13 @@ LYAPUNOV = {
     "lyapunov_decay": Signal((), "[axis]^2/s^3", "decay of the Lyapunov function by feedback, 1/2 E^T Q E"),
 }
 ATTAINED_SHARE = {"attained_share": Signal((), "1", "share of the desired acceleration that the command can give")}
+MEMORY = {
+    "memory": Signal(("axis",), "[axis]/s^2", "share of the estimate that the memory gives"),
+    "memory_weights": Signal(("regressor", "axis"), "[axis]/s^2", "weights of the memory"),
+    "memory_variance": Signal(
+        ("regressor",), "1", "variance of a weight over that before learning: 1 where not excited"
+    ),
+}
 ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | ATTAINED_SHARE
 
 

@@ -2,13 +2,18 @@
 
 from typing import Any
 
+from undertow.controllers.presets.learning import learning
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, Model
 from undertow.core.runtime import double_outside_runs
 
-PRESETS = {"paper": double_outside_runs(paper), "robust": double_outside_runs(robust)}
+PRESETS = {
+    "paper": double_outside_runs(paper),
+    "robust": double_outside_runs(robust),
+    "learning": double_outside_runs(learning),
+}
 
 
 def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractController:
@@ -16,7 +21,8 @@ def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractCont
 
     Args:
         model: nominal model, from `plant.model()`.
-        preset: `paper`, with the defaults of Table 1, or `robust`, the robust variant for real vehicles.
+        preset: `paper`, with the defaults of Table 1, `robust`, the robust variant for real vehicles, or
+            `learning`, the same with a memory.
         options: those of the preset; see `undertow.controllers.presets`.
 
     Raises:

@@ -170,19 +170,22 @@ _OBSERVED = Law(
     instead={"tracking": ("feedback",)},
 )
 
+_ROBUST = Law(
+    ranges=_robust,
+    now={
+        "bandwidth": lambda law: law.estimator.bandwidth,
+        "damping": lambda law: law.estimator.damping,
+        "tracking": lambda law: jnp.sqrt(law.feedback[..., 0]),
+        "actuator_rate": lambda law: law.actuator_rate,
+    },
+    instead={"tracking": ("feedback",), "bandwidth": ("pole", "adaptation", "composite")},
+)
+
 _LAWS = {
     ("adrc", None): _OBSERVED,
     ("indi", None): _OBSERVED,
-    ("rcaf", "robust"): Law(
-        ranges=_robust,
-        now={
-            "bandwidth": lambda law: law.estimator.bandwidth,
-            "damping": lambda law: law.estimator.damping,
-            "tracking": lambda law: jnp.sqrt(law.feedback[..., 0]),
-            "actuator_rate": lambda law: law.actuator_rate,
-        },
-        instead={"tracking": ("feedback",), "bandwidth": ("pole", "adaptation", "composite")},
-    ),
+    ("rcaf", "robust"): _ROBUST,
+    ("rcaf", "learning"): _ROBUST._replace(instead={"tracking": ("feedback",)}),
     ("rcaf", "paper"): Law(
         ranges=_paper,
         now={

@@ -94,9 +94,19 @@ class Estimator(eqx.Module):
         weights = state.weights - (moved / (seen.basis**2).sum(-1))[:, None] * seen.basis
         leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, moved.shape) * dt)[:, None]
         weights = weights - leaked * _unseen(weights, seen.basis)
-        box = jnp.broadcast_to(self.bound, moved.shape)[:, None]
         rates = state.rates + dt * (known + seen.uncertainty) - of_rates * seen.error
-        return EstimatorState(rates, jnp.clip(weights, -box, box))
+        return EstimatorState(rates, self._in_box(weights))
+
+    def lowered(self, state: EstimatorState, amount: PerAxis) -> EstimatorState:
+        """State with a lower d_hat, within the box, because something else gives that amount now, m/s^2 and rad/s^2.
+
+        The basis sums to one, so that an equal change of all weights changes d_hat by as much.
+        """
+        return state._replace(weights=self._in_box(state.weights - amount[:, None]))
+
+    def _in_box(self, weights: Float[Array, "n rules"]) -> Float[Array, "n rules"]:
+        box = jnp.broadcast_to(self.bound, weights.shape[:1])[:, None]
+        return jnp.clip(weights, -box, box)
 
 
 def _unseen(weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, "n rules"]:

@@ -7,13 +7,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.law_signals import ADAPTIVE_LAW, lyapunov_signals, weight_signals
+from undertow.controllers.law_signals import ADAPTIVE_LAW, MEMORY, lyapunov_signals, weight_signals
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
+from undertow.controllers.robust.memory import Memory, MemoryState
 from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target
+from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.numerics.linear_algebra import companion_lyapunov, matvec
@@ -34,6 +35,7 @@ class RobustState(NamedTuple):
     estimator: EstimatorState
     actuators: Any  # estimated state of the actuators
     filter: FilterState | None
+    memory: MemoryState | None = None
 
 
 class Plan(NamedTuple):
@@ -44,6 +46,8 @@ class Plan(NamedTuple):
     off: Tracking  # error from the target, filtered if there is a filter
     robust: PerAxis  # u_r
     forces: Float[Array, " m"]  # for the desired acceleration, without limits
+    phi: Float[Array, " k"] | None  # regressor of the memory
+    remembered: PerAxis  # m, m/s^2, rad/s^2; zero without a memory
 
 
 class RobustRCAF(AbstractInformedController):
@@ -73,6 +77,7 @@ class RobustRCAF(AbstractInformedController):
     direction: Float[Param, ""] = param(
         "", "cost of a departure from the desired direction, where limits bind, relative to a loss of size", default=1.0
     )
+    memory: Memory | None = None
 
     def __check_init__(self):
         for name in ("tracking_share", "robust_gain"):
@@ -82,6 +87,8 @@ class RobustRCAF(AbstractInformedController):
         own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
         estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
         check_gains(self.feedback, self.weight, own | estimators, len(self.model.coordinates.angles))
+        if self.memory is not None:
+            self.memory.check_fit(len(self.model.coordinates.angles), bool(self.model.coordinates.axes))
 
     @property
     def fuzzy(self) -> FuzzySystem:
@@ -96,7 +103,9 @@ class RobustRCAF(AbstractInformedController):
     def init(self, y: Measurement, r: Target) -> RobustState:
         smoothing = None if self.filter is None else self.filter.init(y.position)
         _, coordinates, actuators = self.model
-        return RobustState(self.estimator.init(coordinates.velocity(y)), actuators.init(), smoothing)
+        velocity = coordinates.velocity(y)
+        remembered = None if self.memory is None else self.memory.init(velocity.shape[0], bool(coordinates.axes))
+        return RobustState(self.estimator.init(velocity), actuators.init(), smoothing, remembered)
 
     def command(self, z: RobustState, y: Measurement, r: Target):
         plan, actuators, effect = self._plan(z, y, r), self.model.actuators, self.model.dynamics.gain(y)
@@ -109,6 +118,12 @@ class RobustRCAF(AbstractInformedController):
             "attained_share": attained(effect, plan.forces, forces),
         }
         signals |= lyapunov_signals(plan.off, self.lyapunov(), self.weight)
+        if self.memory is not None and z.memory is not None:
+            signals |= {
+                "memory": plan.remembered,
+                "memory_weights": z.memory.weights,
+                "memory_variance": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
+            }
         return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
@@ -118,11 +133,18 @@ class RobustRCAF(AbstractInformedController):
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         known = self._known(plan.actuators, y, u_applied)
+        estimator, remembered = self.estimator.advance(z.estimator, plan.seen, known, learnt, dt), None
+        if self.memory is not None and z.memory is not None and plan.phi is not None:
+            rest, free = plan.seen.uncertainty - plan.remembered, jnp.where(share < _WHOLE, 0.0, 1.0)
+            gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
+            remembered, gained = self.memory.advance(z.memory, plan.phi, rest, gains, free, dt)
+            estimator = self.estimator.lowered(estimator, gained)
         return RobustState(
-            estimator=self.estimator.advance(z.estimator, plan.seen, known, learnt, dt),
+            estimator=estimator,
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=self.filter
             and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.off)),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
+            memory=remembered,
         )
 
     def _room(self, y: Measurement, off: Tracking) -> Room:
@@ -143,7 +165,7 @@ class RobustRCAF(AbstractInformedController):
         return self._known(self.model.actuators.update_from_report(z.actuators, y.actuator), y, u_applied)
 
     def signals(self):
-        return ADAPTIVE_LAW
+        return ADAPTIVE_LAW if self.memory is None else ADAPTIVE_LAW | MEMORY
 
     def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
@@ -157,8 +179,14 @@ class RobustRCAF(AbstractInformedController):
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        off = tracking(coordinates, self.lyapunov(), y, target)
+        off, phi = tracking(coordinates, self.lyapunov(), y, target), None
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
-        seen = self.estimator.estimate(z.estimator, coordinates.velocity(y))
+        velocity = coordinates.velocity(y)
+        seen, remembered = self.estimator.estimate(z.estimator, velocity), jnp.zeros_like(velocity)
+        if self.memory is not None and z.memory is not None:
+            at = TrackingError(off.error, off.rate, off.acceleration)
+            phi = self.memory.regressors(y, velocity, at, bool(coordinates.axes))
+            remembered = self.memory.value(z.memory, phi)
+            seen = seen._replace(uncertainty=seen.uncertainty + remembered)
         demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
-        return Plan(reported, seen, off, u_r, dynamics.invert(y, demand))
+        return Plan(reported, seen, off, u_r, dynamics.invert(y, demand), phi, remembered)

@@ -1,0 +1,89 @@
+"""Preset `learning`: the robust variant with a memory of the uncertainty along the reference."""
+
+import dataclasses
+from typing import Annotated
+
+from undertow.controllers.presets.robust import robust
+from undertow.controllers.robust.memory import memory
+from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.core import catalogue
+from undertow.core.contracts import Model
+
+
+def learning(
+    model: Model,
+    *,
+    sampling_time: float = 1e-3,
+    velocity_noise=0.0,
+    load_rate=1.0,
+    delay: float = 0.0,
+    bandwidth=None,
+    damping=1.0,
+    tracking=None,
+    feedback=None,
+    weights_bound=50.0,
+    reference_frequency=None,
+    actuator_rate=None,
+    direction=1.0,
+    regressor: str = "rules",
+    rules: int = 5,
+    speeds=0.5,
+    horizon=300.0,
+    learning_rate=10.0,
+    memory_bound=20.0,
+    knowledge: Annotated[str | None, catalogue.FILE] = None,
+) -> RobustRCAF:
+    """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.
+
+    Args:
+        model: nominal model, from `plant.model()`.
+        sampling_time: that of the loop, s; a scenario sets it.
+        velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
+            per axis; a scenario sets it from its navigation.
+        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
+        delay: uncompensated delay of measurement and input together, s.
+        bandwidth: natural frequency of the observer, rad/s; None: chosen as in preset `robust`.
+        damping: damping ratio of the observer.
+        tracking: natural frequency of the tracking error, critically damped, rad/s; None: as in preset `robust`.
+        feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
+        weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that the observer can estimate.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: as in preset `robust`; 0 for none.
+        actuator_rate: bandwidth of the motor loop, 1/s; None: as in preset `robust`.
+        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
+        regressor: `rules`, fuzzy rules of each velocity, or `linear`, v and v |v|.
+        rules: fuzzy sets of each velocity, an odd number from 3.
+        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
+        horizon: time over which motions that are repeated are forgotten, s.
+        learning_rate: p_0, 1/s: how fast it learns at first.
+        memory_bound: largest weight of the memory, m/s^2 and rad/s^2.
+        knowledge: path of a file of `save_knowledge`: what was learnt before.
+
+    Raises:
+        BadInput: a value is out of its range, or the knowledge does not fit.
+    """
+    law = robust(
+        model,
+        sampling_time=sampling_time,
+        velocity_noise=velocity_noise,
+        load_rate=load_rate,
+        delay=delay,
+        bandwidth=bandwidth,
+        damping=damping,
+        tracking=tracking,
+        feedback=feedback,
+        weights_bound=weights_bound,
+        reference_frequency=reference_frequency,
+        actuator_rate=actuator_rate,
+        direction=direction,
+    )
+    remembered = memory(
+        len(law.model.coordinates.angles),
+        regressor=regressor,
+        rules=rules,
+        speeds=speeds,
+        horizon=horizon,
+        learning_rate=learning_rate,
+        bound=memory_bound,
+        knowledge=knowledge,
+    )
+    return dataclasses.replace(law, memory=remembered)

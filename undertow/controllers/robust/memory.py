@@ -1,0 +1,228 @@
+"""Memory of the lumped uncertainty along the reference: fuzzy rules or a linear regressor, learnt while controlling.
+
+A disturbance observer follows the uncertainty with the lag of its bandwidth, each time as if for the first time. The
+memory is a map from the motion of the reference to the uncertainty. It is evaluated without lag and without noise.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import Measurement, TrackingError
+from undertow.core.errors import BadInput
+from undertow.core.measurement import body_of
+from undertow.core.param import Param, param
+from undertow.estimation.fuzzy_system import FuzzySystem, gaussian_sets
+from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.rotations import cross
+
+PerAxis = Float[Array, " n"]
+Regressor = Float[Array, " k"]
+
+REGRESSORS = ("rules", "linear")
+
+
+class MemoryState(NamedTuple):
+    """What is remembered, how uncertain it is, and the regressor behind the observer's lag."""
+
+    weights: Float[Array, "k n"]  # m/s^2, rad/s^2
+    covariance: Float[Array, "k k"]  # of the weights of any axis, over the noise density, 1/s
+    lagged: Regressor  # regressor as the observer would follow it
+    ahead: Regressor  # its modelling error, s
+
+
+class Memory(eqx.Module):
+    """m = W^T phi(reference), learnt by recursive least squares from what the observer still has to add.
+
+    The regressor phi holds 1, the desired acceleration, the direction of gravity, the products of velocities of
+    different axes that turning bodies have, and of each velocity either fuzzy rules or v and v |v|. Every axis sees all
+    of them. Rules are the memberships of normalised Gaussian sets without the middle one, less their values at rest.
+
+    The observer follows d - m with its lag, so its estimate is (W* - W)^T phi_f, with phi_f the regressor behind the
+    same lag, where d = W*^T phi. This is the innovation. With r = T phi_f^T P phi_f,
+
+        W += P phi_f d_rest^T T / (1 + r),    P -= e T P phi_f phi_f^T P / (1 + e r),    e = max(1 - q / r, 0),
+
+    q = T / `horizon`. P never grows: in directions that are not excited nothing is learnt or forgotten. In those that
+    are, the gain does not fall below the one that forgets within the horizon. What the memory gains the observer loses
+    in the same step.
+
+    Raises:
+        BadInput: a number that is not positive, or an unknown regressor.
+    """
+
+    fuzzy: FuzzySystem
+    speeds: Float[Param, " n"] = param("m/s, rad/s", "velocities at the outermost sets")
+    horizon: Float[Param, ""] = param("s", "time over which excited directions forget", symbol="tau", default=300.0)
+    learning_rate: Float[Param, ""] = param(
+        "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=10.0
+    )
+    bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=20.0)
+    start: Float[Array, "k n"] | None = None
+    variance: Float[Array, " k"] | None = None
+    regressor: str = eqx.field(static=True, default="rules")
+
+    def __check_init__(self):
+        checks.choice("regressor", self.regressor, REGRESSORS)
+        for name in ("speeds", "horizon", "learning_rate", "bound"):
+            checks.positive(name, getattr(self, name))
+
+    def check_fit(self, axes: int, body: bool) -> None:
+        """Check that this memory fits a plant.
+
+        Raises:
+            BadInput: velocities or knowledge for another number of axes or regressors.
+        """
+        checks.length("speeds", self.speeds, axes, "axes")
+        shapes, count = (
+            tuple(None if one is None else one.shape for one in (self.start, self.variance)),
+            self.size(axes, body),
+        )
+        if shapes not in ((None, None), ((count, axes), (count,))):
+            must = f"have {count} regressors for {axes} axes"
+            raise BadInput("knowledge", must, shapes[0], hint="Take the rules and the regressor it was learnt with")
+
+    def init(self, axes: int, body: bool) -> MemoryState:
+        """State before the first step: `start` and `variance`, or nothing known."""
+        count = self.size(axes, body)
+        nothing = jnp.zeros(count)
+        weights = jnp.zeros((count, axes)) if self.start is None else self.start
+        variance = jnp.ones(count) if self.variance is None else self.variance
+        return MemoryState(weights, jnp.diag(self.learning_rate * variance), nothing, nothing)
+
+    def size(self, axes: int, body: bool) -> int:
+        """Number k of regressors."""
+        own = axes * (self.fuzzy.rules - 1 if self.regressor == "rules" else 2)
+        return 1 + own + axes + (3 + 9 if body else 0)
+
+    def regressors(self, y: Measurement, velocity: PerAxis, off: TrackingError, body: bool) -> Regressor:
+        """phi at the reference.
+
+        Args:
+            y: measurement; of it only the attitude is used, turned by the error to that of the reference.
+            velocity: of the plant, in the coordinates of the law, m/s and rad/s.
+            off: errors from the reference and its acceleration.
+            body: whether the plant is a body, with an attitude and products of velocities.
+        """
+        share = (velocity + off.rate) / self.speeds
+        if self.regressor == "rules":
+            still = self.fuzzy.basis(jnp.zeros((1, 1)))
+            rules = self.fuzzy.basis(share[:, None]) - still
+            middle = self.fuzzy.rules // 2
+            own = jnp.concatenate([rules[:, :middle], rules[:, middle + 1 :]], -1).reshape(-1)
+        else:
+            own = jnp.concatenate([share, share * jnp.abs(share)])
+        parts = [jnp.ones(1), own, off.acceleration]
+        if body:
+            down = body_of(y).rotation[2]
+            u, turning = share[:3], share[3:]
+            around = jnp.stack([u[1], u[2], u[0]])
+            further = jnp.stack([u[2], u[0], u[1]])
+            parts += [down + cross(down, off.error[3:]) - jnp.asarray([0.0, 0.0, 1.0])]
+            parts += [u * around, turning * around, turning * further]
+        return jnp.concatenate(parts)
+
+    def value(self, state: MemoryState, phi: Regressor) -> PerAxis:
+        """m, m/s^2 and rad/s^2."""
+        return matvec(state.weights.T, phi)
+
+    def advance(
+        self, state: MemoryState, phi: Regressor, rest: PerAxis, gains, free, dt
+    ) -> tuple[MemoryState, PerAxis]:
+        """State one sampling time later, and what the memory gains at this regressor, m/s^2 and rad/s^2.
+
+        Args:
+            state: now.
+            phi: regressor now.
+            rest: what the observer adds to the memory, m/s^2 and rad/s^2.
+            gains: of the observer, per sampling time and 1/s.
+            free: 1, or 0 while limits bind and nothing is learnt.
+            dt: sampling time, s.
+        """
+        of_rates, of_estimate = gains
+        towards = matvec(state.covariance, state.lagged)
+        size = dt * (state.lagged * towards).sum()
+        forgets = dt / self.horizon
+        share = jnp.where(size > forgets, 1 - forgets / jnp.where(size > forgets, size, 1.0), 0.0)
+        step = free * dt / (1 + size) * towards[:, None] * rest[None, :]
+        weights = jnp.clip(state.weights + step, -self.bound, self.bound)
+        shrunk = free * share * dt / (1 + share * size) * towards[:, None] * towards[None, :]
+        gained = matvec((weights - state.weights).T, phi)
+        return MemoryState(
+            weights=weights,
+            covariance=state.covariance - shrunk,
+            lagged=state.lagged - of_estimate * state.ahead,
+            ahead=state.ahead + dt * (state.lagged - phi) - of_rates * state.ahead,
+        ), gained
+
+
+def memory(
+    axes: int,
+    *,
+    regressor: str = "rules",
+    rules: int = 5,
+    speeds=0.5,
+    horizon=300.0,
+    learning_rate=10.0,
+    bound=20.0,
+    knowledge=None,
+) -> Memory:
+    """A memory beside an observer.
+
+    Args:
+        axes: number of axes.
+        regressor: `rules`, or `linear` for v and v |v|.
+        rules: sets of each velocity, an odd number from 3.
+        speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
+        horizon: time over which what is excited forgets, s.
+        learning_rate: p_0, 1/s: how fast it learns at first.
+        bound: largest weight, m/s^2 and rad/s^2.
+        knowledge: what was learnt before: path of a file of `save_knowledge`, or None.
+
+    Raises:
+        BadInput: a number out of its range, or a file that holds no knowledge.
+    """
+    if not isinstance(rules, int) or rules < 3 or rules % 2 == 0:
+        raise BadInput("rules", "be an odd number from 3", rules)
+    learnt = (None, None) if knowledge is None else load_knowledge(knowledge)
+    return Memory(
+        fuzzy=gaussian_sets(rules),
+        speeds=np.broadcast_to(speeds, (axes,)) if np.ndim(speeds) == 0 else speeds,
+        horizon=horizon,
+        learning_rate=learning_rate,
+        bound=bound,
+        start=learnt[0],
+        variance=learnt[1],
+        regressor=regressor,
+    )
+
+
+def save_knowledge(path, run) -> None:
+    """Write what was learnt by the end of a run to a file (.npz).
+
+    Args:
+        path: of the file.
+        run: dataset with the signals `memory_weights` and `memory_variance`.
+    """
+    weights, variance = (run[name].values[-1] for name in ("memory_weights", "memory_variance"))
+    np.savez(path, weights=weights, variance=variance)
+
+
+def load_knowledge(path) -> tuple[Array, Array]:
+    """Weights and variance of a file of `save_knowledge`.
+
+    Raises:
+        BadInput: the file cannot be read, or holds something else.
+    """
+    try:
+        with np.load(path) as held:
+            weights, variance = np.asarray(held["weights"], dtype=float), np.asarray(held["variance"], dtype=float)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput("knowledge", "be a file of `save_knowledge`", str(path)) from error
+    checks.finite("knowledge", weights)
+    checks.finite("knowledge", variance)
+    return jnp.asarray(weights), jnp.asarray(variance)
