@@ -152,7 +152,3 @@ class ToShrink:
         departures = self._objective.box.of_cube(points)
         found = self._objective.robustness(departures)
         return np.where(found <= 0, self._objective.box.size(departures), _UNBROKEN + np.minimum(found, _WORST))
-
-    def slope(self, point: np.ndarray) -> np.ndarray:
-        """None: this cost has a step."""
-        raise NotImplementedError

@@ -18,6 +18,10 @@ class Searched(Protocol):
         """Cost of each point."""
         ...
 
+
+class Descended(Searched, Protocol):
+    """The same where the cost has a gradient."""
+
     def slope(self, point: np.ndarray) -> np.ndarray:
         """Gradient of the cost at a point."""
         ...
@@ -32,7 +36,7 @@ _PATIENCE = 3
 _NARROWER, _NEAREST = 0.5, 0.01  # radius of the random search: halved after every failure, down to the smallest
 
 
-def descend(objective: Searched, start: np.ndarray, cost: float, iterations: int) -> None:
+def descend(objective: Descended, start: np.ndarray, cost: float, iterations: int) -> None:
     """From a certified point to a local minimum of the cost in [0, 1]^k; the objective keeps the best.
 
     Nocedal and Wright (2006), ch. 6. Variables at a bound stay there while the gradient points outward. Instead of a
