@@ -34,7 +34,7 @@ def search_figure(found: Mapping[str, Any]) -> Figure:
             panel.plot(runs[which], values[which], mark, color=colour, markersize=2.5, label=word, zorder=3)
         if bounds is None:
             panel.axhline(0.0, **style.TRUTH.line)
-            panel.legend(fontsize=style.SMALL, frameon=False, loc="upper right", ncols=2)
+            panel.legend(fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
         else:
             panel.axhline(bounds["nominal"], **style.TRUTH.line)
             if found["counterexample"] is not None:
