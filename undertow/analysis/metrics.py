@@ -19,6 +19,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.loop.recorded_signals import Signals
 from undertow.loop.sampled import AbstractAccumulator
+from undertow.numerics.rotations import attitude_error, quaternion_from_euler
 
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]
@@ -39,6 +40,7 @@ class MetricsState(NamedTuple):
     samples: Scalar  # number of them inside the window
     squares: dict[str, PerAxis]  # of the signals of _RMS that are recorded
     largest_error: PerAxis
+    turn_squares: Scalar | None  # of the angle between attitude and target; None where there is no attitude
     input_squares: Scalar
     input_peak: Scalar
     variation: Scalar  # sum over samples of the mean |u_k - u_{k-1}|
@@ -91,6 +93,9 @@ _RMS: dict[str, tuple[tuple[str, ...], Callable[[Signals], PerAxis]]] = {
     "model": (("modelling_error",), lambda s: s["modelling_error"]),
 }
 
+# Outputs that are the Euler angles of a body, in this order.
+_EULER = ("roll", "pitch", "yaw")
+
 # Outputs whose unit is the key make one figure; those of any other unit do only where all outputs have it.
 _GROUPS = {"m": "position", "rad": "attitude"}
 _ALL = "tracking"
@@ -107,6 +112,11 @@ def output_groups(units: Sequence[str]) -> dict[str, tuple[str, list[int]]]:
     return {_ALL: (units[0], list(range(len(units))))} if one_kind else found
 
 
+def euler_places(outputs: Sequence[str]) -> tuple[int, ...]:
+    """Places of roll, pitch and yaw among the names of outputs; none unless all three are there."""
+    return tuple(map(list(outputs).index, _EULER)) if set(_EULER) <= set(outputs) else ()
+
+
 def of_group(group: str, name: str) -> str:
     """Name of a metric of the outputs of one group: `position_rms` of the error, else `position_estimation_rms`."""
     if name.startswith("error_"):
@@ -120,11 +130,13 @@ class Metrics(AbstractAccumulator):
     Args:
         start, stop: the window, s.
         units: of the outputs.
+        euler: places of roll, pitch and yaw among the outputs; empty where a plant has none.
     """
 
     start: Float[Param, ""] = param("s", "first time that counts", default=0.0)
     stop: Float[Param, ""] = param("s", "last time that counts", default=jnp.inf)
     units: tuple[str, ...] = eqx.field(static=True, default=("m",))
+    euler: tuple[int, ...] = eqx.field(static=True, default=())
 
     def init(self, signals: Signals) -> MetricsState:
         axes, zero = jnp.zeros_like(signals["error"]), jnp.zeros(())
@@ -132,6 +144,7 @@ class Metrics(AbstractAccumulator):
             samples=zero,
             squares={name: axes for name, (needed, _) in _RMS.items() if all(one in signals for one in needed)},
             largest_error=axes,
+            turn_squares=zero if self.euler else None,
             input_squares=zero,
             input_peak=zero,
             variation=zero,
@@ -153,10 +166,14 @@ class Metrics(AbstractAccumulator):
         weights_peak = state.weights_peak
         if weights_peak is not None:
             weights_peak = jnp.maximum(weights_peak, inside * jnp.abs(signals["weights"]).max(-1, initial=0.0))
+        turn_squares = state.turn_squares
+        if turn_squares is not None:
+            turn_squares = turn_squares + inside * self._turn(signals) ** 2
         return MetricsState(
             samples=state.samples + inside,
             squares={name: sums + inside * _RMS[name][1](signals) ** 2 for name, sums in state.squares.items()},
             largest_error=jnp.maximum(state.largest_error, inside * size),
+            turn_squares=turn_squares,
             input_squares=state.input_squares + inside * (applied**2).mean(),
             input_peak=jnp.maximum(state.input_peak, inside * jnp.abs(applied).max()),
             variation=state.variation + between * jnp.abs(applied - last_input).mean(),
@@ -169,6 +186,12 @@ class Metrics(AbstractAccumulator):
             previous=(t, applied, supply, inside),
         )
 
+    def _turn(self, signals: Signals) -> Scalar:
+        """Angle of the rotation between the attitude and its target, rad, at most half a turn."""
+        target, actual = (quaternion_from_euler(signals[name][self.euler,]) for name in ("reference", "position"))
+        half = attitude_error(target, actual) / 2
+        return 2 * jnp.arcsin(jnp.minimum(jnp.sqrt((half * half).sum()), 1.0))
+
     def values(self, state: MetricsState) -> dict[str, np.ndarray]:
         """Metrics by name, of many runs at once where the leaves have leading axes; NaN where one is not defined."""
         state = jax.tree.map(np.asarray, state)
@@ -180,6 +203,8 @@ class Metrics(AbstractAccumulator):
             found[of_group(group, "error_max")] = state.largest_error[..., axes].max(-1)
             if state.weights_peak is not None:
                 found[of_group(group, "weights_peak")] = state.weights_peak[..., axes].max(-1)
+        if state.turn_squares is not None:
+            found[_TURN] = np.sqrt(state.turn_squares / count)
         found |= {
             "input_rms": np.sqrt(state.input_squares / count),
             "input_peak": state.input_peak,
@@ -236,7 +261,7 @@ Gathered = tuple[AbstractAccumulator, ...]
 
 def accumulators(plant: AbstractPlant, own: Sequence[AbstractMetric], start: float, stop: float) -> Gathered:
     """What gathers all metrics of a run of a plant between two times, s; `own` are the scenario's own."""
-    return (Metrics(start, stop, plant.output_units), *(Windowed(metric, start, stop) for metric in own))
+    return (Metrics(start, stop, plant.output_units, euler_places(plant.outputs)), *(Windowed(metric, start, stop) for metric in own))
 
 
 def results(gathered: Gathered, states: Sequence[Any]) -> dict[str, Any]:
@@ -303,6 +328,7 @@ _OF_OUTPUTS = {
     "model_rms": Metric("[axis]/s", "rms per axis of the modelling error x_hat_dot - x_dot"),
     "weights_peak": Metric("[axis]/s^2", "largest |theta|, which shows parameter drift"),
 }
+_TURN = "orientation_rms"
 _WHICH = {"position": "outputs in m", "attitude": "outputs in rad", _ALL: "outputs that share another unit"}
 
 # In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
@@ -314,6 +340,7 @@ MEANINGS = {
     for name, metric in _OF_OUTPUTS.items()
     for group in (*_GROUPS.values(), _ALL)
 } | {
+    _TURN: Metric("rad", "rms angle of the rotation between attitude and target, at any attitude"),
     "input_rms": Metric("[input]", "rms of the applied input over all inputs"),
     "input_peak": Metric("[input]", "largest applied input"),
     "input_variation": Metric("[input]/s", "total variation of the input per second, mean over inputs (chattering)"),
@@ -359,6 +386,7 @@ def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, 
     possible = {name for name, needed in _NEEDED.items() if needed in signals}
     own_groups = {of_group(group, name) for group in output_groups(plant.output_units) for name in possible}
     others = {of_group(group, name) for group in (*_GROUPS.values(), _ALL) for name in _OF_OUTPUTS} - own_groups
+    others |= set() if euler_places(plant.outputs) else {_TURN}
     found = {name: metric for name, metric in MEANINGS.items() if name not in others}
     for metric in own:
         for name, meaning in metric.metrics().items():
