@@ -261,7 +261,10 @@ Gathered = tuple[AbstractAccumulator, ...]
 
 def accumulators(plant: AbstractPlant, own: Sequence[AbstractMetric], start: float, stop: float) -> Gathered:
     """What gathers all metrics of a run of a plant between two times, s; `own` are the scenario's own."""
-    return (Metrics(start, stop, plant.output_units, euler_places(plant.outputs)), *(Windowed(metric, start, stop) for metric in own))
+    return (
+        Metrics(start, stop, plant.output_units, euler_places(plant.outputs)),
+        *(Windowed(metric, start, stop) for metric in own),
+    )
 
 
 def results(gathered: Gathered, states: Sequence[Any]) -> dict[str, Any]:

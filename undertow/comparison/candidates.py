@@ -48,11 +48,21 @@ def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: 
         BadInput: fewer than two, or one of them is no controller.
     """
     pairs = given.items() if isinstance(given, Mapping) else map(_split, given)
-    found = [_controller(name, entry, scenario, path) for name, entry in pairs]
+    own = lambda name: _own(name, scenario, path)
+    found = [own(name) if entry == OWN else _controller(name, entry) for name, entry in pairs]
     if len(found) < 2:
         hint = "For example: --controllers robust,pid. The word `scenario` stands for the scenario's own controller"
         raise BadInput("--controllers", "name at least two controllers", len(found), hint=hint)
     return _unique(found)
+
+
+def laws(given: Sequence[str]) -> list[Candidate]:
+    """Controllers that need no scenario: entries as of `controllers`, but for `scenario`.
+
+    Raises:
+        BadInput: one of them is no controller.
+    """
+    return _unique([_controller(name, entry) for name, entry in map(_split, given)])
 
 
 def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candidate], dict[str, list[str]]]:
@@ -111,15 +121,18 @@ def _split(entry: str) -> tuple[str, str]:
     return (name.strip(), value.strip()) if equals else ("", entry.strip())
 
 
-def _controller(name: str, entry: Any, scenario: Text, path: Path | None) -> Candidate:
+def _own(name: str, scenario: Text, path: Path | None) -> Candidate:
+    """The controller of the scenario itself."""
+    part = part_of(validate(scenario).controller, scenario.folder)
+    return Candidate(name or f"{label(part)} (scenario)", {"controller": part}, path)
+
+
+def _controller(name: str, entry: Any) -> Candidate:
     if isinstance(entry, Mapping):
         part = {"kind": "rcaf", **from_data(entry).data}
         return Candidate(name or label(part), {"controller": part}, None)
     if not isinstance(entry, str) or not entry:
         raise BadInput("--controllers", "name controllers, separated by commas", repr(entry))
-    if entry == OWN:
-        part = part_of(validate(scenario).controller, scenario.folder)
-        return Candidate(name or f"{label(part)} (scenario)", {"controller": part}, path)
     if entry.endswith(_FILES):
         return _of_file(name, Path(entry))
     part = _named(entry)

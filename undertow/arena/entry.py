@@ -1,0 +1,140 @@
+"""A law as it enters the arena: one campaign whose variants are the tasks, and the folder that keeps its results."""
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.arena.tasks import CELLS, VERSION, scenario_keys
+from undertow.arena.tuned_gains import Gains
+from undertow.campaign.campaign_schema import validate
+from undertow.campaign.prepare import Prepared, prepare_campaign
+from undertow.comparison.candidates import Candidate
+from undertow.core.errors import BadInput
+from undertow.scenario.build import build
+from undertow.scenario.finished_run import to_json
+from undertow.scenario.reading import Text, from_data
+
+LAWS, ENTRY = "laws", "entry.json"
+
+Cell = tuple[str, str]  # task and vehicle
+
+
+class Entry(NamedTuple):
+    """What is kept of a law beside the results of its trials.
+
+    Attributes:
+        name: in tables and figures.
+        version: of the arena.
+        controller: part `controller` of its scenarios, without tuned gains.
+        cells: tasks and vehicles that it ran, or runs.
+        refused: task and vehicle -> why no scenario could be built; such a task counts as lost.
+        gains: how its gains came about, for each vehicle.
+    """
+
+    name: str
+    version: int
+    controller: dict[str, Any]
+    cells: tuple[Cell, ...]
+    refused: dict[Cell, str]
+    gains: dict[str, str]
+
+
+def folder_of(out: Path, name: str) -> Path:
+    """Folder of a law among the results of an arena."""
+    return out / LAWS / re.sub(r"[^a-zA-Z0-9_-]+", "-", name).strip("-")
+
+
+def variant(cell: Cell) -> str:
+    """Name of the variant of a task on a vehicle."""
+    return f"{cell[0]} {cell[1]}"
+
+
+def prepare_entry(
+    law: Candidate, trials: int, cells: Sequence[Cell] = CELLS, gains: Gains | None = None
+) -> tuple[Entry, Prepared | None]:
+    """The campaign of a law: a variant for every task and vehicle that it accepts.
+
+    Args:
+        law: the law.
+        trials: of every task on every vehicle.
+        cells: tasks and vehicles.
+        gains: tuned for each vehicle; None for those that the law has by itself.
+
+    Returns:
+        What is kept of the law, and its campaign; None where it accepts no task.
+
+    Raises:
+        BadInput: the campaign cannot be built.
+    """
+    part = law.changes["controller"]
+    tuned = lambda vehicle: {} if gains is None else gains.options.get(vehicle, {})
+    scenarios = {cell: scenario_keys(*cell) | {"controller": part | tuned(cell[1])} for cell in cells}
+    refused: dict[Cell, str] = {}
+    try:
+        prepared = campaign_of({variant(cell): keys for cell, keys in scenarios.items()}, trials)
+    except BadInput:
+        refused = {cell: why for cell in cells if (why := _refusal(scenarios[cell]))}
+        if not refused:
+            raise
+        accepted = {variant(cell): keys for cell, keys in scenarios.items() if cell not in refused}
+        prepared = campaign_of(accepted, trials) if accepted else None
+    sentences = {} if gains is None else gains.sentences
+    return Entry(law.name, VERSION, part, tuple(cells), refused, sentences), prepared
+
+
+def campaign_of(scenarios: dict[str, dict[str, Any]], trials: int) -> Prepared:
+    """A campaign whose variants are whole scenarios with the same keys."""
+    data = {"scenario": next(iter(scenarios.values())), "trials": trials, "variants": scenarios}
+    text: Text = from_data(data)
+    return prepare_campaign(validate(text), text)
+
+
+def _refusal(keys: dict[str, Any]) -> str:
+    """Why a scenario cannot be built; empty where it can."""
+    try:
+        build(from_data(keys))
+    except BadInput as error:
+        return str(error)
+    return ""
+
+
+def write_entry(entry: Entry, folder: Path) -> None:
+    """Write what is kept of a law, whole or not at all."""
+    data = entry._asdict() | {"refused": [[*cell, why] for cell, why in entry.refused.items()]}
+    partial = (folder / ENTRY).with_suffix(".partial")
+    partial.write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
+    partial.replace(folder / ENTRY)
+
+
+def read_entry(folder: Path) -> Entry:
+    """What is kept of a law.
+
+    Raises:
+        BadInput: the file cannot be read, or is of another version of the arena.
+    """
+    file = folder / ENTRY
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        version = found["version"]
+        whole: Callable[[Any], str] = lambda one: one if isinstance(one, str) else _fail(one)
+        entry = Entry(
+            whole(found["name"]),
+            int(version),
+            dict(found["controller"]),
+            tuple((whole(task), whole(vehicle)) for task, vehicle in found["cells"]),
+            {(whole(task), whole(vehicle)): whole(why) for task, vehicle, why in found["refused"]},
+            {whole(vehicle): whole(sentence) for vehicle, sentence in found["gains"].items()},
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        hint = f"Remove the folder {folder}, and run the arena again for this law"
+        raise BadInput("--out", "have entries that can be read", f"{file}: {error!r}", hint=hint) from None
+    if entry.version != VERSION:
+        hint = "Results of different versions cannot be compared: choose another folder"
+        raise BadInput("--out", f"be of version {VERSION} of the arena", f"version {version} in {file}", hint=hint)
+    return entry
+
+
+def _fail(found: Any) -> str:
+    raise TypeError(f"{found!r} is no text")

@@ -1,0 +1,219 @@
+"""`undertow arena`: run laws through the fixed tasks of the arena, and write the leader board."""
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from undertow.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, write_entry
+from undertow.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
+from undertow.arena.robustness import FOLDER, VEHICLE, prepare_robustness
+from undertow.arena.tasks import CELLS, TASKS, scenario_keys
+from undertow.arena.tuned_gains import Gains, tuned_gains
+from undertow.arena.vehicles import VEHICLES
+from undertow.campaign.prepare import Prepared
+from undertow.campaign.run_campaign import STORE
+from undertow.cli import results_folder
+from undertow.cli.exit_codes import DONE, warn_of
+from undertow.cli.interruptible import interruptible
+from undertow.cli.pdf_option import check_pdf
+from undertow.cli.results_folder import output_folder
+from undertow.cli.stages import stage
+from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.trials import run_trials, worker_count
+from undertow.comparison.candidates import Candidate, laws
+from undertow.comparison.equal_budgets import check_budget
+from undertow.comparison.step_time import step_time
+from undertow.core import checks
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.report.arena_page import PAGE, SCORE, write_board
+from undertow.scenario.build import build
+from undertow.scenario.finished_run import to_json
+from undertow.scenario.reading import dump, from_data
+
+# All laws of undertow but for `nmpc`, which runs by XLA and takes hours.
+EVERY = (
+    "robust",
+    "learning",
+    "paper",
+    "pid",
+    "adrc",
+    "indi",
+    "lqi",
+    "slotine_li",
+    "mrac",
+    "l1_adaptive",
+    "adaptive_backstepping",
+    "disturbance_observer",
+    "super_twisting",
+    "integral_sliding_mode",
+    "neural",
+    "placed",
+    "ardusub",
+    "px4",
+)
+_TUNING, _SCENARIOS = "tuning", "scenarios"
+_WRITTEN = (PAGE, "leaderboard.json", "leaderboard.csv", "leaderboard.md", "figures")
+
+
+def arena(
+    entries: Sequence[str],
+    out: Path | None,
+    trials: int,
+    tasks: str | None,
+    vehicles: str | None,
+    budget: int | None,
+    robustness: bool,
+    workers: int | None,
+    overwrite: bool,
+    pdf: str | None,
+) -> int:
+    """Run laws through the tasks, those that are missing in the folder, and write the leader board; the exit code."""
+    check_pdf(pdf)
+    checks.positive("--trials", trials)
+    if budget is not None:
+        check_budget(budget)
+    count = worker_count(workers)
+    found = laws([word for entry in entries or EVERY for word in entry.split(",")])
+    cells = _cells(tasks, vehicles)
+    console = wide_console()
+    with output_folder(out or Path("runs") / "arena", Path()) as folder:
+        _check_place(folder)
+        again = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
+        again += ["--tune", str(budget)] if budget is not None else []
+        again += ["--robustness"] if robustness else []
+        for option, given in (("--tasks", tasks), ("--vehicles", vehicles)):
+            again += [option, given] if given is not None else []
+        try:
+            for number, law in enumerate(found, 1):
+                console.rule(f"{law.name} ({number} of {len(found)})", align="left")
+                _run(console, law, folder_of(folder, law.name), trials, cells, budget, robustness, count, overwrite)
+        except (KeyboardInterrupt, OSError):
+            typer.echo(f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *again])}", err=True)
+            raise
+        return _conclude(console, folder, pdf)
+
+
+def _check_place(folder: Path) -> None:
+    """Files of the names of results must be results."""
+    taken = [name for name in (LAWS, *_WRITTEN) if (folder / name).exists()]
+    if taken and not (folder / LAWS).is_dir():
+        hint = f"Choose another folder, or move {taken[0]} out of this one"
+        raise BadInput("--out", "be a folder of an arena, or a free one", f"{folder}, which has {taken[0]}", hint=hint)
+
+
+def _cells(tasks: str | None, vehicles: str | None) -> tuple[Cell, ...]:
+    """Tasks and vehicles that were asked for."""
+    asked = []
+    for option, given, known in (("--tasks", tasks, TASKS), ("--vehicles", vehicles, VEHICLES)):
+        names = list(known) if given is None else [one.strip() for one in given.split(",") if one.strip()]
+        for name in names:
+            if name not in known:
+                raise BadInput(
+                    option, f"name {option.removeprefix('--')} of the arena", name, hint=did_you_mean(name, known)
+                )
+        asked.append(names)
+    found = tuple((task, vehicle) for task, vehicle in CELLS if task in asked[0] and vehicle in asked[1])
+    if not found:
+        hint = "`pitch_turn` is for bluerov2_heavy and odin"
+        raise BadInput("--tasks", "be tasks that one of the vehicles has", f"{tasks} with {vehicles}", hint=hint)
+    return found
+
+
+def _run(
+    console: Console,
+    law: Candidate,
+    folder: Path,
+    trials: int,
+    cells: tuple[Cell, ...],
+    budget: int | None,
+    robustness: bool,
+    workers: int,
+    overwrite: bool,
+) -> None:
+    """Tune and run one law, as far as its folder does not have that already."""
+    if overwrite:
+        results_folder.remove(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    gains = None if budget is None else _tuned(console, law, folder, cells, budget)
+    with stage(console, "building"):
+        entry, prepared = interruptible(lambda: prepare_entry(law, trials, cells, gains))
+    if (folder / ENTRY).exists() and (kept := read_entry(folder)) != entry:
+        different = next(name for name in entry._fields if getattr(entry, name) != getattr(kept, name))
+        hint = "Give the law another name (NAME=ENTRY), choose another folder, or run it again with --overwrite"
+        raise BadInput(law.name, "be the law that is in the folder", f"another: its {different} differ", hint=hint)
+    for cell, why in entry.refused.items():
+        typer.echo(f"Advice: {law.name} cannot run {cell[0]} on {cell[1]}, which counts as lost: {why}", err=True)
+    if prepared is not None:
+        _trials(console, prepared, folder, workers)
+    write_entry(entry, folder)
+    options = {} if gains is None else gains.options.get(VEHICLE, {})
+    _finish(console, law, folder, cells, gains)
+    if robustness:
+        with stage(console, "building robustness"):
+            harder = interruptible(lambda: prepare_robustness(law, max(2, trials // 4), options))
+        _trials(console, harder, folder / FOLDER, workers)
+
+
+def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> Gains:
+    """Gains for every vehicle, tuned on a task of its own."""
+    vehicles = list(dict.fromkeys(vehicle for _, vehicle in cells))
+    said: list[str] = []
+
+    def say(words: str) -> None:
+        if words not in said[-1:]:
+            said.append(words)
+            console.print(words, markup=False, highlight=False)
+
+    return interruptible(lambda: tuned_gains(law, vehicles, budget, folder / _TUNING, say))
+
+
+def _trials(console: Console, prepared: Prepared, folder: Path, workers: int) -> None:
+    """Run the trials of a campaign that are missing."""
+    folder.mkdir(exist_ok=True)
+    run_trials(console, prepared, folder, None if (folder / STORE).exists() else (), None, workers)
+
+
+def _finish(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
+    """Scenarios of the tasks, which `undertow simulate` runs, and the computing time of a step."""
+    part: dict[str, Any] = law.changes["controller"]
+    place = folder / _SCENARIOS
+    place.mkdir(exist_ok=True)
+    for task, vehicle in cells:
+        tuned = {} if gains is None else gains.options.get(vehicle, {})
+        text = dump(scenario_keys(task, vehicle) | {"controller": part | tuned})
+        said = f"# {law.name} in task {task} on {vehicle}: {TASKS[task].question}.\n"
+        (place / f"{task}-{vehicle}.yaml").write_text(said + text, encoding="utf-8")
+    if (folder / STEP).exists():
+        return
+    with stage(console, "time of a step"):
+        for cell in cells:
+            try:
+                built = build(from_data(scenario_keys(*cell) | {"controller": part}))
+            except BadInput:
+                continue
+            found = interruptible(lambda built=built: step_time(built))
+            (folder / STEP).write_text(to_json(found._asdict()) + "\n", encoding="utf-8")
+            return
+
+
+def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
+    """Write page and tables of all laws in the folder, and print the board."""
+    with stage(console, "scores and page"):
+        board = board_of(folder)
+        page, failures = write_board(board, folder, pdf)
+        rows = leader_rows(board)
+        (folder / "leaderboard.json").write_text(to_json(board.data(), indent=1) + "\n", encoding="utf-8")
+        (folder / "leaderboard.csv").write_text(as_csv(board), encoding="utf-8")
+        (folder / "leaderboard.md").write_text(as_markdown(rows), encoding="utf-8")
+    warn_of(failures)
+    shown = titled("Leader board", rows.head[0], *map(numbers, rows.head[1:]))
+    for row in rows.rows:
+        shown.add_row(*row)
+    console.print(shown)
+    console.print(SCORE, markup=False, highlight=False, soft_wrap=True)
+    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    return DONE

@@ -1,0 +1,89 @@
+"""Figures of the arena: errors of all laws in all tasks, and errors over every parameter until a law fails."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from undertow.arena.leader_board import Board, Standing
+from undertow.arena.robustness import PARAMETERS
+from undertow.arena.scores import FINEST, LOST
+from undertow.report.figures import style
+from undertow.report.figures.campaign import looks_of
+from undertow.report.formats import plain
+
+_SHOWN = 6  # laws with a colour in the charts of robustness; the others are grey
+_COLUMNS, _WIDTH, _HEIGHT = 3, 2.6, 1.75  # panels, in
+
+
+def arena_plots(board: Board) -> Mapping[str, Callable[[], Figure]]:
+    """The figures of a board by name."""
+    plots: dict[str, Callable[[], Figure]] = {"tasks": lambda: tasks_figure(board)}
+    shown = [one for one in board.standings if one.robustness]
+    return plots | ({"robustness": lambda: robustness_figure(shown)} if shown else {})
+
+
+def tasks_figure(board: Board) -> Figure:
+    """A cell for every law and task, its colour and number the error in tolerances."""
+    laws, tasks = [one.entry.name for one in board.standings], board.tasks
+    errors = np.array([[one.score.mean(board.of_task(task)) for task in tasks] for one in board.standings])
+    left, top, cell = 0.25 + 0.075 * max(map(len, laws)), 1.35, (0.6, 0.24)
+    figure = style.blank(left + cell[0] * len(tasks) + 0.3, top + cell[1] * len(laws) + 0.35)
+    style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
+    panel = style.place(figure, left, top, cell[0] * len(tasks), cell[1] * len(laws))
+    panel.imshow(errors, norm=LogNorm(FINEST, LOST), cmap="RdYlBu_r", aspect="auto")
+    panel.grid(False)
+    panel.xaxis.tick_top()
+    words = [task.replace("_", " ") for task in tasks]
+    panel.set_xticks(range(len(tasks)), words, rotation=40, ha="left", fontsize=style.SMALL)
+    panel.set_yticks(range(len(laws)), laws, fontsize=style.SMALL)
+    for (row, column), error in np.ndenumerate(errors):
+        extreme = error > 3 or error < 0.03  # the dark ends of the colours
+        colour = "white" if extreme else style.INK
+        panel.text(column, row, plain(float(error), 2), ha="center", va="center", fontsize=style.TINY, color=colour)
+    return figure
+
+
+def robustness_figure(shown: Sequence[Standing]) -> Figure:
+    """A panel for every parameter: the error over its levels; a line ends with a cross where a law is lost."""
+    rows = math.ceil(len(PARAMETERS) / _COLUMNS)
+    looks = looks_of([one.entry.name for one in shown[:_SHOWN]])
+    grey = {"others": style.Look("#b5b5b5", "-", 0.7, 1)} if len(shown) > _SHOWN else {}
+    figure = style.blank(0.7 + _COLUMNS * (_WIDTH + 0.55), 0.85 + rows * (_HEIGHT + 0.65))
+    style.head(figure, "Error / tolerance over one parameter after the other", {})
+    style.key(figure, looks | grey, 0.3, 7)
+    for number, (name, parameter) in enumerate(PARAMETERS.items()):
+        row, column = divmod(number, _COLUMNS)
+        left, top = 0.6 + column * (_WIDTH + 0.55), 0.85 + row * (_HEIGHT + 0.65)
+        panel = style.place(figure, left, top, _WIDTH, _HEIGHT)
+        for one in reversed(shown):
+            look = looks.get(one.entry.name, grey.get("others"))
+            if look is not None:
+                _line(panel, one, name, look)
+        panel.set_yscale("log")
+        panel.set_ylim(FINEST * 0.8, LOST * 1.4)
+        levels = np.array(parameter.levels)
+        if levels.max() > 5 * levels.min():
+            panel.set_xscale("log")
+        if levels[0] > levels[-1]:
+            panel.invert_xaxis()
+        ticks = list(parameter.levels[:: 2 if len(levels) > 5 else 1])
+        panel.set_xticks(ticks, [f"{one:g}" for one in ticks])
+        panel.xaxis.minorticks_off()
+        panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
+        style.label(panel, parameter.label, "error / tolerance" if column == 0 else "")
+    return figure
+
+
+def _line(panel: Axes, one: Standing, name: str, look: style.Look) -> None:
+    """Median errors up to the first level at which a trial is lost."""
+    curve = one.robustness[name]
+    lost = np.flatnonzero(curve.high >= LOST)
+    end = int(lost[0]) if len(lost) else len(curve.levels)
+    levels, errors = np.array(curve.levels), np.where(np.arange(len(curve.levels)) < end, curve.middle, LOST)
+    panel.plot(levels[: end + 1], errors[: end + 1], **look.line)
+    if end < len(levels):
+        panel.plot(levels[end], LOST, "x", color=look.colour, markersize=5, zorder=look.order)
