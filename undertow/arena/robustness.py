@@ -89,11 +89,6 @@ PARAMETERS = {
         (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         lambda factor: _load(_error(damping=factor)),
     ),
-    "light": Parameter(
-        "mass of the model / that of the vehicle",
-        (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
-        lambda factor: _load(_error(mass=1 / factor)),
-    ),
     "thrust": Parameter(
         "thrust / that of the model", (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0), lambda factor: _load(_error(thrust=factor))
     ),

@@ -31,7 +31,7 @@ def tasks_figure(board: Board) -> Figure:
     laws, tasks = [one.entry.name for one in board.standings], board.tasks
     errors = np.array([[one.score.mean(board.of_task(task)) for task in tasks] for one in board.standings])
     left, top, cell = 0.25 + 0.075 * max(map(len, laws)), 1.35, (0.6, 0.24)
-    figure = style.blank(left + cell[0] * len(tasks) + 0.3, top + cell[1] * len(laws) + 0.35)
+    figure = style.blank(9.6, top + cell[1] * len(laws) + 0.2)
     style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
     panel = style.place(figure, left, top, cell[0] * len(tasks), cell[1] * len(laws))
     panel.imshow(errors, norm=LogNorm(FINEST, LOST), cmap="RdYlBu_r", aspect="auto")
