@@ -53,7 +53,7 @@ def variant(cell: Cell) -> str:
 
 def prepare_entry(
     law: Candidate, trials: int, cells: Sequence[Cell] = CELLS, gains: Gains | None = None
-) -> tuple[Entry, Prepared | None]:
+) -> tuple[Entry, Prepared]:
     """The campaign of a law: a variant for every task and vehicle that it accepts.
 
     Args:
@@ -63,10 +63,10 @@ def prepare_entry(
         gains: tuned for each vehicle; None for those that the law has by itself.
 
     Returns:
-        What is kept of the law, and its campaign; None where it accepts no task.
+        What is kept of the law, and its campaign.
 
     Raises:
-        BadInput: the campaign cannot be built.
+        BadInput: the law accepts no task, or the campaign cannot be built.
     """
     part = law.changes["controller"]
     tuned = lambda vehicle: {} if gains is None else gains.options.get(vehicle, {})
@@ -76,10 +76,10 @@ def prepare_entry(
         prepared = campaign_of({variant(cell): keys for cell, keys in scenarios.items()}, trials)
     except BadInput:
         refused = {cell: why for cell in cells if (why := _refusal(scenarios[cell]))}
-        if not refused:
+        if len(refused) in (0, len(cells)):
             raise
         accepted = {variant(cell): keys for cell, keys in scenarios.items() if cell not in refused}
-        prepared = campaign_of(accepted, trials) if accepted else None
+        prepared = campaign_of(accepted, trials)
     sentences = {} if gains is None else gains.sentences
     return Entry(law.name, VERSION, part, tuple(cells), refused, sentences), prepared
 

@@ -15,6 +15,7 @@ from undertow.arena.entry import Cell, Entry, variant
 from undertow.arena.tasks import scenario_keys
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.store_results import Results, load
+from undertow.core.errors import BadInput
 from undertow.core.status import Status
 
 FINEST, LOST = 0.01, 10.0
@@ -96,10 +97,9 @@ def score_of(entry: Entry, folder: Path) -> Score:
     Raises:
         BadInput, OSError: the results are damaged.
     """
-    results = load(folder) if len(entry.refused) < len(entry.cells) else None
-    trials = 1 if results is None else results.campaign.trials
-    refused = {cell: _refused(trials) for cell in entry.refused}
-    ran = {} if results is None else _cells(results, [cell for cell in entry.cells if cell not in entry.refused])
+    results = load(folder)
+    refused = {cell: _refused(results.campaign.trials) for cell in entry.refused}
+    ran = _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
     return scored(entry.name, {cell: (refused | ran)[cell] for cell in entry.cells})
 
 
@@ -148,13 +148,16 @@ def _refused(trials: int) -> CellResult:
     return CellResult(np.full(trials, LOST), nothing, nothing, nothing, {"refused": trials})
 
 
-def _cells(results: Results, cells: Sequence[Cell]) -> dict[Cell, CellResult]:
+def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, CellResult]:
     """The trials of a campaign by task and vehicle."""
     combinations, rows = results.combinations, results.rows
     number = {name: place for place, (name,) in enumerate(map(results.named, range(len(cells))))}
     found = {}
     for cell in cells:
         mine = combinations == number[variant(cell)]
+        if not mine.any():
+            hint = "Run the arena again for this law, which continues"
+            raise BadInput("--out", "have trials of every task", f"none of {variant(cell)} for {law}", hint=hint)
         column = lambda name, mine=mine: rows[name].values[mine].astype(float)
         status = rows["status"].values[mine]
         position, orientation = map(column, METRICS)

@@ -147,8 +147,7 @@ def _run(
         raise BadInput(law.name, "be the law that is in the folder", f"another: its {different} differ", hint=hint)
     for cell, why in entry.refused.items():
         typer.echo(f"Advice: {law.name} cannot run {cell[0]} on {cell[1]}, which counts as lost: {why}", err=True)
-    if prepared is not None:
-        _trials(console, prepared, folder, workers)
+    _trials(console, prepared, folder, workers)
     write_entry(entry, folder)
     options = {} if gains is None else gains.options.get(VEHICLE, {})
     _finish(console, law, folder, cells, gains)

@@ -1,0 +1,64 @@
+"""The tasks of the arena: fixed per version, buildable, and of the size that their words say."""
+
+import hashlib
+import json
+import math
+
+import numpy as np
+import pytest
+
+from undertow.arena.tasks import CELLS, TASKS, VERSION, motion_keys, scenario_keys, training_keys
+from undertow.arena.vehicles import VEHICLES
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data
+
+# Version -> what its tasks hash to. A change of a task or of a vehicle is a new version with a line of its own.
+DIGESTS = {1: "668496711786e5ab"}
+
+
+def test_the_tasks_of_a_version_stay():
+    whole = json.dumps([scenario_keys(*cell) for cell in CELLS], sort_keys=True)
+    assert hashlib.sha256(whole.encode()).hexdigest()[:16] == DIGESTS[VERSION]
+
+
+def test_twelve_tasks_on_four_vehicles():
+    assert len(TASKS) == 12 and len(VEHICLES) == 4
+    assert len(CELLS) == len(set(CELLS)) == 12 * 4 - 2  # two vehicles cannot turn upside down
+    assert len({tuple(sorted(scenario_keys(*cell))) for cell in CELLS}) == 1  # variants of one campaign
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_task_builds(task):
+    for vehicle in TASKS[task].vehicles:
+        built = build(from_data(scenario_keys(task, vehicle) | {"controller": "pid"}))
+        assert built.closed_loop.plant.inputs() == (6 if task == "underactuated" else VEHICLES[vehicle].thrusters)
+        assert set(built.scenario.success) == {"position_rms", "orientation_rms"}
+
+
+def test_the_model_does_not_know_what_a_task_hides():
+    """Low supply, another parameter set and the errors of parameters are of the plant alone."""
+    low = build(from_data(scenario_keys("low_battery", "bluerov2_heavy") | {"controller": "pid"})).resolved
+    assert low["plant"]["thruster"]["supply"] == 12 and low["model"]["thruster"]["supply"] == 16
+    wrong = scenario_keys("wrong_model", "bluerov2_heavy")
+    assert wrong["model"]["vehicle"]["parameters"] == "wu2018" and wrong["plant"]["vehicle"] == "bluerov2_heavy"
+    assert all(any(one["kind"] == "parameter_error" for one in scenario_keys(*cell)["disturbance"]) for cell in CELLS)
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_the_motion_has_the_speed_of_its_vehicle(vehicle):
+    """The largest speed along one axis is 0.8 of the stated one, that of the others follows; from the figure itself."""
+    motion, v = motion_keys(vehicle)["reference"], VEHICLES[vehicle]
+    rates = [amplitude * rate for amplitude, rate in zip(motion["amplitude"], motion["frequency"], strict=True)]
+    assert rates[0] == pytest.approx(0.8 * v.speed) and math.hypot(*rates[:3]) < v.speed
+    twice = motion_keys(vehicle, 2.0)["reference"]
+    np.testing.assert_allclose(twice["frequency"], 2 * np.array(motion["frequency"]), rtol=1e-12)
+
+
+def test_training_is_on_no_task():
+    """Another motion, current and sea, on the same vehicle."""
+    for vehicle in VEHICLES:
+        training = training_keys(vehicle)
+        for task in TASKS:
+            if (task, vehicle) in CELLS:
+                keys = scenario_keys(task, vehicle)
+                assert keys["reference"] != training["reference"] and keys["disturbance"] != training["disturbance"]
