@@ -75,7 +75,7 @@ def prepare_entry(
     try:
         prepared = campaign_of({variant(cell): keys for cell, keys in scenarios.items()}, trials)
     except BadInput:
-        refused = {cell: why for cell in cells if (why := _refusal(scenarios[cell]))}
+        refused = {cell: why for cell in cells if (why := _why_not(scenarios[cell]))}
         if len(refused) in (0, len(cells)):
             raise
         accepted = {variant(cell): keys for cell, keys in scenarios.items() if cell not in refused}
@@ -91,7 +91,7 @@ def campaign_of(scenarios: dict[str, dict[str, Any]], trials: int) -> Prepared:
     return prepare_campaign(validate(text), text)
 
 
-def _refusal(keys: dict[str, Any]) -> str:
+def _why_not(keys: dict[str, Any]) -> str:
     """Why a scenario cannot be built; empty where it can."""
     try:
         build(from_data(keys))
