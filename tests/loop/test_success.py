@@ -1,9 +1,11 @@
 """A run that reached its end is `completed`; whether control succeeded is judged by a stated criterion."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from undertow.analysis.metrics import Metrics, for_people, output_groups, results
+from undertow.analysis.metrics import Metrics, accumulators, for_people, meanings, output_groups, results
 from undertow.analysis.success import judged
 from undertow.campaign.task import NOT_JUDGED, run_trials
 from undertow.controllers.pid import pid
@@ -13,7 +15,7 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import DoubleIntegrator
+from undertow.plants.double_integrator import DoubleIntegrator, double_integrator
 from undertow.references.setpoint import setpoint
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
@@ -39,6 +41,24 @@ def test_metres_and_radians_are_never_one_number():
     assert found["attitude_max"] == np.abs(error[:, [1, 3]]).max()
     np.testing.assert_allclose(found["error_rms_axes"], np.sqrt((error**2).mean(0)), rtol=1e-12)
     assert "tracking_rms" not in found
+
+
+def test_orientation_is_the_angle_of_the_rotation_between_attitude_and_target():
+    """Against SciPy, sample by sample, with pitches beyond 90 degrees; a target that is written in other angles is the same."""
+    plant = DoubleIntegrator(np.inf, outputs=("roll", "pitch", "yaw"), output_units=("rad",) * 3)
+    law, load = pid(plant.model(), frequency=2.0), sinusoid(np.array([1.0, 2.0, 3.0]), 1.0)
+    loop = ClosedLoop(plant, law, setpoint(np.array([0.3, 2.0, -1.0]), settling=3.0), load, perfect())
+    (metrics,) = accumulators(plant, (), 0.0, 3.99)
+    run = sampled.simulate(loop, duration=4.0, dt=0.02, record_every=1, accumulators=(metrics,))
+    euler = lambda name: Rotation.from_euler("ZYX", np.asarray(run.signals[name])[:, ::-1])
+    angles = (euler("reference") * euler("position").inv()).magnitude()[np.asarray(run.time) < 3.99]
+    found = results((metrics,), run.accumulated)["orientation_rms"]
+    assert found == pytest.approx(np.sqrt((angles**2).mean()), rel=1e-9)
+    same = {"reference": jnp.array([0.0, 2.0, 0.0]), "position": jnp.array([np.pi, np.pi - 2.0, np.pi])}
+    assert float(metrics._turn(same)) == pytest.approx(0.0, abs=1e-7)
+    assert "orientation_rms" not in meanings(
+        ClosedLoop(double_integrator(2), law, setpoint(np.zeros(2)), load, perfect())
+    )
 
 
 @pytest.mark.parametrize(
