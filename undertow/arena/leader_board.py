@@ -125,14 +125,18 @@ def vehicle_rows(board: Board) -> Rows:
     return Rows(("law", *board.vehicles), rows)
 
 
-def worst_ratio(board: Board, law: str, baseline: str = BASELINE) -> dict[str, float]:
-    """Task -> error of a law / that of another one: the geometric mean over the vehicles."""
+def ratio_rows(board: Board) -> Rows:
+    """Error of every law in every task / that of the baseline, as means over the vehicles; no rows without it."""
     scores = {one.entry.name: one.score for one in board.standings}
-    of = lambda name, cell: scores[name].cells[cell].error
-    return {
-        task: geometric_mean([of(law, cell) / of(baseline, cell) for cell in board.of_task(task)])
-        for task in board.tasks
-    }
+    head = ("law", *(task.replace("_", " ") for task in board.tasks), "largest on one vehicle")
+    if BASELINE not in scores:
+        return Rows(head, [])
+    rows = []
+    for name, score in scores.items():
+        ratios = {cell: score.cells[cell].error / scores[BASELINE].cells[cell].error for cell in board.cells}
+        means = (geometric_mean([ratios[cell] for cell in board.of_task(task)]) for task in board.tasks)
+        rows.append((name, *map(digits, means), digits(max(ratios.values()))))
+    return Rows(head, rows)
 
 
 def margin_rows(board: Board) -> Rows:

@@ -4,7 +4,16 @@ import math
 import re
 from pathlib import Path
 
-from undertow.arena.leader_board import Board, failures, leader_rows, margin_rows, task_rows, vehicle_rows
+from undertow.arena.leader_board import (
+    BASELINE,
+    Board,
+    failures,
+    leader_rows,
+    margin_rows,
+    ratio_rows,
+    task_rows,
+    vehicle_rows,
+)
 from undertow.arena.robustness import VEHICLE
 from undertow.arena.scores import tolerances
 from undertow.arena.tasks import TASKS, VERSION
@@ -59,7 +68,7 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
         f"{len(board.standings)} laws, {len(board.tasks)} tasks, {len(board.vehicles)} vehicles, {len(board.cells)} "
         f"pairs of them, {trials} {'trial' if trials == 1 else 'trials'} of each with the same seeds for all laws."
     )
-    margins, failed = margin_rows(board), failures(board)
+    margins, failed, ratios = margin_rows(board), failures(board), ratio_rows(board)
     path = folder / PAGE
     path.write_text(
         document(
@@ -70,6 +79,7 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
             _rows(leader_rows(board)),
             tag("p", prose(f"{SCORE} {HOW_LONG}"), class_="small"),
             section("tasks", "Errors by task", *_shown(pictures, "tasks"), _rows(task_rows(board))),
+            *([_ratios(ratios)] if ratios.rows else []),
             section("vehicles", "Errors by vehicle", _rows(vehicle_rows(board))),
             *([_robustness(pictures, margins)] if margins.rows else []),
             *([section("failures", "Failed trials", _rows(failed, words=3))] if failed.rows else []),
@@ -79,6 +89,11 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
         encoding="utf-8",
     )
     return path, saved.failures
+
+
+def _ratios(ratios: Rows) -> Html:
+    said = f"Error / that of preset `{BASELINE}`: the geometric mean over the vehicles; below 1 the law is better."
+    return section("ratios", f"Errors against {BASELINE}", _rows(ratios), tag("p", prose(said), class_="small"))
 
 
 def _robustness(pictures: dict[str, Html], margins: Rows) -> Html:
