@@ -89,8 +89,15 @@ PARAMETERS = {
         (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         lambda factor: _load(_error(damping=factor)),
     ),
-    "thrust": Parameter(
-        "thrust / that of the model", (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0), lambda factor: _load(_error(thrust=factor))
+    "strong": Parameter(
+        "thrust above that of the model, as a ratio",
+        (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
+        lambda factor: _load(_error(thrust=factor)),
+    ),
+    "weak": Parameter(
+        "thrust below that of the model, as a ratio",
+        (1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3),
+        lambda factor: _load(_error(thrust=factor)),
     ),
     "supply": Parameter("supply, V (the model has 16 V)", (16, 14, 12, 11, 10, 9, 8), _supply),
 }
