@@ -112,6 +112,19 @@ def test_damage_and_other_versions(folder, capsys, monkeypatch):
     assert file.read_text() == good
 
 
+def test_a_store_that_is_damaged(folder, capsys):
+    """The law is named, both when it continues and when another one enters beside it."""
+    few = ["--trials", "1", "--tasks", "payload", "--vehicles", "odin", "--out", "out"]
+    assert run(["arena", "pid", *few]) == 0
+    Path("out/laws/pid/trials.zarr/zarr.json").write_text("garbage")
+    assert run(["arena", "pid", *few]) == 2
+    assert "zarr.json is damaged" in capsys.readouterr().err
+    assert run(["arena", "again=pid", *few]) == 2
+    said = capsys.readouterr().err
+    assert "have results that can be read" in said and "Run the arena again for pid with --overwrite" in said
+    assert run(["arena", "pid", *few, "--overwrite"]) == 0
+
+
 def test_every_law_of_the_default_list_is_known():
     assert [one.name for one in laws(list(command.EVERY))] == list(command.EVERY)
 

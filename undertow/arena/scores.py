@@ -95,9 +95,13 @@ def score_of(entry: Entry, folder: Path) -> Score:
     """Score of a law from the folder with its results.
 
     Raises:
-        BadInput, OSError: the results are damaged.
+        BadInput: the results are damaged, or not complete.
     """
-    results = load(folder)
+    try:
+        results = load(folder)
+    except OSError as error:
+        hint = f"Run the arena again for {entry.name} with --overwrite"
+        raise BadInput("--out", "have results that can be read", str(error).partition(";")[0], hint=hint) from None
     refused = {cell: _refused(results.campaign.trials) for cell in entry.refused}
     ran = _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
     return scored(entry.name, {cell: (refused | ran)[cell] for cell in entry.cells})
