@@ -27,7 +27,7 @@ def run(plant, law, reference, duration, dt, load=None, **start):
     return {name: np.asarray(value) for name, value in found.signals.items()}
 
 
-# Slotine and Li (1991), Example 9.1: a_1 to a_4 of the arm. Section 9.2: motion and gains.
+# Slotine and Li (1991), Example 9.1: a_1 to a_4 of the arm; section 9.2: the adaptive law.
 A1, A2, A3, A4 = 3.34, 0.97, 1.2 * np.cos(np.pi / 6), 1.2 * np.sin(np.pi / 6)
 LAMBDA, K_D, GAMMA = 20.0, 100.0, np.array([0.03, 0.05, 0.1, 0.3])
 SWING, TURN = np.radians([30.0, 45.0]), 2 * np.pi
@@ -42,7 +42,7 @@ def regressor(q, v, v_r, a_r):
 
 
 def book(t, state):
-    """Arm, tau = Y a_hat - K_D s and a_hat_dot = -Gamma Y^T s: Eqs. (9.18) to (9.20) in the book's signs."""
+    """Arm, tau = Y a_hat - K_D s and a_hat_dot = -Gamma Y^T s, with s = e_dot + Lambda e and e = q - q_d."""
     q, v, known = np.split(state, [2, 4])
     error = q - SWING * (1 - np.cos(TURN * t))
     rate, asked = v - SWING * TURN * np.sin(TURN * t), SWING * TURN**2 * np.cos(TURN * t)
@@ -144,7 +144,7 @@ def unknown_mass(reference, slope, mass=0.0):
 
 @pytest.mark.parametrize(("moving", "final"), [(False, 1.315), (True, 1.996)])
 def test_unknown_mass_of_slotine_and_li(moving, final):
-    """Figures 8.5 and 8.6: errors vanish, and the estimate finds 2 kg only where the reference is persistent.
+    """Errors vanish, and the estimate finds 2 kg only where the reference is persistent.
 
     The law's filter has the slope l / 2, the book's l: 9 % less at the end of the first, and 0.02 % of the second. The
     nominal mass is 0.01 kg, the book's initial estimate 0; other parameters hardly move at this scale.
@@ -173,7 +173,7 @@ def test_unknown_mass_of_slotine_and_li(moving, final):
 
 
 def tuning_functions(error, rate, asked, estimate, given, c_3, gamma, lag):
-    """Krstic, Kanellakopoulos and Kokotovic (1995), Table 4.1, for x_1_dot = x_2, x_2_dot = x_3 + theta, c_1 = c_2 = 1.
+    """Krstic, Kanellakopoulos and Kokotovic (1995), ch. 4, for x_1_dot = x_2, x_2_dot = x_3 + theta, c_1 = c_2 = 1.
 
     The third equation, lag x_3_dot = u - x_3, has no unknown; the output is regulated to zero.
     """

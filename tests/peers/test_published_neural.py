@@ -29,7 +29,7 @@ def arm(q, v, torque):
 
 
 def theirs(gain):
-    """tau = W^T sigma(V^T x) + K_v r, with the tuning of their Theorem 2, from weights that give nothing."""
+    """tau = W^T sigma(V^T x) + K_v r, with their augmented backpropagation, from weights that give nothing."""
     spread = 0.5 / np.sqrt(11)
     hidden = np.random.default_rng(0).uniform(-spread, spread, (11, NEURONS))
     output, q, v, errors = np.zeros((NEURONS + 1, 2)), np.zeros(2), np.zeros(2), []

@@ -12,7 +12,7 @@ from undertow.navigation import perfect
 from undertow.plants import double_integrator
 from undertow.references import setpoint
 
-# k_1 = 1.5 L^(1/2), k_2 = 1.1 L: the usual gains since Levant (1998)
+# k_1 = 1.5 L^(1/2), k_2 = 1.1 L: Levant's, and the usual ones since
 FIRST, SECOND = 1.5, 1.1
 
 

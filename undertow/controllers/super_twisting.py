@@ -80,9 +80,9 @@ class SuperTwisting(AbstractAccelerationLaw):
 def contraction(first, second):
     """Largest ratio of |w - load| at successive crossings of the surface, under a load of rate at most L.
 
-    The worst load slows w by L until s turns, and drives it by L from there to the next crossing: no other gets as far
-    (the majorant of Levant 1993). With a = c_1 / 2 both parts are linear in |s|^(1/2) and in the time that runs as its
-    inverse. The gains are sufficient where the ratio is below 1, and then |s| and w contract in finite time.
+    The worst load slows w by L until s turns, and drives it by L from there to the next crossing: in the plane of s and
+    w its path encloses that of any other. Both parts are linear in |s|^(1/2) and w, in a time that runs as the inverse
+    of |s|^(1/2). Where the ratio is below 1, s and its rate vanish in finite time; where it is above, this load wins.
     """
     xp = jnp if isinstance(first + second, jax.Array) else np
     a, slow, fast = first / 2, 2 * xp.maximum(second - 1, _TINY), 2 * (second + 1)
