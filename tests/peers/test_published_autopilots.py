@@ -75,7 +75,7 @@ def demand_of_px4(turn, place, velocity, rates):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_demands_of_px4(seed):
-    """Within 2 % at angles of up to 0.15 rad, where the sine of PX4 is the angle; both within UUV_*_SAT."""
+    """Within 2 % at angles of up to 0.05 rad, where the sine of PX4 is the angle; both within UUV_*_SAT."""
     rng = np.random.default_rng(seed)
     model = VEHICLE.model().in_body_axes()
     law = cascade(VEHICLE.model(), preset="px4", sampling_time=1 / 250, authority=AUTHORITY, reference_frequency=0.0)
