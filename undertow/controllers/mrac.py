@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
 from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
@@ -105,7 +106,7 @@ class MRAC(AbstractAccelerationLaw):
 
     def _basis(self, y: Measurement, off: TrackingError) -> tuple[PerAxis, Float[Array, "n 4"]]:
         """Acceleration of the nominal law, and Phi."""
-        nominal = off.acceleration + self.frequency**2 * off.error + 2 * self.damping * self.frequency * off.rate
+        nominal = pole_placement(off, self.frequency, self.damping)
         v = self.model.coordinates.velocity(y)
         return nominal, jnp.stack([jnp.ones_like(v), v, jnp.abs(v) * v, nominal / self.scale], -1)
 

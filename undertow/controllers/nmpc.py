@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.observer_gains import gains_and_path
 from undertow.controllers.receding_horizon import Horizon, Improved, improved, regulator
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -182,18 +182,18 @@ def nmpc(
     if horizon is not None:
         checks.positive("horizon", horizon, "s")
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
-    bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
-    if horizon is None:
-        horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
-    path = actuation_for(
+    bandwidth, tracking, path = gains_and_path(
+        model,
         sampling_time,
-        tracking,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, actuator_rate),
+        order=1,
         motor=motor,
         reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
         direction=direction,
     )
+    if horizon is None:
+        horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
     return NMPC(
         model=model,
         actuation=path,
