@@ -13,7 +13,7 @@ from undertow.disturbances.adding import AbstractSmoothDisturbance
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
+from undertow.plants import double_integrator, linear_plant, two_link_arm
 from undertow.references import setpoint, sine
 
 
@@ -198,3 +198,27 @@ def test_the_piecewise_constant_adaptation_of_l1quad():
     size = lambda error: np.sqrt((error[400:] ** 2).mean())
     np.testing.assert_allclose(size(ours), size(theirs), rtol=0.2)
     np.testing.assert_allclose(np.abs(ours).max(), np.abs(theirs).max(), rtol=0.2)
+
+
+@pytest.mark.parametrize("size", [25.0, 100.0, 400.0])
+def test_l1_responses_scale_with_the_step(size):
+    """Cao and Hovakimyan (2006): in the transient, too, the output is that of a linear system, whatever is unknown.
+
+    The model is a double integrator, the plant x_ddot = 3 x - 5.9 x_dot + u: a hundredth of the step from the response
+    of w = 1 rad/s and zeta = 0.7, for every size of the step.
+    """
+    plant, dt, damping = linear_plant(gain=[[1.0]], position_term=[[3.0]], velocity_term=[[-5.9]]), 1e-3, 0.7
+    law = l1_adaptive(
+        plant.model(position_term=[[0.0]], velocity_term=[[0.0]]),
+        sampling_time=dt,
+        bandwidth=160.0,
+        tracking=1.0,
+        damping=damping,
+        motor="steady",
+        reference_frequency=0.0,
+    )
+    position = run(plant, law, setpoint([size]), 10.0, dt)["position"][:, 0]
+    time, turn = dt * np.arange(10001), np.sqrt(1 - damping**2)
+    wave = np.cos(turn * time) + damping / turn * np.sin(turn * time)
+    off = np.abs(position / size - 1 + np.exp(-damping * time) * wave).max()
+    np.testing.assert_allclose(off, 0.010887, rtol=1e-3)
