@@ -84,7 +84,8 @@ def contraction(first, second):
     w its path encloses that of any other. Both parts are linear in |s|^(1/2) and w, in a time that runs as the inverse
     of |s|^(1/2). Where the ratio is below 1, s and its rate vanish in finite time; where it is above, this load wins.
     """
-    xp = jnp if isinstance(first + second, jax.Array) else np
+    xp = jnp if isinstance(first, jax.Array) or isinstance(second, jax.Array) else np
+    first, second = xp.broadcast_arrays(first, second)
     a, slow, fast = first / 2, 2 * xp.maximum(second - 1, _TINY), 2 * (second + 1)
     # Squared cosines of the two angles less 1; at 0 both quotients are 1 / slow^(1/2).
     off = (slow - a**2) / slow
