@@ -1,4 +1,4 @@
-"""Laws against closed loops of other people's code on the same plants (data/rival_laws.json, benchmarks/rival_peers.py)."""
+"""Laws against closed loops of other people's code on the same plants: benchmarks/rival_peers.py printed them."""
 
 import json
 from pathlib import Path

@@ -52,7 +52,7 @@ def theirs(gain):
 
 
 def ours(gain):
-    """The law with unit masses as its model, so that inertia, weight and Coriolis forces are all left to the network."""
+    """The law with unit masses as its model: inertia, weight and Coriolis forces are all left to the network."""
     links = {"inner_mass": M1, "inner_centre": 1.0, "inner_inertia": 1e-9, "outer_mass": M2, "outer_centre": 1.0}
     plant = two_link_arm(**links, inner_length=1.0, outer_inertia=1e-9, outer_offset=0.0, gravity=GRAVITY)
     law = neural(

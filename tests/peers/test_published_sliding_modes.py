@@ -39,7 +39,7 @@ def twisting(bound, dt):
 def test_super_twisting_reaches_the_surface_in_the_time_of_its_half_turns(bound):
     """A constant load d met on the surface: turns are shorter by rho = exp(-pi k_1 / (8 k_2 - k_1^2)^(1/2)) each.
 
-    w moves at +-k_2, and so a turn from |w - d| takes (1 + rho) |w - d| / k_2: the time is (1 + rho) / (1 - rho) d / k_2.
+    w moves at +-k_2, so that a turn from |w - d| takes (1 + rho) |w - d| / k_2; in all (1 + rho) / (1 - rho) d / k_2.
     """
     load, dt = 2.0, 2e-4
     found = run(twisting(bound, dt), sinusoid(0.0, 1.0, offset=load), 8.0 / bound, dt)
