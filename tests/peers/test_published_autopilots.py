@@ -27,9 +27,9 @@ VEHICLE = hybrid_vehicle(bluerov2_heavy(), t200("ideal", supply=16.0, dead_zone=
 
 
 def attitude_of_ardusub(start, load, authority, gains, duration):
-    """One axis: angle P, and AC_PID with its filters of target and derivative; error in rad."""
+    """One axis: angle P, and AC_PID with its filters of target and derivative, at rest before; error in rad."""
     p, i, d, most, cutoff = gains
-    dt, share = 1 / RATE, 1 - np.exp(-2 * np.pi * cutoff / RATE)
+    dt, share = 1 / RATE, 1 / (1 + RATE / (2 * np.pi * cutoff))
     angle, rate, integral, target, slope, before, errors = start, 0.0, 0.0, 0.0, 0.0, None, []
     for _ in range(round(duration * RATE)):
         errors.append(-angle)
