@@ -110,6 +110,7 @@ def test_e_modification_forgets_and_projection_bounds():
     [
         ({"frequency": -1.0}, "frequency"),
         ({"damping": 0.2}, "damping"),
+        ({"damping": 0.4, "filter_ratio": 1.0}, "damping"),
         ({"adaptation": -1.0}, "adaptation"),
         ({"e_modification": -1.0}, "e_modification"),
         ({"bound": 0.0}, "bound"),

@@ -167,7 +167,7 @@ def test_a_prediction_that_is_not_finite_leaves_the_regulator():
     assert np.isfinite(after.law.plan.forces).all()
 
 
-@pytest.mark.parametrize(("key", "value"), [("steps", 1), ("horizon", 0.0), ("tracking", -1.0)])
+@pytest.mark.parametrize(("key", "value"), [("steps", 1), ("iterations", 0), ("horizon", 0.0), ("tracking", -1.0)])
 def test_options_that_no_horizon_can_have(key, value):
     with pytest.raises(BadInput, match=key):
         nmpc(double_integrator(6).model(), **{key: value})

@@ -3,10 +3,11 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 from undertow.controllers import pid, super_twisting
-from undertow.controllers.super_twisting import least_second
+from undertow.controllers.super_twisting import contraction, least_second
 from undertow.core.errors import BadInput
 from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled
@@ -100,12 +101,34 @@ def test_inside_the_layer_it_is_a_pid():
     np.testing.assert_allclose(ours.signals["input"], theirs.signals["input"], atol=2e-3)
 
 
-@pytest.mark.parametrize("first", [1.0, 1.5, 2.0, 3.0])
-def test_least_second_gain_is_where_the_peak_is_one(first):
-    frequency = np.geomspace(1e-4, 1e2, 200_001)
-    p, second = 1j * frequency, float(least_second(jnp.asarray(first)))
-    peak = np.abs(0.5 / (p**2 + p * first / 2 + second / 2)).max()
-    np.testing.assert_allclose(peak, 1.0, rtol=1e-6)
+def crossing_under_the_worst_load(first, second):
+    """|w - load| at the next crossing, from 1 at the last one, in the coordinates |s|^(1/2) and w - load."""
+
+    def until(rate, start, event):
+        event.terminal, event.direction = True, -1
+        slope = lambda _, y: [y[1] - first * y[0], -2 * rate * y[0]]
+        return solve_ivp(slope, (0, 1e4), start, events=event, rtol=1e-10, atol=1e-12).y[:, -1]
+
+    turn = until(second - 1, [1e-12, 1.0], lambda _, y: y[1] - first * y[0])
+    return -until(second + 1, [turn[0], turn[1] * (1 - 1e-10)], lambda _, y: y[0])[1]
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.0, 1.1), (1.5, 1.1), (2.0, 1.1), (1.0, 2.2), (1.5, 1.3), (0.5, 2.0)])
+def test_contraction_is_that_of_the_worst_load(first, second):
+    expected = crossing_under_the_worst_load(first, second)
+    np.testing.assert_allclose(contraction(np.array(first), np.array(second)), expected, rtol=1e-5)
+    np.testing.assert_allclose(contraction(jnp.array(first), jnp.array(second)), expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("first", [0.5, 0.9, 1.5, 3.0])
+def test_least_second_gain_is_where_nothing_contracts(first):
+    """Large first gains reject every load that the second one exceeds."""
+    least = least_second(np.array(first))
+    assert (contraction(np.array(first), least * (1 + 1e-6)) < 1).all()
+    if first < 1.0:
+        np.testing.assert_allclose(contraction(np.array(first), least), 1.0, rtol=1e-6)
+    else:
+        np.testing.assert_allclose(least, 1.0, rtol=1e-6)
 
 
 def test_limits_do_not_wind_up():
@@ -123,7 +146,7 @@ def test_limits_do_not_wind_up():
         ({"rate_bound": 0.0}, "rate_bound"),
         ({"layer": 0.0}, "layer"),
         ({"second": 0.9}, "second"),
-        ({"first": 1.0, "second": 1.1}, "second"),
+        ({"first": 0.9, "second": 1.1}, "second"),
         ({"motor": "magic"}, "motor"),
     ],
 )

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
-from undertow.controllers.second_order_observer import observer_gains
+from undertow.controllers.observer_gains import gains_with_feedback
 from undertow.controllers.tracking_error import check_gains
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -110,7 +110,7 @@ def adrc(
         BadInput: a value is out of its range, or two options set the same quantity.
     """
     model = model.in_body_axes()
-    bandwidth, feedback, path = observer_gains(
+    bandwidth, feedback, path = gains_with_feedback(
         model,
         sampling_time,
         (velocity_noise, load_rate, delay),

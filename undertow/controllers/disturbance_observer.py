@@ -5,9 +5,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.observer_gains import gains_and_path
+from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
@@ -51,10 +52,8 @@ class DisturbanceObserver(AbstractAccelerationLaw):
         return ObserverState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
     def demand(self, own: ObserverState, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
         estimate = self._estimate(own, y)
-        demanded = acceleration + self.tracking**2 * error + 2 * self.damping * self.tracking * rate
-        return demanded - estimate, {"estimate": estimate}
+        return pole_placement(off, self.tracking, self.damping) - estimate, {"estimate": estimate}
 
     def adapt(self, own: ObserverState, y: Measurement, off: TrackingError, given: Given, dt) -> ObserverState:
         estimate = self._estimate(own, y)
@@ -113,15 +112,15 @@ def disturbance_observer(
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
-    bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
-    path = actuation_for(
+    bandwidth, tracking, path = gains_and_path(
+        model,
         sampling_time,
-        tracking,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, actuator_rate),
+        order=1,
         feedforward=feedforward,
         motor=motor,
         reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
         direction=direction,
     )
     return DisturbanceObserver(model=model, actuation=path, bandwidth=bandwidth, tracking=tracking, damping=damping)

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
+from undertow.controllers.observer_gains import gains_and_path
+from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
@@ -62,10 +63,11 @@ class L1Adaptive(AbstractAccelerationLaw):
         return PredictorState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
     def demand(self, own: PredictorState, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
         seen = self._adapted(own, y)
-        demanded = acceleration + self.tracking**2 * error + 2 * self.damping * self.tracking * rate - seen.filtered
-        return demanded, {"estimate": seen.filtered, "modelling_error": seen.error}
+        return pole_placement(off, self.tracking, self.damping) - seen.filtered, {
+            "estimate": seen.filtered,
+            "modelling_error": seen.error,
+        }
 
     def adapt(self, own: PredictorState, y: Measurement, off: TrackingError, given: Given, dt) -> PredictorState:
         seen, velocity = self._adapted(own, y), self.model.coordinates.velocity(y)
@@ -131,15 +133,15 @@ def l1_adaptive(
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
-    bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
-    path = actuation_for(
+    bandwidth, tracking, path = gains_and_path(
+        model,
         sampling_time,
-        tracking,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, actuator_rate),
+        order=1,
         feedforward=feedforward,
         motor=motor,
         reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
         direction=direction,
     )
     return L1Adaptive(

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
 from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
@@ -40,11 +41,11 @@ class MRAC(AbstractAccelerationLaw):
     theta* constant V = 1/2 E^T P E + |theta - theta*|^2 / (2 gamma) falls as V_dot = -1/2 E^T Q E.
 
     P is the one with p_22 = 1, p_12 = c, p_11 = w^2 + 2 zeta w c: Q = diag(2 w^2 c, 4 zeta w - 2 c) and s = e_dot + c e
-    of E; c = w / 2. With the load as only parameter the law is a PID with k_d = 2 zeta w, k_p = w^2 + gamma and
+    of E. With the load as only parameter the law is a PID with k_d = 2 zeta w, k_p = w^2 + gamma and
     k_i = gamma c.
 
     Raises:
-        BadInput: a number of the wrong sign, or a damping ratio of at most 1/4, for which Q is not positive.
+        BadInput: a number of the wrong sign, or a damping ratio of at most c / 2 w, for which Q is not positive.
     """
 
     model: Model
@@ -57,16 +58,19 @@ class MRAC(AbstractAccelerationLaw):
     e_modification: Float[Param, "..."] = param("", "leakage per filtered error", symbol="sigma")
     bound: Float[Param, "..."] = param("m/s^2, rad/s^2", "largest size of a parameter", symbol="theta_max")
     scale: Float[Param, "..."] = param("m/s^2, rad/s^2", "scale of the nominal acceleration", symbol="A")
+    filter_ratio: Float[Param, "..."] = param("", "slope c of the filtered error over w", symbol="c / w")
 
     def __check_init__(self):
-        for name in ("frequency", "damping", "adaptation", "e_modification", "bound", "scale"):
+        for name in ("frequency", "damping", "adaptation", "e_modification", "bound", "scale", "filter_ratio"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
-        for name in ("frequency", "damping", "bound", "scale"):
+        for name in ("frequency", "damping", "bound", "scale", "filter_ratio"):
             checks.positive(name, getattr(self, name))
         for name in ("adaptation", "e_modification"):
             checks.not_negative(name, getattr(self, name))
-        if not checks.assumed(lambda damping: (damping > _SLOPE / 2).all(), self.damping):
-            raise BadInput("damping", f"be more than {_SLOPE / 2:g}", float(np.min(self.damping)))
+        enough = lambda damping, ratio: (damping > ratio / 2).all()
+        if not checks.assumed(enough, self.damping, self.filter_ratio):
+            least = float(np.max(self.filter_ratio)) / 2
+            raise BadInput("damping", f"be more than {least:g}, half of `filter_ratio`", float(np.min(self.damping)))
 
     def begin(self, y: Measurement, r: Target) -> AdaptiveState:
         still = jnp.zeros_like(y.position)
@@ -86,7 +90,7 @@ class MRAC(AbstractAccelerationLaw):
         """
         _, basis = self._basis(y, off)
         error, rate = jnp.where(own.begun > 0, own.error, off.error), jnp.where(own.begun > 0, own.rate, off.rate)
-        filtered = (off.rate - rate + _SLOPE * self.frequency * (off.error - error))[:, None]
+        filtered = (off.rate - rate + self.filter_ratio * self.frequency * (off.error - error))[:, None]
         share = jnp.broadcast_to(self.e_modification, off.error.shape)[:, None]
         moved = basis * filtered + share * jnp.abs(filtered) * own.parameters
         speed = jnp.minimum(self.adaptation, self.damping * self.frequency / (dt * (basis**2).sum(-1)))[:, None]
@@ -105,7 +109,7 @@ class MRAC(AbstractAccelerationLaw):
 
     def _basis(self, y: Measurement, off: TrackingError) -> tuple[PerAxis, Float[Array, "n 4"]]:
         """Acceleration of the nominal law, and Phi."""
-        nominal = off.acceleration + self.frequency**2 * off.error + 2 * self.damping * self.frequency * off.rate
+        nominal = pole_placement(off, self.frequency, self.damping)
         v = self.model.coordinates.velocity(y)
         return nominal, jnp.stack([jnp.ones_like(v), v, jnp.abs(v) * v, nominal / self.scale], -1)
 
@@ -123,6 +127,7 @@ def mrac(
     e_modification=0.0,
     bound=None,
     scale=None,
+    filter_ratio=_SLOPE,
     feedforward: bool = True,
     motor: str = "steady",
     reference_frequency=None,
@@ -144,13 +149,15 @@ def mrac(
         delay: that of measurement and input together, s.
         frequency: natural frequency w of the reference model, rad/s; one number or one per axis. None: the one of least
             predicted cost that keeps the margins of `bandwidths.py` with the other defaults.
-        damping: its damping ratio, more than 1/4.
+        damping: its damping ratio, more than half of `filter_ratio`.
         adaptation: gamma, 1/s^2; one number or one per axis. None: a fifth of w^2. 0 for the baseline law alone.
         e_modification: sigma: parameters decay by sigma |s|; 0 for none.
         bound: largest size of each parameter, m/s^2 and rad/s^2. None: the authority of the actuators, 10 where
             they have no limit.
         scale: A: the parameter of effectiveness is a share of this acceleration, m/s^2 and rad/s^2. None: twice
             the bound, so that half of the effectiveness may be missing.
+        filter_ratio: slope c of the filtered error s = e_dot + c e over w: with a larger one, position teaches more
+            than velocity.
         feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
@@ -187,6 +194,7 @@ def mrac(
         e_modification=e_modification,
         bound=bound,
         scale=2 * jnp.asarray(bound, dtype=float) if scale is None else scale,
+        filter_ratio=filter_ratio,
     )
 
 

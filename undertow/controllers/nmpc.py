@@ -1,14 +1,15 @@
-"""Nonlinear model predictive control: forces over the next second, one optimisation step per sampling time."""
+"""Nonlinear model predictive control: forces over the next second, a few optimisation steps per sampling time."""
 
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.observer_gains import gains_and_path
 from undertow.controllers.receding_horizon import Horizon, Improved, improved, regulator
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -37,8 +38,8 @@ class NMPC(AbstractAccelerationLaw):
 
     e_ddot = a_d - F(x) - G(x) f - d_hat along the predicted motion; a_d and d_hat are held over the horizon. Where no
     limit binds this is the law a = a_d + w^2 e + 2 w e_dot - d_hat, up to the step of the horizon. Real-time iteration
-    (Diehl, Bock and Schloeder 2005): after each measurement one Gauss-Newton step from the plan of before; the next
-    measurement enters by the feedback gain of that step. d_hat is that of `disturbance_observer`.
+    (Diehl, Bock and Schloeder 2005): after each measurement a few Gauss-Newton steps from the plan of before; the next
+    measurement enters by the feedback gain of the last one. d_hat is that of `disturbance_observer`.
 
     Raises:
         BadInput: a value is not positive.
@@ -52,6 +53,7 @@ class NMPC(AbstractAccelerationLaw):
     )
     horizon: Float[Param, ""] = param("s", "length of the horizon")
     steps: int = eqx.field(static=True, default=10)
+    iterations: int = eqx.field(static=True, default=2)
 
     def __check_init__(self):
         for name in ("bandwidth", "tracking", "horizon"):
@@ -86,7 +88,9 @@ class NMPC(AbstractAccelerationLaw):
         moved = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
         moved = jnp.where(jnp.isfinite(moved).all(), jnp.clip(moved, horizon.low[None, :], horizon.high[None, :]), 0.0)
         start = jnp.concatenate([off.error, off.rate])
-        plan = improved(self._motion(y, off, estimate), horizon, start, moved)
+        motion = self._motion(y, off, estimate)
+        again = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
+        plan, _ = jax.lax.scan(again, own.plan._replace(forces=moved, start=start), None, self.iterations)
         predicted = self.model.coordinates.velocity(y) + dt * (given.known + estimate)
         return PlannedState(plan, off.acceleration, predicted, estimate, dt)
 
@@ -136,6 +140,7 @@ def nmpc(
     tracking=None,
     horizon=None,
     steps: int = 10,
+    iterations: int = 2,
     motor: str = "computed",
     reference_frequency=None,
     actuator_rate=None,
@@ -159,6 +164,8 @@ def nmpc(
             `disturbance_observer`.
         horizon: its length, s; None: 4 / w of the slowest axis, 1 s at most.
         steps: its number of steps.
+        iterations: Gauss-Newton steps per sampling time. With one, a plan for which limits begin to bind or cease to
+            bind is used before it has converged.
         motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
             no filter.
@@ -170,19 +177,29 @@ def nmpc(
     """
     if steps < 2:
         raise BadInput("steps", "be at least 2", steps)
+    if iterations < 1:
+        raise BadInput("iterations", "be at least 1", iterations)
     if horizon is not None:
         checks.positive("horizon", horizon, "s")
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
-    bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate, order=1)
-    if horizon is None:
-        horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
-    path = actuation_for(
+    bandwidth, tracking, path = gains_and_path(
+        model,
         sampling_time,
-        tracking,
+        (velocity_noise, load_rate, delay),
+        (bandwidth, tracking, actuator_rate),
+        order=1,
         motor=motor,
         reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
         direction=direction,
     )
-    return NMPC(model=model, actuation=path, bandwidth=bandwidth, tracking=tracking, horizon=horizon, steps=steps)
+    if horizon is None:
+        horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
+    return NMPC(
+        model=model,
+        actuation=path,
+        bandwidth=bandwidth,
+        tracking=tracking,
+        horizon=horizon,
+        steps=steps,
+        iterations=iterations,
+    )

@@ -1,5 +1,6 @@
 """Super-twisting sliding-mode control: finite time against a load of bounded rate, by a continuous input."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -17,6 +18,7 @@ PerAxis = Float[Array, " n"]
 
 _FIRST, _SECOND = 2.0, 1.1
 _SHARE = 0.1  # 1/s, rate of the load over the authority of the actuators
+_TINY = 1e-12
 _STEEP = 2.0  # gain of the first term inside the layer over the slope of the surface
 
 
@@ -48,7 +50,7 @@ class SuperTwisting(AbstractAccelerationLaw):
         for name in ("slope", "rate_bound", "layer", "first", "second"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
             checks.positive(name, getattr(self, name))
-        enough = lambda first, second: (second > least_second(first)).all()
+        enough = lambda first, second: (contraction(first, second) < 1).all()
         if not checks.assumed(enough, self.first, self.second):
             least = float(np.max(least_second(np.asarray(self.first))))
             raise BadInput("second", f"be more than {least:.4g} with this `first`", float(np.min(self.second)))
@@ -75,14 +77,36 @@ class SuperTwisting(AbstractAccelerationLaw):
         return ESTIMATE | {"surface": Signal(("axis",), "[axis]/s", "distance s from the surface")} | ATTAINED_SHARE
 
 
-def least_second(first):
-    """c_2 above which every load whose rate is at most L is rejected in finite time.
+def contraction(first, second):
+    """Largest ratio of |w - load| at successive crossings of the surface, under a load of rate at most L.
 
-    With (|s|^(1/2) sign s, w) as state the law is a linear system whose uncertain feedback is at most L (Moreno and
-    Osorio 2012); the bounded real lemma asks that the peak of (1/2) / (p^2 + p c_1 / 2 + c_2 / 2) be below 1.
+    The worst load slows w by L until s turns, and drives it by L from there to the next crossing: in the plane of s and
+    w its path encloses that of any other. Both parts are linear in |s|^(1/2) and w, in a time that runs as the inverse
+    of |s|^(1/2). Where the ratio is below 1, s and its rate vanish in finite time; where it is above, this load wins.
     """
-    counted = first.clip(max=2.0)  # from there on the peak is at p = 0
-    return 2 / counted**2 + counted**2 / 8
+    xp = jnp if isinstance(first, jax.Array) or isinstance(second, jax.Array) else np
+    first, second = xp.broadcast_arrays(first, second)
+    a, slow, fast = first / 2, 2 * xp.maximum(second - 1, _TINY), 2 * (second + 1)
+    # Squared cosines of the two angles less 1; at 0 both quotients are 1 / slow^(1/2).
+    off = (slow - a**2) / slow
+    off = xp.where(abs(off) < _TINY, _TINY, off)
+    turn = xp.arccos(xp.sqrt(1 - xp.maximum(off, 0.0))) + xp.arccosh(xp.sqrt(1 - xp.minimum(off, 0.0)))
+    left = xp.maximum(fast - a**2, _TINY)
+    surface = xp.arccos(-a / xp.sqrt(a**2 + left)) / xp.sqrt(left)
+    ratio = xp.sqrt(fast / slow) * xp.exp(-a * (turn / xp.sqrt(abs(off) * slow) + surface))
+    ratio = xp.where(a**2 < fast, ratio, 0.0)  # else the surface is reached without a further crossing
+    return xp.where(second > 1, ratio, xp.inf)
+
+
+def least_second(first):
+    """c_2 above which every load whose rate is at most L is rejected in finite time."""
+    first = np.asarray(first, dtype=float)
+    low, high = np.ones_like(first), np.full_like(first, 1e4)
+    for _ in range(60):
+        middle = (low + high) / 2
+        enough = contraction(first, middle) < 1
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return high
 
 
 def super_twisting(

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractCoordinates, Measurement, Target
+from undertow.core.contracts import AbstractCoordinates, Measurement, Target, TrackingError
 
 PerAxis = Float[Array, " n"]
 # One for all axes, or one per axis.
@@ -30,6 +30,17 @@ def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measuremen
     """Errors of a measurement against a target, with P of Eq. (21)."""
     error, rate, acceleration = coordinates.tracking_error(y, r)
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
+
+
+def pole_placement(off: TrackingError, frequency: Float[Array, "..."], damping: Float[Array, "..."]) -> PerAxis:
+    """a_d + w^2 e + 2 zeta w e_dot, m/s^2 and rad/s^2: where it is given, e_ddot = -w^2 e - 2 zeta w e_dot.
+
+    Args:
+        off: errors from the target, and its acceleration.
+        frequency: w, rad/s; one number or one per axis.
+        damping: zeta.
+    """
+    return off.acceleration + frequency**2 * off.error + 2 * damping * frequency * off.rate
 
 
 def check_gains(feedback: Array, weight: Array, per_axis: dict[str, Any], axes: int) -> None:

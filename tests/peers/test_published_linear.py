@@ -1,0 +1,85 @@
+"""pid and lqi: gains of textbooks, and those of python-control for the same cost."""
+
+import control
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from undertow.controllers import pid
+from undertow.controllers.lqi import lqi_gains
+from undertow.disturbances import none
+from undertow.loop import sampled
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation import perfect
+from undertow.plants import double_integrator, two_link_arm
+from undertow.references import setpoint
+
+SHORT = 1e-5  # s: the sampled design is the continuous one
+
+
+def gains(frequency, integral_weight, rate_weight, lag=0.0, dt=SHORT):
+    return np.asarray(lqi_gains(*map(jnp.asarray, (frequency, integral_weight, rate_weight, lag, dt))))
+
+
+def test_gains_of_fossens_pole_placement():
+    """K_p = m w^2, K_d = 2 zeta w m, K_i = w K_p / 10: Fossen (2021), Algorithm 15.2, as in PIDnonlinearMIMO.m of MSS.
+
+    For the Otter's w = 2.5 rad/s and zeta = 1 they are 6.25, 5 and 1.5625 for each unit of inertia.
+    """
+    law = pid(double_integrator(1).model(), frequency=2.5, damping=1.0)
+    np.testing.assert_allclose([law.proportional, law.derivative, law.integral], [6.25, 5.0, 1.5625])
+
+
+def arm_under_proportional_and_derivative_torques(t, state):
+    """Slotine and Li (1991), Example 9.1: tau = -K_p (q - q_d) - K_d q_dot with K_d = 100 I and K_p = 20 K_d."""
+    q, v = np.split(state, 2)
+    a1, a2, a3, a4 = 3.34, 0.97, 1.2 * np.cos(np.pi / 6), 1.2 * np.sin(np.pi / 6)
+    c, h = a3 * np.cos(q[1]) + a4 * np.sin(q[1]), a3 * np.sin(q[1]) - a4 * np.cos(q[1])
+    tau = 2000 * (GOAL - q) - 100 * v + h * np.array([(2 * v[0] + v[1]) * v[1], -(v[0] ** 2)])
+    return np.concatenate([v, np.linalg.solve([[a1 + 2 * c, a2 + c], [a2 + c, a2]], tau)])
+
+
+GOAL = np.radians([60.0, 90.0])
+
+
+def test_position_of_an_arm_by_proportional_and_derivative_control():
+    """From rest at zero, for one second: with unit masses as its model the law gives these torques."""
+    plant, dt = two_link_arm(gravity=0.0), 1e-3
+    law = pid(double_integrator(2).model(), sampling_time=dt, gains=(2000.0, 0.0, 100.0), reference_frequency=0.0)
+    loop = ClosedLoop(plant, law, setpoint(GOAL), none(), perfect())
+    found = np.asarray(sampled.simulate(loop, duration=1.0, dt=dt, record_every=1).signals["position"])
+    time = dt * np.arange(1001)
+    expected = solve_ivp(arm_under_proportional_and_derivative_torques, (0, 1), np.zeros(4), t_eval=time, rtol=1e-8)
+    np.testing.assert_allclose(found, expected.y[:2].T, atol=0.02 * GOAL.max())
+    np.testing.assert_allclose(found[-1], GOAL, atol=1e-3)
+
+
+def test_regulator_of_the_double_integrator():
+    """Q = I and R = 1 give K = (1, sqrt(3)), the Riccati equation solved by hand. Without the integral here."""
+    integral, error, rate, given = gains(1.0, 1e-9, 1.0)
+    np.testing.assert_allclose([error, rate], [1.0, np.sqrt(3)], rtol=1e-4)
+    assert abs(integral) < 1e-8 and given == 0.0
+
+
+@pytest.mark.parametrize(("w", "rho", "sigma"), [(2.0, 0.1, 1.0), (1.0, 0.5, 2.0), (5.0, 0.2, 0.5)])
+def test_gains_of_python_control(w, rho, sigma):
+    """`control.lqr` with integral action, of the same cost; its states are position, velocity and integral."""
+    plant = control.ss([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], np.eye(2), 0)
+    cost = np.diag([w**2, sigma * w, rho * w**3]) ** 2
+    expected = np.asarray(control.lqr(plant, cost, np.eye(1), integral_action=np.array([[1.0, 0.0]]))[0])[0]
+    integral, error, rate, _ = gains(w, rho, sigma)
+    np.testing.assert_allclose([error, rate, integral], expected, rtol=2e-4)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.3])
+def test_gains_of_python_control_with_the_lag_of_actuators(lag):
+    """The acceleration that actuators give is a fourth state."""
+    w, rho, sigma = 3.0, 0.2, 1.0
+    a = np.zeros((4, 4))
+    a[0, 1] = a[2, 0] = a[1, 3] = 1.0  # position, velocity, integral, given acceleration
+    a[3, 3] = -1 / lag
+    cost = np.diag([w**2, sigma * w, rho * w**3, 0.0]) ** 2
+    expected = np.asarray(control.lqr(a, [[0.0], [0.0], [0.0], [1 / lag]], cost, np.eye(1))[0])[0]
+    integral, error, rate, given = gains(w, rho, sigma, lag)
+    np.testing.assert_allclose([error, rate, integral, given], expected, rtol=1e-3)
