@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import typer
 from rich.console import Console
@@ -30,9 +30,8 @@ from undertow.comparison.step_time import step_time
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.report.arena_page import PAGE, SCORE, write_board
-from undertow.scenario.build import build
 from undertow.scenario.finished_run import to_json
-from undertow.scenario.reading import dump, from_data
+from undertow.scenario.reading import dump
 
 # All laws of undertow but for `nmpc`, which runs by XLA and takes hours.
 EVERY = (
@@ -59,6 +58,17 @@ _TUNING, _SCENARIOS = "tuning", "scenarios"
 _WRITTEN = (PAGE, "leaderboard.json", "leaderboard.csv", "leaderboard.md", "figures")
 
 
+class _Asked(NamedTuple):
+    """What every law runs."""
+
+    trials: int
+    cells: tuple[Cell, ...]
+    budget: int | None  # evaluations of gains for each vehicle
+    robustness: bool
+    workers: int
+    overwrite: bool
+
+
 def arena(
     entries: Sequence[str],
     out: Path | None,
@@ -76,9 +86,8 @@ def arena(
     checks.positive("--trials", trials)
     if budget is not None:
         check_budget(budget)
-    count = worker_count(workers)
     found = laws([word for entry in entries or EVERY for word in entry.split(",")])
-    cells = _cells(tasks, vehicles)
+    asked = _Asked(trials, _cells(tasks, vehicles), budget, robustness, worker_count(workers), overwrite)
     console = wide_console()
     with output_folder(out or Path("runs") / "arena", Path()) as folder:
         _check_place(folder)
@@ -90,7 +99,7 @@ def arena(
         try:
             for number, law in enumerate(found, 1):
                 console.rule(f"{law.name} ({number} of {len(found)})", align="left")
-                _run(console, law, folder_of(folder, law.name), trials, cells, budget, robustness, count, overwrite)
+                _run(console, law, folder_of(folder, law.name), asked)
         except (KeyboardInterrupt, OSError):
             typer.echo(f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *again])}", err=True)
             raise
@@ -123,38 +132,32 @@ def _cells(tasks: str | None, vehicles: str | None) -> tuple[Cell, ...]:
     return found
 
 
-def _run(
-    console: Console,
-    law: Candidate,
-    folder: Path,
-    trials: int,
-    cells: tuple[Cell, ...],
-    budget: int | None,
-    robustness: bool,
-    workers: int,
-    overwrite: bool,
-) -> None:
+def _run(console: Console, law: Candidate, folder: Path, asked: _Asked) -> None:
     """Tune and run one law, as far as its folder does not have that already."""
-    if overwrite:
+    if asked.overwrite:
         results_folder.remove(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    gains = None if budget is None else _tuned(console, law, folder, cells, budget)
+    gains = None if asked.budget is None else _tuned(console, law, folder, asked.cells, asked.budget)
     with stage(console, "building"):
-        entry, prepared = interruptible(lambda: prepare_entry(law, trials, cells, gains))
+        entry, prepared = interruptible(lambda: prepare_entry(law, asked.trials, asked.cells, gains))
     if (folder / ENTRY).exists() and (kept := read_entry(folder)) != entry:
         different = next(name for name in entry._fields if getattr(entry, name) != getattr(kept, name))
         hint = "Give the law another name (NAME=ENTRY), choose another folder, or run it again with --overwrite"
         raise BadInput(law.name, "be the law that is in the folder", f"another: its {different} differ", hint=hint)
     for cell, why in entry.refused.items():
         typer.echo(f"Advice: {law.name} cannot run {cell[0]} on {cell[1]}, which counts as lost: {why}", err=True)
-    _trials(console, prepared, folder, workers)
+    _trials(console, prepared, folder, asked.workers)
     write_entry(entry, folder)
-    options = {} if gains is None else gains.options.get(VEHICLE, {})
-    _finish(console, law, folder, cells, gains)
-    if robustness:
+    _write_scenarios(law, folder / _SCENARIOS, asked.cells, gains)
+    if not (folder / STEP).exists():
+        with stage(console, "time of a step"):
+            found = interruptible(lambda: step_time(prepared.first))
+            (folder / STEP).write_text(to_json(found._asdict()) + "\n", encoding="utf-8")
+    if asked.robustness:
+        options = {} if gains is None else gains.options.get(VEHICLE, {})
         with stage(console, "building robustness"):
-            harder = interruptible(lambda: prepare_robustness(law, max(2, trials // 4), options))
-        _trials(console, harder, folder / FOLDER, workers)
+            harder = interruptible(lambda: prepare_robustness(law, max(2, asked.trials // 4), options))
+        _trials(console, harder, folder / FOLDER, asked.workers)
 
 
 def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> Gains:
@@ -176,27 +179,15 @@ def _trials(console: Console, prepared: Prepared, folder: Path, workers: int) ->
     run_trials(console, prepared, folder, None if (folder / STORE).exists() else (), None, workers)
 
 
-def _finish(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
-    """Scenarios of the tasks, which `undertow simulate` runs, and the computing time of a step."""
+def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
+    """Write the scenario of every task, which `undertow simulate` runs."""
     part: dict[str, Any] = law.changes["controller"]
-    place = folder / _SCENARIOS
-    place.mkdir(exist_ok=True)
+    folder.mkdir(exist_ok=True)
     for task, vehicle in cells:
         tuned = {} if gains is None else gains.options.get(vehicle, {})
         text = dump(scenario_keys(task, vehicle) | {"controller": part | tuned})
         said = f"# {law.name} in task {task} on {vehicle}: {TASKS[task].question}.\n"
-        (place / f"{task}-{vehicle}.yaml").write_text(said + text, encoding="utf-8")
-    if (folder / STEP).exists():
-        return
-    with stage(console, "time of a step"):
-        for cell in cells:
-            try:
-                built = build(from_data(scenario_keys(*cell) | {"controller": part}))
-            except BadInput:
-                continue
-            found = interruptible(lambda built=built: step_time(built))
-            (folder / STEP).write_text(to_json(found._asdict()) + "\n", encoding="utf-8")
-            return
+        (folder / f"{task}-{vehicle}.yaml").write_text(said + text, encoding="utf-8")
 
 
 def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
