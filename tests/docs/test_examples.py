@@ -27,6 +27,7 @@ KNOWN = {
     "two_link_arm": {},
     "under_actuated": {},
     "own_vehicle": {},
+    "observer_based": {},
     "bluerov2_heavy": {"position_rms": (0.0132, 0.05), "attitude_rms": (0.0095, 0.05)},
 }
 VEHICLES = ["my_rov"]  # not scenarios
