@@ -28,6 +28,7 @@ KNOWN = {
     "under_actuated": {},
     "own_vehicle": {},
     "observer_based": {},
+    "non_affine": {},
     "bluerov2_heavy": {"position_rms": (0.0132, 0.05), "attitude_rms": (0.0095, 0.05)},
 }
 VEHICLES = ["my_rov"]  # not scenarios
