@@ -29,6 +29,7 @@ KNOWN = {
     "own_vehicle": {},
     "observer_based": {},
     "non_affine": {},
+    "large_scale": {},
     "bluerov2_heavy": {"position_rms": (0.0132, 0.05), "attitude_rms": (0.0095, 0.05)},
 }
 VEHICLES = ["my_rov"]  # not scenarios
