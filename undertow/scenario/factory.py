@@ -321,7 +321,11 @@ def _law_of_each(
         with within(_LAW):
             made.append(make("controllers", description, folder, (part,), alone))
         before = after
-    return tuple(law for law, _ in made), made[0][1]
+    # What differs between the subsystems follows from the rest of the scenario each time that it is built.
+    own = {"kind": description} if isinstance(description, str) else description
+    per_axis = {key for key, value in context.items() if np.ndim(value) and key not in own}
+    resolved = {key: value for key, value in made[0][1].items() if key not in per_axis}
+    return tuple(law for law, _ in made), resolved
 
 
 def _at(
