@@ -101,12 +101,16 @@ def test_batch_compiler_runs_it_alike():
 
 
 def test_signals_and_metrics_of_all_axes():
-    """Those over axes are joined, others have a dimension of their own; an rms is over the axes of both vehicles."""
+    """Those over axes are joined, numbers become one; an rms is over the axes of both vehicles."""
     plant = pair("tether")
     found, loop = run(plant, decentralised(plant.model(), robust), GOAL, START)
     signals = loop.signals()
     assert signals["estimate"].dimensions == ("axis",) and found.signals["estimate"].shape == (21, 12)
-    assert signals["attained_share"].dimensions == ("subsystem",) and found.signals["attained_share"].shape == (21, 2)
+    assert signals["attained_share"].dimensions == () and found.signals["attained_share"].shape == (21,)
+    largest = np.abs(found.signals["weights"]).max((1, 2))
+    np.testing.assert_allclose(found.signals["weights_peak"], largest)
+    memory = decentralised(plant.model(), lambda model: rcaf(model, preset="learning")).signals()
+    assert memory["memory_variance"].dimensions == ("subsystem", "regressor")
     assert found.signals["weights"].shape[1] == 12
     metrics = measure(found, plant)
     metres = [i for i, unit in enumerate(plant.output_units) if unit == "m"]

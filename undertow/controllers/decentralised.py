@@ -24,12 +24,21 @@ from undertow.core.signals import Signal
 # Dimensions of signals that run over outputs or inputs: there the signals of all laws stand one after the other.
 _JOINED = ("axis", "actuator")
 
+# How the numbers of all laws become one; the largest counts where nothing else is said.
+_REDUCED = {
+    "attained_share": jnp.min,
+    "weights_at_bound": jnp.mean,
+    "lyapunov_tracking": jnp.sum,
+    "lyapunov_decay": jnp.sum,
+}
+
 
 class Decentralised(AbstractInformedController):
     """u_i = law_i(y_i, r_i): states, measurements and references are those of the subsystem alone.
 
-    Signals of the laws over axes or actuators are joined; others get a dimension `subsystem`. All laws have the same
-    signals.
+    All laws have the same signals. Those over axes or actuators are joined; numbers become one (parts of the Lyapunov
+    function their sum, the attained share the least, the share of weights at their bound the mean, others the
+    largest); what else there is gets a dimension `subsystem`.
     """
 
     model: Model
@@ -52,15 +61,18 @@ class Decentralised(AbstractInformedController):
         return jnp.concatenate([known_acceleration(law, state, own, u) for law, state, own, u in each])
 
     def signals(self):
-        several = lambda one: one if _is_joined(one) else one._replace(dimensions=("subsystem", *one.dimensions))
-        return {name: several(signal) for name, signal in self._declared().items()}
+        several = lambda one: one._replace(dimensions=("subsystem", *one.dimensions))
+        kept = lambda one: not one.dimensions or one.dimensions[0] in _JOINED
+        return {name: one if kept(one) else several(one) for name, one in self._declared().items()}
 
     def _declared(self) -> dict[str, Signal]:
         return self.laws[0].signals()
 
     def _joined(self, name: str, values: list[Array]) -> Array:
-        joined = _is_joined(self._declared()[name])
-        return jnp.concatenate(values) if joined else jnp.stack(values)
+        dimensions = self._declared()[name].dimensions
+        if dimensions and dimensions[0] in _JOINED:
+            return jnp.concatenate(values)
+        return jnp.stack(values) if dimensions else _REDUCED.get(name, jnp.max)(jnp.stack(values))
 
     def _inputs(self) -> tuple[int, ...]:
         return parts_of(self.model)[1]
@@ -73,10 +85,6 @@ class Decentralised(AbstractInformedController):
 
     def _coordinates(self):
         return tuple(law.model.coordinates for law in self.laws)
-
-
-def _is_joined(signal: Signal) -> bool:
-    return bool(signal.dimensions) and signal.dimensions[0] in _JOINED
 
 
 def decentralised(
