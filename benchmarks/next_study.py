@@ -229,7 +229,7 @@ def each(label: str, found: Found) -> None:
         off = np.asarray(metrics["error_rms_axes"]).reshape(4, 3)
         first, turn, second, other = 1e3 * np.sqrt((off**2).mean(1))
         print(
-            f"{label:<32} first {first:8.2f} mm {turn:8.2f} mrad, second {second:8.2f} mm {other:8.2f} mrad, "
+            f"{label:<32} first {first:8.3f} mm {turn:8.3f} mrad, second {second:8.3f} mm {other:8.3f} mrad, "
             f"{metrics['input_variation']:7.1f} V/s; tension {tension.min():7.1f} to {tension.max():6.1f} N, "
             f"at limits {100 * share:4.1f} %",
             flush=True,
