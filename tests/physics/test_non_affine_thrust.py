@@ -9,8 +9,10 @@ from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Target, forced_acceleration, input_for, known_acceleration
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
+from undertow.numerics.integrators import rk4
 from undertow.numerics.rotations import cross
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.thrusters.axial_flow import axial_flow
 from undertow.thrusters.first_order import first_order
 from undertow.thrusters.inflow import advance_speed, static_thrust_for, with_inflow
 from undertow.thrusters.linear_voltage import linear_voltage
@@ -78,6 +80,7 @@ THRUSTERS = {
     "subtracted dead zone": quadratic_voltage(dead_zone=1.0, dead_zone_kind="subtract"),
     "T200 static": t200("static", dead_zone_kind="subtract"),
     "T200 ideal": t200("ideal", dead_zone_kind="subtract"),
+    "axial flow": axial_flow(),
     "lagging": first_order(power=1.7, reverse_share=0.8, linear_gain=8.0),
 }
 
@@ -126,3 +129,24 @@ def test_bad_options():
         plant.model(affine=False, speed_sensor=True)
     with pytest.raises(BadInput, match="inflow_loss"):
         hybrid_vehicle(bluerov2_heavy(), t200(), inflow_loss=-1.0)
+
+
+def test_axial_flow_settles_at_the_thrust_of_its_steady_voltage():
+    """Integrated until flow and speed rest, forwards and backwards; the thrust of a voltage is the inverse."""
+    thruster = axial_flow()
+    thrust = jnp.asarray([-20.0, -6.0, -0.5, 0.2, 4.0, 11.0, 24.0])
+    volts = thruster.steady_voltage(thrust)
+    step = lambda state, _: (rk4(lambda t, x: thruster.dynamics(x, volts), jnp.zeros(()), state, 2e-3), None)
+    state, _ = jax.jit(lambda x: jax.lax.scan(step, x, None, length=30_000))(thruster.initial_state(7))
+    np.testing.assert_allclose(thruster.thrust(state, volts), thrust, rtol=1e-6)
+    np.testing.assert_allclose(thruster.steady_thrust(volts), thrust, rtol=1e-9)
+    inside = jnp.asarray([-0.8, 0.0, 0.85])
+    np.testing.assert_array_equal(thruster.steady_thrust(inside), 0.0)
+
+
+def test_slope_of_the_steady_thrust_of_axial_flow():
+    """That of differences, on both sides of the dead zone."""
+    slope = jax.vmap(jax.grad(axial_flow().steady_thrust))(jnp.asarray([-2.5, -1.0, 1.2, 3.0]))
+    at, h = np.asarray([-2.5, -1.0, 1.2, 3.0]), 1e-4
+    curve = lambda volts: np.asarray(axial_flow().steady_thrust(jnp.asarray(volts)))
+    np.testing.assert_allclose(slope, (curve(at + h) - curve(at - h)) / (2 * h), rtol=1e-5)
