@@ -165,6 +165,10 @@ def thrust(long: bool) -> None:
                 for name, law, affine in (*laws, ("robust", ROBUST, True), ("adrc", ADRC, True)):
                     found = run(changed(case, controller=law, model={"affine": affine}))
                     shown(f"{zone}, {fidelity}, {name}", found)
+        print(f"\nNON-AFFINE: {motion}, thruster axial_flow, 30 to 60 s, 200 Hz")
+        case = changed(base, plant={"thruster": {"kind": "axial_flow"}}, loop={"dt": 0.005}, **changes)
+        for name, law, affine in (("slowed", SLOWED, True), ("slowed solved", SLOWED, False), ("robust", ROBUST, True)):
+            shown(name, run(changed(case, controller=law, model={"affine": affine})))
     if long:
         print("\nNON-AFFINE: lissajous, 2,000 s; windows 10-20, 100-200, 1000-2000 s")
         for fidelity, law in (("static", PAPER), ("shaft", SLOWED)):
