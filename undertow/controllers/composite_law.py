@@ -13,13 +13,20 @@ from undertow.controllers.law_signals import ADAPTIVE_LAW, lyapunov_signals, sha
 from undertow.controllers.robust_modification import RobustModification
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractContinuousController, Measurement, Model, Target
+from undertow.core.contracts import (
+    AbstractContinuousController,
+    Measurement,
+    Model,
+    Target,
+    forced_acceleration,
+    input_for,
+)
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.estimation.series_parallel import SeriesParallel
-from undertow.numerics.linear_algebra import companion_lyapunov, matvec
+from undertow.numerics.linear_algebra import companion_lyapunov
 from undertow.numerics.smoothing import SWITCHES, switch
 
 
@@ -118,21 +125,23 @@ class RCAF(AbstractContinuousController):
         return RCAFState(y.position, self.model.coordinates.velocity(y), jnp.zeros((axes, self.fuzzy.rules)))
 
     def command(self, z: RCAFState, y: Measurement, r: Target):
-        """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43)."""
+        """V of Eq. (23), with d_hat of Eq. (42) and u_r of Eq. (43); of a non-affine model, the solution V of
+        g(x, V) = the acceleration that Eq. (23) gives by G.
+        """
         dynamics, coordinates, _ = self.model
         off = self._tracking(y, r)
         eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
         u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
         desired = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
-        u = dynamics.invert(y, desired)
+        u = input_for(dynamics, y, desired)
         signals = {
             "estimate": d_hat,
             "robust_term": u_r,
             "modelling_error": eps,
             "predicted_position": z.predicted_position,
             "predicted_velocity": z.predicted_velocity,
-            "attained_share": share_given(desired, matvec(dynamics.gain(y), u)),
+            "attained_share": share_given(desired, forced_acceleration(dynamics, y, u)),
         }
         signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
         return u, signals | weight_signals(z.weights, self.weights_bound)
@@ -145,7 +154,7 @@ class RCAF(AbstractContinuousController):
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
         u = u_applied if self.identification_input == "applied" else self.command(z, y, r)[0]
-        known = dynamics.drift(y) + matvec(dynamics.gain(y), u)
+        known = dynamics.drift(y) + forced_acceleration(dynamics, y, u)
         theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
         if self.modification is not None:
             theta_rate = self.modification.rate(theta_rate, self.adaptation, eps, z.weights)

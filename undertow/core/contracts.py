@@ -124,6 +124,35 @@ class AbstractDynamics(eqx.Module):
         """Smallest f that gives the acceleration, or the nearest to it: G# of Eqs. (22)-(27)."""
 
 
+class AbstractNonAffineDynamics(AbstractDynamics):
+    """Nominal dynamics x_ddot = F + g(x, u) + d whose g is not linear in the input.
+
+    `gain` and `invert` are those of an affine model of the same plant, for laws and analyses that need one.
+    """
+
+    @abc.abstractmethod
+    def forced(self, y: Measurement, u: Inputs) -> Outputs:
+        """g, the acceleration that an input gives, m/s^2 and rad/s^2."""
+
+    @abc.abstractmethod
+    def solve(self, y: Measurement, acceleration: Outputs) -> Inputs:
+        """Input with g(x, u) = acceleration, or the nearest to it."""
+
+
+def forced_acceleration(dynamics: AbstractDynamics, y: Measurement, u: Inputs) -> Outputs:
+    """Acceleration that an input gives by the nominal dynamics: G u, or g(x, u)."""
+    if isinstance(dynamics, AbstractNonAffineDynamics):
+        return dynamics.forced(y, u)
+    return matvec(dynamics.gain(y), u)
+
+
+def input_for(dynamics: AbstractDynamics, y: Measurement, acceleration: Outputs) -> Inputs:
+    """Input that gives an acceleration by the nominal dynamics: G# of it, or the solution of g(x, u) = acceleration."""
+    if isinstance(dynamics, AbstractNonAffineDynamics):
+        return dynamics.solve(y, acceleration)
+    return dynamics.invert(y, acceleration)
+
+
 class TrackingError(NamedTuple):
     """Tracking error in the coordinates of a law, E of Eq. (19), and the acceleration of the target."""
 
@@ -330,10 +359,10 @@ class AbstractRestartable(AbstractInformedController):
 
 
 def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-    """The acceleration that a law models: F + G u unless it defines its own."""
+    """The acceleration that a law models: F + G u, or F + g(x, u), unless it defines its own."""
     if isinstance(law, AbstractInformedController):
         return law.known_acceleration(z, y, u_applied)
-    return law.model.dynamics.drift(y) + matvec(law.model.dynamics.gain(y), u_applied)
+    return law.model.dynamics.drift(y) + forced_acceleration(law.model.dynamics, y, u_applied)
 
 
 class AbstractDisturbance(eqx.Module):

@@ -184,8 +184,12 @@ class EulerCoordinates(AbstractOutputCoordinates):
     def measurement(self, position, velocity, actuator: Any = None) -> Measurement:
         return measurement_of_outputs(position, velocity, actuator)
 
-    def in_body_axes(self, dynamics: HybridDynamics) -> Model:
-        """The same model in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`."""
+    def in_body_axes(self, dynamics: Any) -> Model:
+        """The same model in body axes, with the thrusters' motors; speeds are measured if `speed_sensor`.
+
+        Of a non-affine model, the affine one: the curve of the thrusters is in the model of the actuators.
+        """
+        dynamics = getattr(dynamics, "affine", dynamics)
         body, matrix = dynamics.body, dynamics.thruster_matrix
         effect = body.inverse_mass_matrix @ matrix
         alike = 1 / jnp.sqrt(jnp.diagonal(body.mass_matrix))  # accelerations of equal kinetic energy

@@ -11,18 +11,22 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS, measurement_of_pose
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.number import Number
 from undertow.numerics.rotations import Kinematics, quaternion_from_euler, quaternion_rate, rotation_from_quaternion
 from undertow.plants.hybrid_model import EulerCoordinates, HybridDynamics
 from undertow.plants.hybrid_power import HybridPower, PowerState, has_motor
 from undertow.plants.mechanism import given_or_zero
+from undertow.plants.non_affine_model import NonAffineHybridDynamics
 from undertow.plants.reachability import open_loop_advice
 from undertow.power import ESC, Battery
+from undertow.thrusters.inflow import advance_speed, with_inflow
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body, seen_from_water
@@ -55,6 +59,7 @@ class HybridVehicle(AbstractPlant):
     power: HybridPower
     body: Body
     thruster_matrix: Float[Array, "6 N"]
+    inflow_loss: Float[Array, ""] | None  # lambda of `with_inflow`, N^(1/2) s/m; None for none
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
@@ -67,10 +72,14 @@ class HybridVehicle(AbstractPlant):
         battery: Battery | None = None,
         esc: ESC | None = None,
         ledger: bool | None = None,
+        inflow_loss: Number | None = None,
     ):
         kept = has_motor(thruster) if ledger is None else ledger
         self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, kept)
         self.power.check(thruster)
+        if inflow_loss is not None:
+            checks.positive("inflow_loss", inflow_loss, "N^(1/2) s/m")
+        self.inflow_loss = None if inflow_loss is None else as_array(inflow_loss)
         self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
         self.outputs = BODY_OUTPUTS
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
@@ -105,7 +114,10 @@ class HybridVehicle(AbstractPlant):
     def _body_acceleration(self, kinematics: Kinematics, x: VehicleState, u, d: Load) -> Float[Array, "6"]:
         """nu_dot of Eq. (2): thrust of Eq. (6), dynamics of the body, and the loads."""
         body = altered(self.body, d.scaling, d.payloads)
+        seen = seen_from_water(d.water, kinematics.rotation, x.nu, body.gravity)
         thrust = self.thruster.thrust(x.thrusters, u)
+        if self.inflow_loss is not None:
+            thrust = with_inflow(thrust, self.inflow_loss, advance_speed(self.thruster_matrix, seen.nu))
         if d.scaling is not None:
             if d.scaling.thrust.shape not in ((), thrust.shape):
                 raise BadInput("thrusters", f"be {thrust.size}, as the vehicle has", d.scaling.thrust.size)
@@ -114,7 +126,6 @@ class HybridVehicle(AbstractPlant):
         prescribed = d.acceleration
         if self.thruster.has_prescribed_acceleration:
             prescribed = prescribed - kinematics.rate_term(x.nu)
-        seen = seen_from_water(d.water, kinematics.rotation, x.nu, body.gravity)
         own = body.free_acceleration(seen.nu, seen.down) + seen.rate
         return own + body.accelerate(wrench) + kinematics.to_body(prescribed)
 
@@ -161,6 +172,7 @@ class HybridVehicle(AbstractPlant):
         speed_sensor: bool = False,
         rate_term: bool = False,
         regularisation: float | None = None,
+        affine: bool = True,
         vehicle: Vehicle | None = None,
         thruster: AbstractThruster | None = None,
     ) -> Model:
@@ -170,6 +182,8 @@ class HybridVehicle(AbstractPlant):
             speed_sensor: whether phi of Eq. (15) is known from propeller-speed sensors (Example 1) or left in d.
             rate_term: whether J_dot nu is in F; the paper leaves it in d (Remark 2).
             regularisation: delta of Definition 2; None for the exact inverse.
+            affine: whether thrust is taken as alpha V, as in the paper; false: preset `paper` solves the steady thrust
+                curve and the inflow for the voltage. Other laws have the curve in their model of the actuators.
             vehicle: nominal vehicle of the controller, such as another published parameter set; None for the true one.
             thruster: nominal thruster of the controller, such as one with another lag; None for the true one.
 
@@ -179,6 +193,9 @@ class HybridVehicle(AbstractPlant):
         """
         nominal = self.thruster if thruster is None else thruster
         known = self if vehicle is None else HybridVehicle(vehicle, nominal)
+        if speed_sensor and not affine:
+            hint = "Leave one of them out"
+            raise BadInput("speed_sensor", "be false where `affine` is false: phi is in the curve", "true", hint=hint)
         if known.inputs() != self.inputs():
             raise BadInput("vehicle", f"have {self.inputs()} thrusters, as the true one has", f"{known.inputs()}")
         if regularisation is not None:
@@ -200,6 +217,9 @@ class HybridVehicle(AbstractPlant):
             speed_sensor=speed_sensor,
             rate_term=rate_term,
         )
+        if not affine:
+            curve = nominal.actuator_model(self.inputs(), False).quasi_static()
+            dynamics = NonAffineHybridDynamics(dynamics, curve, self.inflow_loss)
         return Model(dynamics, EulerCoordinates(), DirectActuator())
 
 
@@ -225,6 +245,7 @@ def hybrid_vehicle(
     battery: Battery | None = None,
     esc: ESC | None = None,
     ledger: bool | None = None,
+    inflow_loss: float | None = None,
 ) -> HybridVehicle:
     """A vehicle with its thrusters, voltages in, pose out: the paper's hybrid system.
 
@@ -237,10 +258,12 @@ def hybrid_vehicle(
         esc: speed controllers, which round the command to pulses; None for none.
         ledger: whether to keep account of the thrusters' energy along the run, for 3 to 10 % of its time; None
             wherever there is a motor.
+        inflow_loss: thrust lost per root of the static thrust and speed of the propeller through the water,
+            N^(1/2) s/m: K_1 D (rho / K_0)^(1/2), where K_T = K_0 - K_1 J; None where it is neglected.
 
     Raises:
         BadInput: a number that is not one of the vehicle's thrusters, or power parts that do not fit the thruster.
     """
     if thrusters is not None:
         vehicle = vehicle.with_thrusters(thrusters)
-    return HybridVehicle(vehicle, thruster, battery, esc, ledger)
+    return HybridVehicle(vehicle, thruster, battery, esc, ledger, inflow_loss)

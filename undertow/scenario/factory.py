@@ -12,6 +12,7 @@ import numpy as np
 
 from undertow.core import catalogue, checks, contracts
 from undertow.core.arrays import as_array
+from undertow.core.composite_model import parts_of
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import RAISED, fault_of, place_of
@@ -26,6 +27,9 @@ from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.vehicle import Vehicle
 
+# Argument of a controller that applies another law to each subsystem of a plant.
+_LAW = "law"
+
 # Arguments that are parts themselves: their kind, and the default part; a tuple for a list of parts.
 INNER = {
     "vehicle": ("vehicles", "odin"),
@@ -33,6 +37,8 @@ INNER = {
     "battery": ("power", "battery"),
     "esc": ("power", "esc"),
     "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
+    "second_vehicle": ("vehicles", "odin"),
+    _LAW: ("controllers", "rcaf"),
 }
 
 # Arguments that are tables of samples, which a file can give.
@@ -93,7 +99,7 @@ def make(
         changes = {key: options.pop(key) for key in list(options) if key not in own}
     if argument := next((name for name in _TABLES if name in own), ""):
         table = _samples(options, folder, argument, getattr(function, "rows_of_log", None))
-    part, resolved = call(function, options, given, folder)
+    part, resolved = call(function, options, given, folder, context)
     if not isinstance(part, _CONTRACTS[kind]):
         must = f"name a function that returns {_title(_CONTRACTS[kind])}"
         if part is None:
@@ -112,9 +118,20 @@ def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]
 
 
 def call(
-    function: Callable[..., Any], options: Mapping[str, Any], given: tuple[Any, ...] = (), folder: Path | None = None
+    function: Callable[..., Any],
+    options: Mapping[str, Any],
+    given: tuple[Any, ...] = (),
+    folder: Path | None = None,
+    context: Mapping[str, Any] | None = None,
 ) -> tuple[Any, dict[str, Any]]:
     """Result of a function called with checked options, and all options with their defaults.
+
+    Args:
+        function: that makes the part, or another one.
+        options: from the user.
+        given: leading arguments that do not come from the user.
+        folder: folder of relative file names.
+        context: defaults of options of an inner law, as of `make`.
 
     Raises:
         BadInput: unknown, missing or mistyped option, or an error of the function.
@@ -128,7 +145,10 @@ def call(
         raise BadInput(unknown[0], "be an option here", "unknown", hint=joined(hint, also))
     arguments, resolved = {}, {}
     for name, parameter in known.items():
-        if name in INNER:
+        if name == _LAW:
+            description = options.get(name, INNER[_LAW][1])
+            arguments[name], resolved[name] = _law_of_each(description, given, folder or Path(), context or {})
+        elif name in INNER:
             description = options.get(name, inner_default(name, parameter))
             made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
             arguments[name], resolved[name] = made
@@ -286,6 +306,26 @@ def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[
         pairs = [_at(f"{name}[{i}]", kind, {}, entry, folder) for i, entry in enumerate(description)]
         return [part for part, _ in pairs], [resolved for _, resolved in pairs]
     return _at(name, kind, {"kind": default}, description, folder)
+
+
+def _law_of_each(
+    description: Any, given: tuple[Any, ...], folder: Path, context: Mapping[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """The described law for each subsystem of the given model, and its description with every default filled in."""
+    if not isinstance(description, str | Mapping):
+        raise BadInput(_LAW, "be a controller by name, or a mapping with `kind`", description)
+    made, before = [], 0
+    for part in parts_of(given[0])[0]:
+        after = before + len(part.coordinates.angles)
+        alone = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
+        with within(_LAW):
+            made.append(make("controllers", description, folder, (part,), alone))
+        before = after
+    # What differs between the subsystems follows from the rest of the scenario each time that it is built.
+    own = {"kind": description} if isinstance(description, str) else description
+    per_axis = {key for key, value in context.items() if np.ndim(value) and key not in own}
+    resolved = {key: value for key, value in made[0][1].items() if key not in per_axis}
+    return tuple(law for law, _ in made), resolved
 
 
 def _at(

@@ -2,13 +2,18 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from undertow.core import checks
+from undertow.core.actuator_model import AbstractMemorylessActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.thrusters.thruster import AbstractMotorlessThruster, PerThruster
+
+_HALVINGS = 45  # of the interval in which the steady thrust of a voltage is looked for
+_LEAST = 1e-12  # N; stands for 0, where the root of a thrust has no slope
 
 
 class AxialFlowState(NamedTuple):
@@ -86,6 +91,52 @@ class AxialFlowThruster(AbstractMotorlessThruster):
     def current(self, state, voltage) -> PerThruster:
         return self.current_per_torque * self.torque(state)
 
+    def steady_voltage(self, thrust: PerThruster) -> PerThruster:
+        """Command, V, whose steady thrust, after the flow has built up, is a thrust in N: in closed form.
+
+        Ambient flow, flow and speed follow from the thrust, each as the positive root of a quadratic. At zero thrust
+        the command is zero, and beside it that of the dead zone.
+        """
+        sign, size = jnp.sign(thrust), jnp.abs(thrust)
+        ambient = _positive_root(self.ambient_drag, self.ambient_decay, self.ambient_drive * size)
+        still = self.flow_decay - self.flow_drag * ambient
+        flow = _positive_root(self.flow_drag, still, self.flow_drive * size)
+        speed = _positive_root(self.thrust_coefficient, -self.thrust_loss * flow, size)
+        torque = (self.torque_coefficient * speed - self.torque_loss * flow) * speed
+        driven = self.speed_decay * speed + self.torque_load * torque
+        forward = driven / self.forward_drive + self.forward_dead_zone
+        reverse = driven / self.reverse_drive + self.reverse_dead_zone
+        return self.commanded(sign * jnp.where(thrust < 0, reverse, forward))
+
+    def steady_thrust(self, voltage: PerThruster) -> PerThruster:
+        """Steady thrust, N, of a command in V: halvings of an interval, and a step of Newton's method.
+
+        Above it is the thrust of the speed without flow, which is largest. The last step has the slope of the curve.
+        """
+        volts = self.terminal(voltage)
+        zone = jnp.where(volts < 0, self.reverse_dead_zone, self.forward_dead_zone)
+        drive = jnp.where(volts < 0, self.reverse_drive, self.forward_drive)
+        driven = drive * jnp.maximum(jnp.abs(volts) - zone, 0.0)
+        fastest = _positive_root(self.torque_load * self.torque_coefficient, self.speed_decay, driven)
+        sign = jnp.where(volts < 0, -1.0, 1.0)
+        asked = jnp.abs(self.commanded(volts))
+        size = lambda thrust: jnp.abs(self.steady_voltage(sign * thrust))
+
+        def halved(_, interval):
+            low, high = interval
+            middle = (low + high) / 2
+            below = size(middle) < asked
+            return jnp.where(below, middle, low), jnp.where(below, high, middle)
+
+        start = jnp.zeros_like(driven), 1.1 * self.thrust_coefficient * fastest**2
+        low, high = jax.lax.fori_loop(0, _HALVINGS, halved, jax.lax.stop_gradient(start))
+        found = jax.lax.stop_gradient(jnp.maximum((low + high) / 2, _LEAST))
+        there, slope = jax.jvp(size, (found,), (jnp.ones_like(found),))
+        return jnp.where(driven > 0, sign * jnp.maximum(found + (asked - there) / slope, 0.0), 0.0)
+
+    def actuator_model(self, count: int, measured: bool) -> "AxialFlowCurve":
+        return AxialFlowCurve(self)
+
     def speed_term(self, report):
         hint = "A speed sensor does not measure the axial flow, which reduces the thrust by a third at full speed"
         raise BadInput("speed_sensor", "be false with thruster axial_flow", "true", hint=hint)
@@ -94,6 +145,35 @@ class AxialFlowThruster(AbstractMotorlessThruster):
         if float(jnp.max(self.current_per_torque)) > 0:
             return ()
         return ("the current of this thruster is not known: its energy counts as 0. Give `current_per_torque`.",)
+
+
+class AxialFlowCurve(AbstractMemorylessActuator):
+    """Steady thrust of an axial-flow thruster as a controller knows it; its lag is unknown."""
+
+    thruster: AxialFlowThruster
+
+    def time_constant(self) -> None:
+        return None
+
+    def range(self, state, rate) -> tuple[PerThruster, PerThruster]:
+        supply = jnp.asarray(self.thruster.supply)
+        limited = jnp.isfinite(supply)
+        volts = jnp.where(limited, supply, 0.0)
+        low, high = self.thruster.steady_thrust(-volts), self.thruster.steady_thrust(volts)
+        return jnp.where(limited, low, -jnp.inf), jnp.where(limited, high, jnp.inf)
+
+    def force(self, state, u) -> PerThruster:
+        return self.thruster.steady_thrust(u)
+
+    def command(self, state, force, rate) -> PerThruster:
+        return self.thruster.steady_voltage(force)
+
+
+def _positive_root(a: PerThruster, b: PerThruster, c: PerThruster) -> PerThruster:
+    """x >= 0 with a x^2 + b x = c, for a > 0 and c >= 0; slope 0 at c = 0 where b is not positive."""
+    square = b * b + 4 * a * c
+    root = jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+    return (root - b) / (2 * a)
 
 
 def axial_flow(supply: float = 5.0, current_per_torque: float = 0.0) -> AxialFlowThruster:

@@ -1,0 +1,187 @@
+"""Models of several subsystems side by side: the nominal model of a plant that consists of several, block by block.
+
+No subsystem enters the model of another: what couples them is part of the uncertainty d.
+"""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Model, Target, TrackingError
+from undertow.core.status import Status
+
+Parts = tuple[Model, ...]
+
+
+def composite_model(parts: Parts, inputs: tuple[int, ...]) -> Model:
+    """The model of subsystems side by side; outputs and inputs in their order.
+
+    Args:
+        parts: model of each.
+        inputs: number of inputs of each.
+    """
+    dynamics = CompositeDynamics(parts, inputs)
+    actuators = CompositeActuators(tuple(part.actuators for part in parts), inputs)
+    return Model(dynamics, _side_by_side(tuple(part.coordinates for part in parts)), actuators)
+
+
+def parts_of(model: Model) -> tuple[Parts, tuple[int, ...]]:
+    """Models of the subsystems of a model, and their numbers of inputs; the model itself where it is of one."""
+    if isinstance(model.dynamics, CompositeDynamics):
+        return model.dynamics.parts, model.dynamics.inputs
+    still = jnp.zeros(len(model.coordinates.angles))
+    return (model,), (model.dynamics.gain(model.coordinates.measurement(still, still)).shape[1],)
+
+
+def split(values: Float[Array, " k"], sizes: tuple[int, ...]) -> tuple[Array, ...]:
+    """The entries of each subsystem."""
+    ends = [sum(sizes[: i + 1]) for i in range(len(sizes))]
+    return tuple(values[end - size : end] for end, size in zip(ends, sizes, strict=True))
+
+
+def split_measurement(coordinates: tuple[AbstractCoordinates, ...], y: Measurement) -> tuple[Measurement, ...]:
+    """Measurement of each subsystem: its own outputs, and the report of its own actuators."""
+    if len(coordinates) == 1:
+        return (y,)
+    sizes = tuple(len(one.angles) for one in coordinates)
+    reports = (None,) * len(sizes) if y.actuator is None else y.actuator
+    each = zip(coordinates, split(y.position, sizes), split(y.velocity, sizes), reports, strict=True)
+    return tuple(one.measurement(position, velocity, report) for one, position, velocity, report in each)
+
+
+def split_target(coordinates: tuple[AbstractCoordinates, ...], r: Target) -> tuple[Target, ...]:
+    """Reference of each subsystem."""
+    sizes = tuple(len(one.angles) for one in coordinates)
+    return tuple(Target(*parts) for parts in zip(*(split(one, sizes) for one in r), strict=True))
+
+
+class CompositeCoordinates(AbstractCoordinates):
+    """The coordinates of each subsystem."""
+
+    parts: tuple[AbstractCoordinates, ...]
+    angles: tuple[bool, ...] = eqx.field(static=True)
+    tolerated_status: tuple[Status, ...] = eqx.field(static=True)
+    axes: tuple[str, ...] = eqx.field(static=True)
+
+    def measurement(self, position, velocity, actuator: Any = None) -> Measurement:
+        return Measurement(position, velocity, actuator)
+
+    def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
+        each = zip(self.parts, split_measurement(self.parts, y), split_target(self.parts, r), strict=True)
+        found = [part.tracking_error(own, target) for part, own, target in each]
+        return TrackingError(*(jnp.concatenate(rows) for rows in zip(*found, strict=True)))
+
+    def velocity(self, y: Measurement):
+        each = zip(self.parts, split_measurement(self.parts, y), strict=True)
+        return jnp.concatenate([part.velocity(own) for part, own in each])
+
+    def acceleration(self, y: Measurement, acceleration):
+        each = zip(self.parts, split_measurement(self.parts, y), self._split(acceleration), strict=True)
+        return jnp.concatenate([part.acceleration(own, given) for part, own, given in each])
+
+    def output_velocity(self, y: Measurement, velocity):
+        each = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
+        return jnp.concatenate([part.output_velocity(own, given) for part, own, given in each])
+
+    def in_body_axes(self, dynamics: "CompositeDynamics") -> Model | None:
+        """Every subsystem in its body axes; None where none has any."""
+        parts = tuple(part.in_body_axes() for part in dynamics.parts)
+        unchanged = all(new is old for new, old in zip(parts, dynamics.parts, strict=True))
+        return None if unchanged else composite_model(parts, dynamics.inputs)
+
+    def _split(self, values) -> tuple[Array, ...]:
+        return split(values, tuple(len(part.angles) for part in self.parts))
+
+
+def _side_by_side(parts: tuple[AbstractCoordinates, ...]) -> CompositeCoordinates:
+    """Coordinates of all; names of axes have the number of the subsystem, and there are none where one has none."""
+    first, *others = (part.tolerated_status for part in parts)
+    named = [f"{name}_{i + 1}" for i, part in enumerate(parts) for name in part.axes]
+    return CompositeCoordinates(
+        parts=parts,
+        angles=tuple(angle for part in parts for angle in part.angles),
+        tolerated_status=tuple(one for one in first if all(one in other for other in others)),
+        axes=tuple(named) if all(part.axes for part in parts) else (),
+    )
+
+
+class CompositeDynamics(AbstractDynamics):
+    """F and G of each subsystem: G has a block for each."""
+
+    parts: Parts
+    inputs: tuple[int, ...] = eqx.field(static=True)
+
+    def drift(self, y: Measurement):
+        return jnp.concatenate([part.dynamics.drift(own) for part, own in self._each(y)])
+
+    def gain(self, y: Measurement):
+        rows, before = [], 0
+        for (part, own), count in zip(self._each(y), self.inputs, strict=True):
+            block = part.dynamics.gain(own)
+            after = sum(self.inputs) - before - count
+            rows.append(jnp.pad(block, ((0, 0), (before, after))))
+            before += count
+        return jnp.concatenate(rows)
+
+    def invert(self, y: Measurement, acceleration):
+        sizes = tuple(len(part.coordinates.angles) for part in self.parts)
+        each = zip(self._each(y), split(acceleration, sizes), strict=True)
+        return jnp.concatenate([part.dynamics.invert(own, demanded) for (part, own), demanded in each])
+
+    def _each(self, y: Measurement) -> list[tuple[Model, Measurement]]:
+        coordinates = tuple(part.coordinates for part in self.parts)
+        return list(zip(self.parts, split_measurement(coordinates, y), strict=True))
+
+
+class CompositeActuators(AbstractActuatorModel):
+    """The actuators of each subsystem; state and report are those of each, in a tuple."""
+
+    parts: tuple[AbstractActuatorModel, ...]
+    inputs: tuple[int, ...] = eqx.field(static=True)
+
+    def max_bandwidth(self, sampled):
+        return jnp.stack([part.max_bandwidth(sampled) for part in self.parts]).min()
+
+    def time_constant(self):
+        """That of the slowest; None where one is unknown."""
+        each = [part.time_constant() for part in self.parts]
+        known = [jnp.max(one) for one in each if one is not None]
+        return jnp.stack(known).max() if len(known) == len(each) else None
+
+    def init(self) -> tuple[Any, ...]:
+        return tuple(part.init() for part in self.parts)
+
+    def update_from_report(self, state, report) -> tuple[Any, ...]:
+        reports = (None,) * len(self.parts) if report is None else report
+        each = zip(self.parts, state, reports, strict=True)
+        return tuple(part.update_from_report(own, given) for part, own, given in each)
+
+    def range(self, state, rate):
+        each = [part.range(own, rate) for part, own in zip(self.parts, state, strict=True)]
+        return self._joined([low for low, _ in each]), self._joined([high for _, high in each])
+
+    def force(self, state, u):
+        return self._joined([part.force(own, given) for part, own, given in self._each(state, u)])
+
+    def command(self, state, force, rate):
+        return self._joined([part.command(own, given, rate) for part, own, given in self._each(state, force)])
+
+    def target_of(self, state, u, rate):
+        return self._joined([part.target_of(own, given, rate) for part, own, given in self._each(state, u)])
+
+    def advance(self, state, u, dt) -> tuple[Any, ...]:
+        return tuple(part.advance(own, given, dt) for part, own, given in self._each(state, u))
+
+    def quasi_static(self) -> "CompositeActuators":
+        return CompositeActuators(tuple(part.quasi_static() for part in self.parts), self.inputs)
+
+    def _each(self, state, values):
+        return list(zip(self.parts, state, split(values, self.inputs), strict=True))
+
+    def _joined(self, values) -> Array:
+        """One entry per actuator, of values that hold for each or for one."""
+        each = zip(values, self.inputs, strict=True)
+        return jnp.concatenate([jnp.broadcast_to(jnp.asarray(value), (count,)) for value, count in each])
