@@ -15,14 +15,16 @@ six-axis motion begin with a jump of the velocity, which costs every law the sam
 
 import argparse
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.analysis.metrics import Metrics
 from undertow.controllers.robust.memory import save_knowledge
 from undertow.core.contracts import AbstractReference, Target
 from undertow.loop import simd_batch
@@ -116,6 +118,55 @@ def errors(found, start: float, stop: float) -> np.ndarray:
     off = np.asarray(found.signals["error"])[inside]
     changes = np.abs(np.diff(np.asarray(found.signals["input"])[inside], axis=0)).mean()
     return np.array([*(np.sqrt((off[:, part] ** 2).sum(1).mean()) for part in (slice(3), slice(3, 6))), changes])
+
+
+class Found(NamedTuple):
+    """Errors of runs with different seeds.
+
+    Attributes:
+        errors: (seeds, 3): rms error of position, m, and attitude, rad, and variation of an input, V/s; the last is
+            counted at every control step.
+        lost: how many runs did not reach their end.
+        laps: rms error of position and attitude over each lap, (seeds, laps, 2).
+        final: values of the recorded signals at the end, by name.
+    """
+
+    errors: np.ndarray
+    lost: int
+    laps: np.ndarray
+    final: dict[str, np.ndarray]
+
+
+def run_seeds(
+    loop: ClosedLoop, rate: int, duration: float, seeds: Iterable[int], start: float, stop: float, lap: float = np.inf
+) -> Found:
+    """Runs of one loop with different seeds, as one SIMD batch; errors over start < t <= stop, s."""
+    metrics = Metrics(start, stop, loop.plant.output_units)
+    steps, keys = round(duration / rate**-1), [jax.random.PRNGKey(seed) for seed in seeds]
+    signals = tuple(name for name in ("error", "memory_weights", "memory_variance") if name in loop.signals())
+    plan = simd_batch.Plan(steps, 1 / rate, max(rate // 10, 1), signals)
+    one = simd_batch.Run(loop, (metrics,), loop.outputs_at_start(None, None), keys[0])
+    arrays, rest = eqx.partition(one, eqx.is_array)
+    leaves = jax.tree.leaves(arrays)
+    constant = [True] * (len(leaves) - 1) + [len(keys) == 1]
+    batch = simd_batch.BatchRunner(one, plan, constant, runs=len(keys))
+    many = jax.tree.map(lambda leaf: np.stack([np.asarray(leaf)] * len(keys)), arrays)
+    many = eqx.tree_at(lambda tree: tree.key, many, np.stack(keys))
+    outcome = batch.run(many)
+    state = jax.tree.map(np.asarray, outcome.accumulated[0])
+    square = state.squares["error"] / state.samples[:, None]
+    variation = state.variation / state.span
+    errors = np.stack([np.sqrt(square[:, :3].sum(1)), np.sqrt(square[:, 3:].sum(1)), variation], 1)
+    off, time = np.asarray(outcome.signals["error"]), np.asarray(outcome.time)[0]
+    laps = [(time > k * lap) & (time <= (k + 1) * lap) for k in range(int(duration / lap + 1e-6))]
+    parts = (slice(3), slice(3, 6))
+    each = [[np.sqrt((off[:, lap, part] ** 2).sum(2).mean(1)) for part in parts] for lap in laps]
+    return Found(
+        errors,
+        int((np.asarray(outcome.status) != 0).sum()),
+        np.transpose(np.array(each), (2, 0, 1)) if each else np.zeros((len(keys), 0, 2)),
+        {name: np.asarray(outcome.signals[name])[:, -1] for name in signals},
+    )
 
 
 def compared(options) -> None:
