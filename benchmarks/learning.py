@@ -23,6 +23,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics
 from undertow.controllers.robust.memory import save_knowledge
@@ -124,16 +125,18 @@ class Found(NamedTuple):
     """Errors of runs with different seeds.
 
     Attributes:
-        errors: (seeds, 3): rms error of position, m, and attitude, rad, and variation of an input, V/s; the last is
-            counted at every control step.
+        errors: (seeds, 3): rms error of position, m, and angle of rotation to the reference, rad, from ten records
+            per second, and variation of an input, V/s, from every control step.
         lost: how many runs did not reach their end.
         laps: rms error of position and attitude over each lap, (seeds, laps, 2).
+        navigation: rms error of the measured position and attitude, (seeds, 2).
         final: values of the recorded signals at the end, by name.
     """
 
     errors: np.ndarray
     lost: int
     laps: np.ndarray
+    navigation: np.ndarray
     final: dict[str, np.ndarray]
 
 
@@ -142,36 +145,42 @@ def run_seeds(
 ) -> Found:
     """Runs of one loop with different seeds, as one SIMD batch; errors over start < t <= stop, s."""
     metrics = Metrics(start, stop, loop.plant.output_units)
-    steps, keys = round(duration / rate**-1), [jax.random.PRNGKey(seed) for seed in seeds]
-    signals = tuple(name for name in ("error", "memory_weights", "memory_variance") if name in loop.signals())
-    plan = simd_batch.Plan(steps, 1 / rate, max(rate // 10, 1), signals)
+    steps, keys = round(duration * rate), [jax.random.PRNGKey(seed) for seed in seeds]
+    names = ("position", "reference", "measured_position", "memory_weights", "memory_variance")
+    signals = tuple(name for name in names if name in loop.signals())
+    plan = simd_batch.Plan(steps, 1 / rate, rate // 10, signals)
     one = simd_batch.Run(loop, (metrics,), loop.outputs_at_start(None, None), keys[0])
-    arrays, rest = eqx.partition(one, eqx.is_array)
-    leaves = jax.tree.leaves(arrays)
-    constant = [True] * (len(leaves) - 1) + [len(keys) == 1]
+    arrays = eqx.filter(one, eqx.is_array)
+    constant = [True] * (len(jax.tree.leaves(arrays)) - 1) + [len(keys) == 1]
     batch = simd_batch.BatchRunner(one, plan, constant, runs=len(keys))
     many = jax.tree.map(lambda leaf: np.stack([np.asarray(leaf)] * len(keys)), arrays)
-    many = eqx.tree_at(lambda tree: tree.key, many, np.stack(keys))
-    outcome = batch.run(many)
+    outcome = batch.run(eqx.tree_at(lambda tree: tree.key, many, np.stack([np.asarray(key) for key in keys])))
     state = jax.tree.map(np.asarray, outcome.accumulated[0])
-    square = state.squares["error"] / state.samples[:, None]
-    variation = state.variation / state.span
-    errors = np.stack([np.sqrt(square[:, :3].sum(1)), np.sqrt(square[:, 3:].sum(1)), variation], 1)
-    off, time = np.asarray(outcome.signals["error"]), np.asarray(outcome.time)[0]
-    laps = [(time > k * lap) & (time <= (k + 1) * lap) for k in range(int(duration / lap + 1e-6))]
-    parts = (slice(3), slice(3, 6))
-    each = [[np.sqrt((off[:, lap, part] ** 2).sum(2).mean(1)) for part in parts] for lap in laps]
+    time, series = np.asarray(outcome.time)[0], outcome.signals
+    off = np.stack(errors_of(series["reference"], series["position"]), -1)
+    known = np.stack(errors_of(series["measured_position"], series["position"]), -1)
+    rms = lambda values, begin, end: np.sqrt((values[:, (time > begin) & (time <= end)] ** 2).mean(1))
+    laps = [rms(off, k * lap, (k + 1) * lap) for k in range(int(duration / lap + 1e-6))]
     return Found(
-        errors,
+        np.concatenate([rms(off, start, stop), (state.variation / state.span)[:, None]], 1),
         int((np.asarray(outcome.status) != 0).sum()),
-        np.transpose(np.array(each), (2, 0, 1)) if each else np.zeros((len(keys), 0, 2)),
-        {name: np.asarray(outcome.signals[name])[:, -1] for name in signals},
+        np.stack(laps, 1) if laps else np.zeros((len(keys), 0, 2)),
+        rms(known, start, stop),
+        {name: np.asarray(series[name])[:, -1] for name in signals},
     )
+
+
+def errors_of(target, outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Distance, m, and angle of the rotation between two attitudes, rad; both of a vehicle's six outputs."""
+    target, outputs = np.asarray(target), np.asarray(outputs)
+    there, here = (Rotation.from_euler("ZYX", one[..., :2:-1].reshape(-1, 3)) for one in (target, outputs))
+    angle = (here.inv() * there).magnitude().reshape(target.shape[:-1])
+    return np.linalg.norm(target[..., :3] - outputs[..., :3], axis=-1), angle
 
 
 def compared(options) -> None:
     """Print the table of all cases."""
-    print(f"{'motion':<11}{'model':<8}{'Hz':>4} {'sea':<11}{'law':<8}{'position':>10}{'attitude':>11}{'variation':>10}")
+    print(f"{'motion':<11}{'model':<8}{'Hz':>4} {'sea':<11}{'law':<8}medians over seeds; ratios to robust")
     for name in options.motions.split(","):
         motion, lap = motions()[name]
         duration = np.round(options.laps * lap)
@@ -181,17 +190,17 @@ def compared(options) -> None:
                     base = None
                     for law, given in LAWS.items():
                         loop = loop_of(given, motion, model, rate, sea)
-                        seeds = range(1 if sea == "still" else options.seeds)
-                        each = [run(loop, rate, duration, 1000 + seed) for seed in seeds]
-                        if not all(int(one.status) == 0 for one in each):
-                            print(name, model, rate, sea, law, "did not reach its end")
-                            continue
-                        value = np.mean([errors(one, lap, duration) for one in each], axis=0)
-                        base = value if base is None else base
+                        seeds = range(options.first, options.first + (1 if sea == "still" else options.seeds))
+                        found = run_seeds(loop, rate, duration, seeds, lap, duration)
+                        base = found.errors if base is None else base
+                        value, ratio = np.median(found.errors, axis=0), found.errors / base
                         print(
-                            f"{name:<11}{model:<8}{rate:>4} {sea:<11}{law:<8}{1e3 * value[0]:7.1f} mm"
-                            f"{1e3 * value[1]:7.1f} mrad{value[2]:8.4f} V   ratios"
-                            + "".join(f"{one:6.2f}" for one in value / base),
+                            f"{name:<11}{model:<8}{rate:>4} {sea:<11}{law:<8}{1e3 * value[0]:12.1f} mm"
+                            f"{1e3 * value[1]:9.1f} mrad{value[2]:8.2f} V/s   ratios, median"
+                            + "".join(f"{one:6.2f}" for one in np.median(ratio, axis=0))
+                            + "  worst"
+                            + "".join(f"{one:6.2f}" for one in ratio.max(0))
+                            + (f"  {found.lost} of {len(seeds)} lost" if found.lost else ""),
                             flush=True,
                         )
 
@@ -235,7 +244,8 @@ def next_dive(options) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--first", type=int, default=2000)
     parser.add_argument("--laps", type=int, default=4)
     parser.add_argument("--motions", default="lissajous,lawn_mower,six_axis")
     parser.add_argument("--models", default="wu2018,px4")

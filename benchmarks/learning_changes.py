@@ -25,7 +25,9 @@ BEFORE, AFTER, QUARTERS = 4, 3, 4
 
 def changes(time: float) -> dict[str, dict[str, Any]]:
     """Entries of a scenario for each change at a time, s."""
-    current, drag = ({"target": "plant", "mode": mode, "severity": s} for mode, s in (("current_step", 0.2), ("drag", 1.0)))
+    current, drag = (
+        {"target": "plant", "mode": mode, "severity": s} for mode, s in (("current_step", 0.2), ("drag", 1.0))
+    )
     until, then = {"onset": 0, "duration": time}, {"onset": time}
     weak = {"target": "thruster 2", "mode": "scale", "severity": 0.5}
     return {
@@ -63,7 +65,9 @@ def ratios(motion: str, law: str, case: str) -> tuple[np.ndarray, np.ndarray]:
             found.append(run_seeds(loop, 50, np.ceil(stop), [0], 0.0, stop, part).laps[0])
     robust, other = (one**2 for one in found)
     start = before * QUARTERS
-    lapped = np.sqrt(other[start - QUARTERS : start].sum(0) / robust[start - QUARTERS : start].sum(0)) if start else None
+    lapped = (
+        np.sqrt(other[start - QUARTERS : start].sum(0) / robust[start - QUARTERS : start].sum(0)) if start else None
+    )
     return (np.full(2, np.nan) if lapped is None else lapped), np.sqrt(other / robust)[start:]
 
 

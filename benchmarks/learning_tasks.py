@@ -13,7 +13,6 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from learning import LAWS, motions, run_seeds
 
@@ -31,17 +30,17 @@ CURRENT = {"kind": "current", "velocity": [0.15, 0.1, 0.0]}
 # Task -> reference, duration (s) and what differs from the base scenario; a name is one of `motions`.
 TASKS: dict[str, tuple[Any, float, dict[str, Any]]] = {
     "station in waves": (HELD, 180.0, {"disturbance": [CURRENT, WAVES]}),
-    "current step": (HELD, 180.0, {"faults": [{"target": "plant", "mode": "current_step", "severity": 0.3, "onset": 60}]}),
+    "current step": (
+        HELD,
+        180.0,
+        {"faults": [{"target": "plant", "mode": "current_step", "severity": 0.3, "onset": 60}]},
+    ),
     "lawn mower": ("lawn_mower", 180.0, {}),
     "pitch through 90 deg": (sine([0, 0, 0, 0, 2.0, 0], 0.5), 180.0, {}),
     "payload": ("lissajous", 252.0, {"disturbance": [{"kind": "payload", "mass": 1.5, "weight": 8.0, "start": 126.0}]}),
     "dead thruster": ("lissajous", 252.0, {"faults": [{"target": "thruster 2", "mode": "off", "onset": 126}]}),
     "wrong model": ("lissajous", 126.0, {"model": {"vehicle": {"parameters": "px4"}}}),
-    "noise": (
-        "lissajous",
-        126.0,
-        {"navigation": {"kind": "degraded", "position_noise": 0.01, "velocity_noise": 0.02}},
-    ),
+    "noise": ("lissajous", 126.0, {"navigation": {"kind": "degraded", "position_noise": 0.01, "velocity_noise": 0.02}}),
     "delay": ("lissajous", 126.0, {"navigation": {"kind": "degraded", "delay": 0.1}}),
     "low battery": ("lissajous", 126.0, {"plant": {"thruster": {"supply": 12.0}}}),
     "tether": (
@@ -49,11 +48,19 @@ TASKS: dict[str, tuple[Any, float, dict[str, Any]]] = {
         180.0,
         {"disturbance": [{"kind": "tether", "anchor": [0.0, 0.0, -3.0], "length": 6.0, "stiffness": 10.0}]},
     ),
-    "underactuated": ("lissajous", 126.0, {
+    "underactuated": (
+        "lissajous",
+        126.0,
+        {
             "plant": {"vehicle": {"kind": "bluerov2", "parameters": "hkpolyu"}},
             "model": {"vehicle": {"kind": "bluerov2", "parameters": "li2020"}},
-        }),
-    "drag doubles": ("lissajous", 252.0, {"faults": [{"target": "plant", "mode": "drag", "severity": 1.0, "onset": 126}]}),
+        },
+    ),
+    "drag doubles": (
+        "lissajous",
+        252.0,
+        {"faults": [{"target": "plant", "mode": "drag", "severity": 1.0, "onset": 126}]},
+    ),
 }
 
 
@@ -114,7 +121,8 @@ def main() -> None:
                 value = np.median(found.errors, axis=0)
                 print(
                     f"{task:<22}{rate:>4}  {name:<8}{1e3 * value[0]:9.1f} mm{1e3 * value[1]:9.1f} mrad"
-                    f"{value[2]:8.2f} V/s   " + "".join(f"{one:6.2f}" for one in ratio)
+                    f"{value[2]:8.2f} V/s   "
+                    + "".join(f"{one:6.2f}" for one in ratio)
                     + (f"  {found.lost} lost" if found.lost else "")
                     + ("  WORSE" if (ratio[:2] > 1.1).any() else ""),
                     flush=True,

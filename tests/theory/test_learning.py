@@ -28,11 +28,11 @@ GAINS = OBSERVER.gains(jnp.asarray(DT))
 ONE = jnp.ones(())
 
 
-def learnt(part, state, regressors, rest_of, free=ONE):
-    """States over a sequence of regressors; `rest_of` gives what the observer adds."""
+def learnt(part, state, regressors, rest_of, free=ONE, error_of=lambda state: jnp.zeros(2)):
+    """States over a sequence of regressors; what the observer adds, and its modelling error, are functions of them."""
 
     def step(state, phi):
-        after, gained = part.advance(state, phi, rest_of(state), GAINS, free, jnp.asarray(DT))
+        after, gained = part.advance(state, phi, rest_of(state), error_of(state), GAINS, free, jnp.asarray(DT))
         return after, (state, gained)
 
     return jax.jit(lambda state: jax.lax.scan(step, state, regressors))(state)
@@ -111,7 +111,7 @@ def test_the_observer_loses_what_the_memory_gains():
     state, phi = part.init(2, False), motion(7, part.size(2, False), 1)[0]
     state = state._replace(lagged=0.9 * phi)
     observer = OBSERVER.init(jnp.zeros(2))._replace(weights=jnp.asarray([[0.4], [-0.3]]))
-    after, gained = part.advance(state, phi, jnp.asarray([0.4, -0.3]), GAINS, ONE, jnp.asarray(DT))
+    after, gained = part.advance(state, phi, jnp.asarray([0.4, -0.3]), jnp.zeros(2), GAINS, ONE, jnp.asarray(DT))
     lowered = OBSERVER.lowered(observer, gained)
     total = part.value(after, phi) + lowered.weights[:, 0]
     assert np.abs(gained).min() > 1e-3

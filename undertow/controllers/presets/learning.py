@@ -31,6 +31,7 @@ def learning(
     horizon=300.0,
     learning_rate=10.0,
     memory_bound=20.0,
+    judging_time=30.0,
     knowledge: Annotated[str | None, catalogue.FILE] = None,
 ) -> RobustRCAF:
     """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.
@@ -56,6 +57,8 @@ def learning(
         horizon: time over which motions that are repeated are forgotten, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         memory_bound: largest weight of the memory, m/s^2 and rad/s^2.
+        judging_time: time over which the memory is judged; one that harms is used less, and a vehicle that has changed
+            is learnt anew, s.
         knowledge: path of a file of `save_knowledge`: what was learnt before.
 
     Raises:
@@ -84,6 +87,7 @@ def learning(
         horizon=horizon,
         learning_rate=learning_rate,
         bound=memory_bound,
+        judging_time=judging_time,
         knowledge=knowledge,
     )
     return dataclasses.replace(law, memory=remembered)

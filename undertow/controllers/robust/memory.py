@@ -11,6 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.controllers.robust import evidence
+from undertow.controllers.robust.evidence import Evidence
 from undertow.core import checks
 from undertow.core.contracts import Measurement, TrackingError
 from undertow.core.errors import BadInput
@@ -33,6 +35,7 @@ class MemoryState(NamedTuple):
     covariance: Float[Array, "k k"]  # of the weights of any axis, over the noise density, 1/s
     lagged: Regressor  # regressor as the observer would follow it
     ahead: Regressor  # its modelling error, s
+    evidence: Evidence  # whether it helps
 
 
 class Memory(eqx.Module):
@@ -42,14 +45,18 @@ class Memory(eqx.Module):
     different axes that turning bodies have, and of each velocity either fuzzy rules or v and v |v|. Every axis sees all
     of them. Rules are the memberships of normalised Gaussian sets without the middle one, less their values at rest.
 
-    The observer follows d - m with its lag, so its estimate is (W* - W)^T phi_f, with phi_f the regressor behind the
-    same lag, where d = W*^T phi. This is the innovation. With r = T phi_f^T P phi_f,
+    The observer follows d - m with its lag. With all of the memory in use its estimate is (W* - W)^T phi_f, with phi_f
+    the regressor behind the same lag, where d = W*^T phi. This is the innovation. With r = T phi_f^T P phi_f,
 
         W += P phi_f d_rest^T T / (1 + r),    P -= e T P phi_f phi_f^T P / (1 + e r),    e = max(1 - q / r, 0),
 
-    q = T / `horizon`. P never grows: in directions that are not excited nothing is learnt or forgotten. In those that
-    are, the gain does not fall below the one that forgets within the horizon. What the memory gains the observer loses
-    in the same step.
+    q = T / `horizon`. In directions that are not excited nothing is learnt or forgotten. In those that are, the gain
+    does not fall below the one that forgets within the horizon. What the memory gains the observer loses in the same
+    step.
+
+    Where the memory harms, less of it is used: m = g W^T phi with the share g of `evidence.trust` for each axis; the
+    weights learn on as if all of it were used. Where it is wrong, P returns towards p_0 I at the rate
+    `evidence.wrong` / `judging_time`, so that a vehicle that has changed is learnt anew. P never exceeds p_0 I.
 
     Raises:
         BadInput: a number that is not positive, or an unknown regressor.
@@ -62,13 +69,14 @@ class Memory(eqx.Module):
         "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=10.0
     )
     bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=20.0)
+    judging_time: Float[Param, ""] = param("s", "time over which the memory is judged", symbol="tau_j", default=30.0)
     start: Float[Array, "k n"] | None = None
     variance: Float[Array, " k"] | None = None
     regressor: str = eqx.field(static=True, default="rules")
 
     def __check_init__(self):
         checks.choice("regressor", self.regressor, REGRESSORS)
-        for name in ("speeds", "horizon", "learning_rate", "bound"):
+        for name in ("speeds", "horizon", "learning_rate", "bound", "judging_time"):
             checks.positive(name, getattr(self, name))
 
     def check_fit(self, axes: int, body: bool) -> None:
@@ -92,7 +100,8 @@ class Memory(eqx.Module):
         nothing = jnp.zeros(count)
         weights = jnp.zeros((count, axes)) if self.start is None else self.start
         variance = jnp.ones(count) if self.variance is None else self.variance
-        return MemoryState(weights, jnp.diag(self.learning_rate * variance), nothing, nothing)
+        covariance = jnp.diag(self.learning_rate * variance)
+        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes))
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
@@ -128,10 +137,10 @@ class Memory(eqx.Module):
 
     def value(self, state: MemoryState, phi: Regressor) -> PerAxis:
         """m, m/s^2 and rad/s^2."""
-        return matvec(state.weights.T, phi)
+        return evidence.trust(state.evidence) * matvec(state.weights.T, phi)
 
     def advance(
-        self, state: MemoryState, phi: Regressor, rest: PerAxis, gains, free, dt
+        self, state: MemoryState, phi: Regressor, rest: PerAxis, error: PerAxis, gains, free, dt
     ) -> tuple[MemoryState, PerAxis]:
         """State one sampling time later, and what the memory gains at this regressor, m/s^2 and rad/s^2.
 
@@ -139,25 +148,31 @@ class Memory(eqx.Module):
             state: now.
             phi: regressor now.
             rest: what the observer adds to the memory, m/s^2 and rad/s^2.
+            error: modelling error of the observer, m/s and rad/s.
             gains: of the observer, per sampling time and 1/s.
             free: 1, or 0 while limits bind and nothing is learnt.
             dt: sampling time, s.
         """
         of_rates, of_estimate = gains
+        used, span = evidence.trust(state.evidence), free * dt
+        innovation = rest - (1 - used) * matvec(state.weights.T, state.lagged)
         towards = matvec(state.covariance, state.lagged)
         size = dt * (state.lagged * towards).sum()
         forgets = dt / self.horizon
         share = jnp.where(size > forgets, 1 - forgets / jnp.where(size > forgets, size, 1.0), 0.0)
-        step = free * dt / (1 + size) * towards[:, None] * rest[None, :]
-        weights = jnp.clip(state.weights + step, -self.bound, self.bound)
-        shrunk = free * share * dt / (1 + share * size) * towards[:, None] * towards[None, :]
-        gained = matvec((weights - state.weights).T, phi)
-        return MemoryState(
-            weights=weights,
-            covariance=state.covariance - shrunk,
+        weights = state.weights + span / (1 + size) * towards[:, None] * innovation[None, :]
+        shrunk = share * span / (1 + share * size) * towards[:, None] * towards[None, :]
+        reopened = evidence.wrong(state.evidence) * span / self.judging_time
+        unknown = self.learning_rate * jnp.eye(phi.shape[0])
+        explained = matvec(state.weights.T, state.ahead)
+        after = MemoryState(
+            weights=jnp.clip(weights, -self.bound, self.bound),
+            covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),
             lagged=state.lagged - of_estimate * state.ahead,
             ahead=state.ahead + dt * (state.lagged - phi) - of_rates * state.ahead,
-        ), gained
+            evidence=evidence.gathered(state.evidence, error + used * explained, explained, span, self.judging_time),
+        )
+        return after, self.value(after, phi) - self.value(state, phi)
 
 
 def memory(
@@ -169,6 +184,7 @@ def memory(
     horizon=300.0,
     learning_rate=10.0,
     bound=20.0,
+    judging_time=30.0,
     knowledge=None,
 ) -> Memory:
     """A memory beside an observer.
@@ -181,6 +197,7 @@ def memory(
         horizon: time over which what is excited forgets, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         bound: largest weight, m/s^2 and rad/s^2.
+        judging_time: time over which the memory is judged by the modelling error, s.
         knowledge: what was learnt before: path of a file of `save_knowledge`, or None.
 
     Raises:
@@ -195,6 +212,7 @@ def memory(
         horizon=horizon,
         learning_rate=learning_rate,
         bound=bound,
+        judging_time=judging_time,
         start=learnt[0],
         variance=learnt[1],
         regressor=regressor,
