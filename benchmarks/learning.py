@@ -38,12 +38,13 @@ from undertow.scenario.reading import from_data
 
 jax.config.update("jax_enable_x64", True)
 
-PATHS = {"still": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
+PATHS = {"still": {}, "current": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
 START = 20.0  # s
 SEA = [{"kind": "current", "velocity": [0.15, 0.1, 0.0]}, {"kind": "waves", "height": 0.25, "depth": 3.0}]
 LAWS = {
     "robust": {"preset": "robust"},
-    "rules": {"preset": "learning"},
+    "both": {"preset": "learning"},
+    "rules": {"preset": "learning", "regressor": "rules"},
     "linear": {"preset": "learning", "regressor": "linear"},
 }
 
@@ -97,7 +98,7 @@ def loop_of(law: dict[str, Any], motion: AbstractReference, model: str, rate: in
         "model": {"rate_term": True, "vehicle": {"kind": "bluerov2_heavy", "parameters": model}},
         "controller": {"kind": "rcaf"} | law,
         "reference": {"kind": "setpoint", "position": [0.0] * 6},
-        "disturbance": SEA if sea == "waves" else [],
+        "disturbance": {"waves": SEA, "current": SEA[:1]}.get(sea, []),
         "loop": {"dt": 1 / rate, "duration": 1.0, "record": 0.1},
     } | PATHS[sea]
     if not scenario["disturbance"]:
@@ -188,9 +189,11 @@ def compared(options) -> None:
             for sea in options.seas.split(","):
                 for model in options.models.split(","):
                     base = None
-                    for law, given in LAWS.items():
-                        loop = loop_of(given, motion, model, rate, sea)
-                        seeds = range(options.first, options.first + (1 if sea == "still" else options.seeds))
+                    for law in ("robust", *options.laws.split(",")):
+                        loop = loop_of(LAWS[law], motion, model, rate, sea)
+                        seeds = range(
+                            options.first, options.first + (1 if sea in ("still", "current") else options.seeds)
+                        )
                         found = run_seeds(loop, rate, duration, seeds, lap, duration)
                         base = found.errors if base is None else base
                         value, ratio = np.median(found.errors, axis=0), found.errors / base
@@ -210,7 +213,7 @@ def long_run(options) -> None:
     name = options.motions.split(",")[0]
     motion, lap = motions()[name]
     for model in options.models.split(","):
-        for law in ("rules", "linear"):
+        for law in options.laws.split(","):
             loop = loop_of(LAWS[law], motion, model, 50, "still")
             end = np.round(2 * lap + 2000)
             found = run(loop, 50, end, 0)
@@ -228,7 +231,7 @@ def next_dive(options) -> None:
         motion, lap = motions()[name]
         for model in options.models.split(","):
             first = errors(run(loop_of(LAWS["robust"], motion, model, 50, "still"), 50, np.round(lap), 0), START, lap)
-            for law in ("rules", "linear"):
+            for law in options.laws.split(","):
                 loop = loop_of(LAWS[law], motion, model, 50, "still")
                 learnt = run(loop, 50, np.round(3 * lap), 0)
                 with tempfile.TemporaryDirectory() as folder:
@@ -244,13 +247,14 @@ def next_dive(options) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--first", type=int, default=2000)
-    parser.add_argument("--laps", type=int, default=4)
+    parser.add_argument("--laps", type=int, default=2)
     parser.add_argument("--motions", default="lissajous,lawn_mower,six_axis")
     parser.add_argument("--models", default="wu2018,px4")
     parser.add_argument("--rates", default="50,100")
-    parser.add_argument("--seas", default="still,waves,navigation")
+    parser.add_argument("--seas", default="still,current,waves,navigation")
+    parser.add_argument("--laws", default="both,linear")
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--next-dive", action="store_true")
     chosen = parser.parse_args()

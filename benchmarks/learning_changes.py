@@ -75,7 +75,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--motions", default="lissajous,six_axis")
-    parser.add_argument("--laws", default="rules,linear")
+    parser.add_argument("--laws", default="both,linear")
     parser.add_argument("--cases", default="all")
     chosen = parser.parse_args()
     cases = [*changes(0.0), "other model", "signs turned"] if chosen.cases == "all" else chosen.cases.split(",")

@@ -18,7 +18,6 @@ from learning import LAWS, motions, run_seeds
 
 from undertow.core.contracts import AbstractReference
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.references.sine import sine
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
@@ -36,7 +35,11 @@ TASKS: dict[str, tuple[Any, float, dict[str, Any]]] = {
         {"faults": [{"target": "plant", "mode": "current_step", "severity": 0.3, "onset": 60}]},
     ),
     "lawn mower": ("lawn_mower", 180.0, {}),
-    "pitch through 90 deg": (sine([0, 0, 0, 0, 2.0, 0], 0.5), 180.0, {}),
+    "pitch through 90 deg": (
+        {"kind": "sine", "amplitude": [0.0, 0.0, 0.0, 0.0, 2.0, 0.0], "frequency": 0.5},
+        180.0,
+        {},
+    ),
     "payload": ("lissajous", 252.0, {"disturbance": [{"kind": "payload", "mass": 1.5, "weight": 8.0, "start": 126.0}]}),
     "dead thruster": ("lissajous", 252.0, {"faults": [{"target": "thruster 2", "mode": "off", "onset": 126}]}),
     "wrong model": ("lissajous", 126.0, {"model": {"vehicle": {"parameters": "px4"}}}),
@@ -105,7 +108,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=3000)
     parser.add_argument("--rates", default="50")
     parser.add_argument("--tasks", default="all")
-    parser.add_argument("--laws", default="rules,linear")
+    parser.add_argument("--laws", default="both,linear")
     chosen = parser.parse_args()
     print(f"{'task':<22}{'Hz':>4}  {'law':<8}{'position':>12}{'attitude':>14}{'variation':>12}   ratios to robust")
     for rate in map(int, chosen.rates.split(",")):

@@ -118,7 +118,7 @@ def test_the_observer_loses_what_the_memory_gains():
     np.testing.assert_allclose(total, part.value(state, phi) + observer.weights[:, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("regressor", ["rules", "linear"])
+@pytest.mark.parametrize("regressor", ["both", "rules", "linear"])
 def test_the_regressor_is_that_of_the_reference_wherever_the_vehicle_is(regressor):
     """The body axes of a vehicle that is displaced and moves otherwise, in the attitude of the reference."""
     part, model = memory(6, regressor=regressor), hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()

@@ -25,7 +25,7 @@ def learning(
     reference_frequency=None,
     actuator_rate=None,
     direction=1.0,
-    regressor: str = "rules",
+    regressor: str = "both",
     rules: int = 5,
     speeds=0.5,
     horizon=300.0,
@@ -51,7 +51,7 @@ def learning(
         reference_frequency: that of the filter of reference jumps, rad/s; None: as in preset `robust`; 0 for none.
         actuator_rate: bandwidth of the motor loop, 1/s; None: as in preset `robust`.
         direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
-        regressor: `rules`, fuzzy rules of each velocity, or `linear`, v and v |v|.
+        regressor: `rules`, fuzzy rules of each velocity, `linear`, v and v |v|, or `both`.
         rules: fuzzy sets of each velocity, an odd number from 3.
         speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which motions that are repeated are forgotten, s.

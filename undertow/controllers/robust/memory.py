@@ -25,7 +25,7 @@ from undertow.numerics.rotations import cross
 PerAxis = Float[Array, " n"]
 Regressor = Float[Array, " k"]
 
-REGRESSORS = ("rules", "linear")
+REGRESSORS = ("both", "rules", "linear")
 
 
 class MemoryState(NamedTuple):
@@ -42,7 +42,7 @@ class Memory(eqx.Module):
     """m = W^T phi(reference), learnt by recursive least squares from what the observer still has to add.
 
     The regressor phi holds 1, the desired acceleration, the direction of gravity, the products of velocities of
-    different axes that turning bodies have, and of each velocity either fuzzy rules or v and v |v|. Every axis sees all
+    different axes that turning bodies have, and of each velocity v and v |v|, fuzzy rules, or both. Every axis sees all
     of them. Rules are the memberships of normalised Gaussian sets without the middle one, less their values at rest.
 
     The observer follows d - m with its lag. With all of the memory in use its estimate is (W* - W)^T phi_f, with phi_f
@@ -72,7 +72,7 @@ class Memory(eqx.Module):
     judging_time: Float[Param, ""] = param("s", "time over which the memory is judged", symbol="tau_j", default=30.0)
     start: Float[Array, "k n"] | None = None
     variance: Float[Array, " k"] | None = None
-    regressor: str = eqx.field(static=True, default="rules")
+    regressor: str = eqx.field(static=True, default="both")
 
     def __check_init__(self):
         checks.choice("regressor", self.regressor, REGRESSORS)
@@ -105,8 +105,9 @@ class Memory(eqx.Module):
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
-        own = axes * (self.fuzzy.rules - 1 if self.regressor == "rules" else 2)
-        return 1 + own + axes + (3 + 9 if body else 0)
+        rules = 0 if self.regressor == "linear" else self.fuzzy.rules - 1
+        shapes = 0 if self.regressor == "rules" else 2
+        return 1 + axes * (rules + shapes) + axes + (3 + 9 if body else 0)
 
     def regressors(self, y: Measurement, velocity: PerAxis, off: TrackingError, body: bool) -> Regressor:
         """phi at the reference.
@@ -118,14 +119,14 @@ class Memory(eqx.Module):
             body: whether the plant is a body, with an attitude and products of velocities.
         """
         share = (velocity + off.rate) / self.speeds
-        if self.regressor == "rules":
+        parts = [jnp.ones(1), off.acceleration]
+        if self.regressor != "linear":
             still = self.fuzzy.basis(jnp.zeros((1, 1)))
             rules = self.fuzzy.basis(share[:, None]) - still
             middle = self.fuzzy.rules // 2
-            own = jnp.concatenate([rules[:, :middle], rules[:, middle + 1 :]], -1).reshape(-1)
-        else:
-            own = jnp.concatenate([share, share * jnp.abs(share)])
-        parts = [jnp.ones(1), own, off.acceleration]
+            parts += [jnp.concatenate([rules[:, :middle], rules[:, middle + 1 :]], -1).reshape(-1)]
+        if self.regressor != "rules":
+            parts += [share, share * jnp.abs(share)]
         if body:
             down = body_of(y).rotation[2]
             u, turning = share[:3], share[3:]
@@ -178,7 +179,7 @@ class Memory(eqx.Module):
 def memory(
     axes: int,
     *,
-    regressor: str = "rules",
+    regressor: str = "both",
     rules: int = 5,
     speeds=0.5,
     horizon=300.0,
@@ -191,7 +192,7 @@ def memory(
 
     Args:
         axes: number of axes.
-        regressor: `rules`, or `linear` for v and v |v|.
+        regressor: `rules` of each velocity, `linear` for v and v |v|, or `both`.
         rules: sets of each velocity, an odd number from 3.
         speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which what is excited forgets, s.
