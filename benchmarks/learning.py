@@ -26,7 +26,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics
-from undertow.controllers.robust.memory import save_knowledge
+from undertow.controllers.robust.knowledge import save_knowledge
 from undertow.core.contracts import AbstractReference, Target
 from undertow.loop import simd_batch
 from undertow.loop.closed_loop import ClosedLoop

@@ -7,7 +7,8 @@ import pytest
 
 from undertow.controllers import rcaf
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.memory import load_knowledge, memory, save_knowledge
+from undertow.controllers.robust.knowledge import load_knowledge, save_knowledge
+from undertow.controllers.robust.memory import memory
 from undertow.core.contracts import Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.robust import evidence
 from undertow.controllers.robust.evidence import Evidence
+from undertow.controllers.robust.knowledge import load_knowledge
 from undertow.core import checks
 from undertow.core.contracts import Measurement, TrackingError
 from undertow.core.errors import BadInput
@@ -36,6 +37,7 @@ class MemoryState(NamedTuple):
     lagged: Regressor  # regressor as the observer would follow it
     ahead: Regressor  # its modelling error, s
     evidence: Evidence  # whether it helps
+    taken: PerAxis  # over from the observer so far, m/s^2, rad/s^2
 
 
 class Memory(eqx.Module):
@@ -98,10 +100,10 @@ class Memory(eqx.Module):
         """State before the first step: `start` and `variance`, or nothing known."""
         count = self.size(axes, body)
         nothing = jnp.zeros(count)
-        weights = jnp.zeros((count, axes)) if self.start is None else self.start
+        weights = jnp.zeros((count, axes)) if self.start is None else jnp.clip(self.start, -self.bound, self.bound)
         variance = jnp.ones(count) if self.variance is None else self.variance
         covariance = jnp.diag(self.learning_rate * variance)
-        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes))
+        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes), jnp.zeros(axes))
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
@@ -172,8 +174,10 @@ class Memory(eqx.Module):
             lagged=state.lagged - of_estimate * state.ahead,
             ahead=state.ahead + dt * (state.lagged - phi) - of_rates * state.ahead,
             evidence=evidence.gathered(state.evidence, error + used * explained, explained, span, self.judging_time),
+            taken=state.taken,
         )
-        return after, self.value(after, phi) - self.value(state, phi)
+        gained = self.value(after, phi) - self.value(state, phi)
+        return after._replace(taken=state.taken + gained), gained
 
 
 def memory(
@@ -218,30 +222,3 @@ def memory(
         variance=learnt[1],
         regressor=regressor,
     )
-
-
-def save_knowledge(path, run) -> None:
-    """Write what was learnt by the end of a run to a file (.npz).
-
-    Args:
-        path: of the file.
-        run: dataset with the signals `memory_weights` and `memory_variance`.
-    """
-    weights, variance = (run[name].values[-1] for name in ("memory_weights", "memory_variance"))
-    np.savez(path, weights=weights, variance=variance)
-
-
-def load_knowledge(path) -> tuple[Array, Array]:
-    """Weights and variance of a file of `save_knowledge`.
-
-    Raises:
-        BadInput: the file cannot be read, or holds something else.
-    """
-    try:
-        with np.load(path) as held:
-            weights, variance = np.asarray(held["weights"], dtype=float), np.asarray(held["variance"], dtype=float)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInput("knowledge", "be a file of `save_knowledge`", str(path)) from error
-    checks.finite("knowledge", weights)
-    checks.finite("knowledge", variance)
-    return jnp.asarray(weights), jnp.asarray(variance)

@@ -123,6 +123,7 @@ class RobustRCAF(AbstractInformedController):
             signals |= {
                 "memory": plan.remembered,
                 "memory_weights": z.memory.weights,
+                "memory_taken": z.memory.taken,
                 "memory_trust": evidence.trust(z.memory.evidence),
                 "memory_variance": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
             }
