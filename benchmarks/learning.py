@@ -206,6 +206,10 @@ def compared(options) -> None:
                             + "".join(f"{one:6.2f}" for one in np.median(ratio, axis=0))
                             + "  worst"
                             + "".join(f"{one:6.2f}" for one in ratio.max(0))
+                            + (
+                                f"  measured to {1e3 * np.median(found.navigation[:, 0]):.1f} mm"
+                                * (sea == "navigation")
+                            )
                             + (f"  {found.lost} of {len(seeds)} lost" if found.lost else ""),
                             flush=True,
                         )
