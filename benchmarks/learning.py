@@ -1,29 +1,34 @@
-"""What a memory gives: preset `learning` with fuzzy rules and with a linear regressor, against `robust`.
+"""What a memory gives: preset `learning` against `robust`, with fuzzy rules, with v and v |v|, and with both.
 
 BlueROV2 Heavy, T200s at 16 V. The true vehicle has the parameters vonbenzon2022, the nominal model another published
 set. All laws have the same gains, those of preset `robust`. Motions are repeated; errors are those from the second
-lap to the end. In waves (JONSWAP Hs 0.25 m at 3 m depth, current 0.18 m/s) and with navigation from readings, numbers
-are means over seeds.
+lap to the end. `current` is still water with a current, `waves` JONSWAP waves with it, `navigation` still water with
+navigation from readings. Rates of inputs are counted at every control step, errors ten times per second.
 
-    python benchmarks/learning.py [--seeds 2] [--laps 4] [--motions lissajous,lawn_mower,six_axis]
-        [--models wu2018,px4] [--rates 50,100] [--seas still,waves,navigation] [--long] [--next-dive]
+    python benchmarks/learning.py [--seeds 6] [--first 2000] [--laps 2] [--motions lissajous,lawn_mower,six_axis]
+        [--models wu2018,px4] [--rates 50,100] [--seas still,current,waves,navigation] [--laws both,rules,linear]
+        [--height 0.25] [--depth 3] [--current 0.15 0.1] [--long] [--next-dive]
 
-`--long` runs the first motion for 2,000 s more and compares its last lap with the second. `--next-dive` saves what was
-learnt in three laps, loads it and reports the first lap of the next run, without its first 20 s: the lissajous and the
-six-axis motion begin with a jump of the velocity, which costs every law the same. Both are in still water at 50 Hz.
+Seeds are `first`, `first` + 1, ...; still water needs one. `worst` is the largest ratio of a seed. `--long` runs the
+first motion for 2,000 s more and compares its last lap with the second. `--next-dive` saves what was learnt in three
+laps, loads it and reports the first lap of the next run, without its first 20 s: the lissajous and the six-axis motion
+begin with a jump of the velocity, which costs every law the same. Both are in still water at 50 Hz.
 """
 
 import argparse
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from undertow.controllers.robust.memory import save_knowledge
+from undertow.analysis.metrics import Metrics
+from undertow.controllers.robust.knowledge import save_knowledge
 from undertow.core.contracts import AbstractReference, Target
 from undertow.loop import simd_batch
 from undertow.loop.closed_loop import ClosedLoop
@@ -35,12 +40,14 @@ from undertow.scenario.reading import from_data
 
 jax.config.update("jax_enable_x64", True)
 
-PATHS = {"still": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
+PATHS = {"still": {}, "current": {}, "waves": {}, "navigation": {"navigation": {"kind": "observer"}}}
 START = 20.0  # s
+_FAR = 1.0  # m
 SEA = [{"kind": "current", "velocity": [0.15, 0.1, 0.0]}, {"kind": "waves", "height": 0.25, "depth": 3.0}]
 LAWS = {
     "robust": {"preset": "robust"},
-    "rules": {"preset": "learning"},
+    "both": {"preset": "learning"},
+    "rules": {"preset": "learning", "regressor": "rules"},
     "linear": {"preset": "learning", "regressor": "linear"},
 }
 
@@ -94,7 +101,7 @@ def loop_of(law: dict[str, Any], motion: AbstractReference, model: str, rate: in
         "model": {"rate_term": True, "vehicle": {"kind": "bluerov2_heavy", "parameters": model}},
         "controller": {"kind": "rcaf"} | law,
         "reference": {"kind": "setpoint", "position": [0.0] * 6},
-        "disturbance": SEA if sea == "waves" else [],
+        "disturbance": {"waves": SEA, "current": SEA[:1]}.get(sea, []),
         "loop": {"dt": 1 / rate, "duration": 1.0, "record": 0.1},
     } | PATHS[sea]
     if not scenario["disturbance"]:
@@ -118,9 +125,66 @@ def errors(found, start: float, stop: float) -> np.ndarray:
     return np.array([*(np.sqrt((off[:, part] ** 2).sum(1).mean()) for part in (slice(3), slice(3, 6))), changes])
 
 
+class Found(NamedTuple):
+    """Errors of runs with different seeds.
+
+    Attributes:
+        errors: (seeds, 3): rms error of position, m, and angle of rotation to the reference, rad, from ten records
+            per second, and variation of an input, V/s, from every control step.
+        lost: how many runs did not reach their end, or have a position error of more than 1 m rms.
+        laps: rms error of position and attitude over each lap, (seeds, laps, 2).
+        navigation: rms error of the measured position and attitude, (seeds, 2).
+        final: values of the recorded signals at the end, by name.
+    """
+
+    errors: np.ndarray
+    lost: int
+    laps: np.ndarray
+    navigation: np.ndarray
+    final: dict[str, np.ndarray]
+
+
+def run_seeds(
+    loop: ClosedLoop, rate: int, duration: float, seeds: Iterable[int], start: float, stop: float, lap: float = np.inf
+) -> Found:
+    """Runs of one loop with different seeds, as one SIMD batch; errors over start < t <= stop, s."""
+    metrics = Metrics(start, stop, loop.plant.output_units)
+    steps, keys = round(duration * rate), [jax.random.PRNGKey(seed) for seed in seeds]
+    names = ("position", "reference", "measured_position", "memory_weights", "memory_variance")
+    signals = tuple(name for name in names if name in loop.signals())
+    plan = simd_batch.Plan(steps, 1 / rate, rate // 10, signals)
+    one = simd_batch.Run(loop, (metrics,), loop.outputs_at_start(None, None), keys[0])
+    arrays = eqx.filter(one, eqx.is_array)
+    constant = [True] * (len(jax.tree.leaves(arrays)) - 1) + [len(keys) == 1]
+    batch = simd_batch.BatchRunner(one, plan, constant, runs=len(keys))
+    many = jax.tree.map(lambda leaf: np.stack([np.asarray(leaf)] * len(keys)), arrays)
+    outcome = batch.run(eqx.tree_at(lambda tree: tree.key, many, np.stack([np.asarray(key) for key in keys])))
+    state = jax.tree.map(np.asarray, outcome.accumulated[0])
+    time, series = np.asarray(outcome.time)[0], outcome.signals
+    off = np.stack(errors_of(series["reference"], series["position"]), -1)
+    known = np.stack(errors_of(series["measured_position"], series["position"]), -1)
+    rms = lambda values, begin, end: np.sqrt((values[:, (time > begin) & (time <= end)] ** 2).mean(1))
+    laps = [rms(off, k * lap, (k + 1) * lap) for k in range(int(duration / lap + 1e-6))]
+    return Found(
+        np.concatenate([rms(off, start, stop), (state.variation / state.span)[:, None]], 1),
+        int(((np.asarray(outcome.status) != 0) | (rms(off, start, stop)[:, 0] > _FAR)).sum()),
+        np.stack(laps, 1) if laps else np.zeros((len(keys), 0, 2)),
+        rms(known, start, stop),
+        {name: np.asarray(series[name])[:, -1] for name in signals},
+    )
+
+
+def errors_of(target, outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Distance, m, and angle of the rotation between two attitudes, rad; both of a vehicle's six outputs."""
+    target, outputs = np.asarray(target), np.asarray(outputs)
+    there, here = (Rotation.from_euler("ZYX", one[..., :2:-1].reshape(-1, 3)) for one in (target, outputs))
+    angle = (here.inv() * there).magnitude().reshape(target.shape[:-1])
+    return np.linalg.norm(target[..., :3] - outputs[..., :3], axis=-1), angle
+
+
 def compared(options) -> None:
     """Print the table of all cases."""
-    print(f"{'motion':<11}{'model':<8}{'Hz':>4} {'sea':<11}{'law':<8}{'position':>10}{'attitude':>11}{'variation':>10}")
+    print(f"{'motion':<11}{'model':<8}{'Hz':>4} {'sea':<11}{'law':<8}medians over seeds; ratios to robust")
     for name in options.motions.split(","):
         motion, lap = motions()[name]
         duration = np.round(options.laps * lap)
@@ -128,19 +192,25 @@ def compared(options) -> None:
             for sea in options.seas.split(","):
                 for model in options.models.split(","):
                     base = None
-                    for law, given in LAWS.items():
-                        loop = loop_of(given, motion, model, rate, sea)
-                        seeds = range(1 if sea == "still" else options.seeds)
-                        each = [run(loop, rate, duration, 1000 + seed) for seed in seeds]
-                        if not all(int(one.status) == 0 for one in each):
-                            print(name, model, rate, sea, law, "did not reach its end")
-                            continue
-                        value = np.mean([errors(one, lap, duration) for one in each], axis=0)
-                        base = value if base is None else base
+                    for law in ("robust", *options.laws.split(",")):
+                        loop = loop_of(LAWS[law], motion, model, rate, sea)
+                        seeds = range(
+                            options.first, options.first + (1 if sea in ("still", "current") else options.seeds)
+                        )
+                        found = run_seeds(loop, rate, duration, seeds, lap, duration)
+                        base = found.errors if base is None else base
+                        value, ratio = np.median(found.errors, axis=0), found.errors / base
                         print(
-                            f"{name:<11}{model:<8}{rate:>4} {sea:<11}{law:<8}{1e3 * value[0]:7.1f} mm"
-                            f"{1e3 * value[1]:7.1f} mrad{value[2]:8.4f} V   ratios"
-                            + "".join(f"{one:6.2f}" for one in value / base),
+                            f"{name:<11}{model:<8}{rate:>4} {sea:<11}{law:<8}{1e3 * value[0]:12.1f} mm"
+                            f"{1e3 * value[1]:9.1f} mrad{value[2]:8.2f} V/s   ratios, median"
+                            + "".join(f"{one:6.2f}" for one in np.median(ratio, axis=0))
+                            + "  worst"
+                            + "".join(f"{one:6.2f}" for one in ratio.max(0))
+                            + (
+                                f"  measured to {1e3 * np.median(found.navigation[:, 0]):.1f} mm"
+                                * (sea == "navigation")
+                            )
+                            + (f"  {found.lost} of {len(seeds)} lost" if found.lost else ""),
                             flush=True,
                         )
 
@@ -150,7 +220,7 @@ def long_run(options) -> None:
     name = options.motions.split(",")[0]
     motion, lap = motions()[name]
     for model in options.models.split(","):
-        for law in ("rules", "linear"):
+        for law in options.laws.split(","):
             loop = loop_of(LAWS[law], motion, model, 50, "still")
             end = np.round(2 * lap + 2000)
             found = run(loop, 50, end, 0)
@@ -168,7 +238,7 @@ def next_dive(options) -> None:
         motion, lap = motions()[name]
         for model in options.models.split(","):
             first = errors(run(loop_of(LAWS["robust"], motion, model, 50, "still"), 50, np.round(lap), 0), START, lap)
-            for law in ("rules", "linear"):
+            for law in options.laws.split(","):
                 loop = loop_of(LAWS[law], motion, model, 50, "still")
                 learnt = run(loop, 50, np.round(3 * lap), 0)
                 with tempfile.TemporaryDirectory() as folder:
@@ -184,15 +254,24 @@ def next_dive(options) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--laps", type=int, default=4)
+    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--first", type=int, default=2000)
+    parser.add_argument("--laps", type=int, default=2)
     parser.add_argument("--motions", default="lissajous,lawn_mower,six_axis")
     parser.add_argument("--models", default="wu2018,px4")
     parser.add_argument("--rates", default="50,100")
-    parser.add_argument("--seas", default="still,waves,navigation")
+    parser.add_argument("--seas", default="still,current,waves,navigation")
+    parser.add_argument("--laws", default="both,linear")
+    parser.add_argument("--height", type=float, default=0.25)
+    parser.add_argument("--depth", type=float, default=3.0)
+    parser.add_argument("--current", type=float, nargs=2, default=(0.15, 0.1))
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--next-dive", action="store_true")
     chosen = parser.parse_args()
+    SEA[:] = [
+        {"kind": "current", "velocity": [*chosen.current, 0.0]},
+        {"kind": "waves", "height": chosen.height, "depth": chosen.depth},
+    ]
     if chosen.long:
         long_run(chosen)
     elif chosen.next_dive:

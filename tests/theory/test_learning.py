@@ -7,7 +7,8 @@ import pytest
 
 from undertow.controllers import rcaf
 from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.memory import load_knowledge, memory, save_knowledge
+from undertow.controllers.robust.knowledge import load_knowledge, save_knowledge
+from undertow.controllers.robust.memory import memory
 from undertow.core.contracts import Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
@@ -28,11 +29,11 @@ GAINS = OBSERVER.gains(jnp.asarray(DT))
 ONE = jnp.ones(())
 
 
-def learnt(part, state, regressors, rest_of, free=ONE):
-    """States over a sequence of regressors; `rest_of` gives what the observer adds."""
+def learnt(part, state, regressors, rest_of, free=ONE, error_of=lambda state: jnp.zeros(2)):
+    """States over a sequence of regressors; what the observer adds, and its modelling error, are functions of them."""
 
     def step(state, phi):
-        after, gained = part.advance(state, phi, rest_of(state), GAINS, free, jnp.asarray(DT))
+        after, gained = part.advance(state, phi, rest_of(state), error_of(state), GAINS, free, jnp.asarray(DT))
         return after, (state, gained)
 
     return jax.jit(lambda state: jax.lax.scan(step, state, regressors))(state)
@@ -111,14 +112,14 @@ def test_the_observer_loses_what_the_memory_gains():
     state, phi = part.init(2, False), motion(7, part.size(2, False), 1)[0]
     state = state._replace(lagged=0.9 * phi)
     observer = OBSERVER.init(jnp.zeros(2))._replace(weights=jnp.asarray([[0.4], [-0.3]]))
-    after, gained = part.advance(state, phi, jnp.asarray([0.4, -0.3]), GAINS, ONE, jnp.asarray(DT))
+    after, gained = part.advance(state, phi, jnp.asarray([0.4, -0.3]), jnp.zeros(2), GAINS, ONE, jnp.asarray(DT))
     lowered = OBSERVER.lowered(observer, gained)
     total = part.value(after, phi) + lowered.weights[:, 0]
     assert np.abs(gained).min() > 1e-3
     np.testing.assert_allclose(total, part.value(state, phi) + observer.weights[:, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("regressor", ["rules", "linear"])
+@pytest.mark.parametrize("regressor", ["both", "rules", "linear"])
 def test_the_regressor_is_that_of_the_reference_wherever_the_vehicle_is(regressor):
     """The body axes of a vehicle that is displaced and moves otherwise, in the attitude of the reference."""
     part, model = memory(6, regressor=regressor), hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()

@@ -27,6 +27,8 @@ ATTAINED_SHARE = {"attained_share": Signal((), "1", "share of the desired accele
 MEMORY = {
     "memory": Signal(("axis",), "[axis]/s^2", "share of the estimate that the memory gives"),
     "memory_weights": Signal(("regressor", "axis"), "[axis]/s^2", "weights of the memory"),
+    "memory_taken": Signal(("axis",), "[axis]/s^2", "what the memory has taken over from the observer so far"),
+    "memory_trust": Signal(("axis",), "1", "share of what was learnt that is used: 1 unless it harms"),
     "memory_variance": Signal(
         ("regressor",), "1", "variance of a weight over that before learning: 1 where not excited"
     ),

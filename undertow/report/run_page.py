@@ -14,7 +14,14 @@ from undertow.report.page import Html, bullets, document, figure, join, section,
 from undertow.report.plotting import Plotted
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
-from undertow.report.run_tables import RunTable, certificate_rows, fault_rows, metrics_rows, transition_rows
+from undertow.report.run_tables import (
+    RunTable,
+    certificate_rows,
+    fault_rows,
+    memory_rows,
+    metrics_rows,
+    transition_rows,
+)
 from undertow.scenario.finished_run import certificate_of, faults_of, metrics_of, transitions_of, window_of
 
 _DIGITS = 4
@@ -87,6 +94,10 @@ def _page(
         hypotheses = certificate_rows(certificate, window)
         below = [tag("p", prose(one)) for one in hypotheses.sentences]
         sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
+        if "memory" in certificate:
+            learnt = memory_rows(certificate)
+            below = [tag("p", prose(one)) for one in learnt.sentences]
+            sections.append(section("memory", learnt.title, _table(learnt), *below))
     plotted = [
         figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
         for name, picture in figures.items()

@@ -68,6 +68,20 @@ def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float]
     return RunTable("Certificate: hypotheses of the stability proof", head, rows, _consequences(certificate))
 
 
+def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
+    """The largest weights of each axis of a memory, and how sure they are."""
+    rows: list[tuple[str | float, ...]] = [
+        (one["axis"], one["regressor"], one["weight"], _share(one["variance"])) for one in certificate["memory"]
+    ]
+    sentences = (
+        "The largest weights of each axis, in the unit of its acceleration. A variance of 100 % means that the motion "
+        "did not show that entry.",
+        f"Of what was learnt at least {_share(min(certificate['memory_trust']))} was used on every axis. No weight "
+        f"exceeds {_number(certificate['memory_bound'])}.",
+    )
+    return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, sentences)
+
+
 def fault_rows(faults: Sequence[Mapping[str, Any]]) -> RunTable:
     """Faults of a run, as its scenario has them."""
     seconds = lambda value: f"{value:g} s" if isinstance(value, int | float) else f"{value[0]:g} to {value[1]:g} s"
@@ -105,8 +119,9 @@ def _consequences(certificate: Mapping[str, Any]) -> tuple[str, ...]:
         )
     if "estimation_within" in certificate:
         kept, allowed = certificate["estimation_within"], certificate["estimation_bound"]
+        moving = "|d_dot| of what the memory does not explain" if "memory" in certificate else "|d_dot|"
         sentences.append(
-            f"|d_hat - d| is within the bound that follows from the largest recorded |d_dot| (up to "
+            f"|d_hat - d| is within the bound that follows from the largest recorded {moving} (up to "
             f"{_number(None if None in allowed else max(allowed))}) for {_share(kept['steady'])} of the steady window."
         )
     return tuple(sentences)

@@ -122,8 +122,15 @@ def _layer(switching: str, amplitude, layer):
 
 
 def fastest_uncertainty(run: xr.Dataset) -> np.ndarray:
-    """Largest |d_dot| of each axis from record to record, m/s^3 and rad/s^3."""
-    steps = np.abs(np.diff(run["uncertainty"].values, axis=0)) / np.diff(run["time"].values)[:, None]
+    """Largest |d_dot| of each axis from record to record, m/s^3 and rad/s^3.
+
+    With a memory it is that of d less the memory, at the weights of each step: what the memory takes over from the
+    observer moves nothing.
+    """
+    d = run["uncertainty"].values
+    if "memory" in run:
+        d = d - run["memory"].values + run["memory_taken"].values
+    steps = np.abs(np.diff(d, axis=0)) / np.diff(run["time"].values)[:, None]
     return steps.max(axis=0, initial=0.0)
 
 

@@ -1,5 +1,7 @@
 """Theory of the robust variant: poles of its estimator and tracking, drift, and the certificate of section X4."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -8,6 +10,7 @@ from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
 from undertow.analysis.small_signal import of_axis
 from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
+from undertow.controllers.robust.knowledge import regressor_names, strongest
 from undertow.controllers.robust.robust_law import RobustRCAF
 
 
@@ -49,5 +52,21 @@ def _certificate(
         "estimation_within": window.shares(kept, lived["time"].values),
         "weights_bound": bound.tolist(),
     }
+    if law.memory is not None:
+        numbers |= _learnt(law, lived)
     asked = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_robust(law, lived)]
     return RunCertificate(of_robust(law, run, dt), asked, numbers)
+
+
+def _learnt(law: RobustRCAF, lived: xr.Dataset) -> dict[str, Any]:
+    """The largest weights of each axis at the end, and how much of the memory was used at least."""
+    memory, coordinates = law.memory, law.model.coordinates
+    assert memory is not None
+    axes = list(coordinates.axes) or [str(name) for name in lived["axis"].values]
+    names = regressor_names(axes, memory.fuzzy.rules, memory.regressor, bool(coordinates.axes))
+    weights, variance = (lived[f"memory_{name}"].values[-1] for name in ("weights", "variance"))
+    return {
+        "memory": [one._asdict() for one in strongest(weights, variance, names, axes)],
+        "memory_trust": lived["memory_trust"].values.min(0).tolist(),
+        "memory_bound": float(memory.bound),
+    }

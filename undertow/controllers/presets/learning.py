@@ -25,12 +25,13 @@ def learning(
     reference_frequency=None,
     actuator_rate=None,
     direction=1.0,
-    regressor: str = "rules",
+    regressor: str = "both",
     rules: int = 5,
     speeds=0.5,
     horizon=300.0,
     learning_rate=10.0,
     memory_bound=20.0,
+    judging_time=30.0,
     knowledge: Annotated[str | None, catalogue.FILE] = None,
 ) -> RobustRCAF:
     """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.
@@ -50,12 +51,14 @@ def learning(
         reference_frequency: that of the filter of reference jumps, rad/s; None: as in preset `robust`; 0 for none.
         actuator_rate: bandwidth of the motor loop, 1/s; None: as in preset `robust`.
         direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
-        regressor: `rules`, fuzzy rules of each velocity, or `linear`, v and v |v|.
+        regressor: `rules`, fuzzy rules of each velocity, `linear`, v and v |v|, or `both`.
         rules: fuzzy sets of each velocity, an odd number from 3.
         speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which motions that are repeated are forgotten, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         memory_bound: largest weight of the memory, m/s^2 and rad/s^2.
+        judging_time: time over which the memory is judged; one that harms is used less, and a vehicle that has changed
+            is learnt anew, s.
         knowledge: path of a file of `save_knowledge`: what was learnt before.
 
     Raises:
@@ -84,6 +87,7 @@ def learning(
         horizon=horizon,
         learning_rate=learning_rate,
         bound=memory_bound,
+        judging_time=judging_time,
         knowledge=knowledge,
     )
     return dataclasses.replace(law, memory=remembered)

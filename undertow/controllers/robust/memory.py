@@ -11,6 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.controllers.robust import evidence
+from undertow.controllers.robust.evidence import Evidence
+from undertow.controllers.robust.knowledge import load_knowledge
 from undertow.core import checks
 from undertow.core.contracts import Measurement, TrackingError
 from undertow.core.errors import BadInput
@@ -23,7 +26,7 @@ from undertow.numerics.rotations import cross
 PerAxis = Float[Array, " n"]
 Regressor = Float[Array, " k"]
 
-REGRESSORS = ("rules", "linear")
+REGRESSORS = ("both", "rules", "linear")
 
 
 class MemoryState(NamedTuple):
@@ -33,23 +36,29 @@ class MemoryState(NamedTuple):
     covariance: Float[Array, "k k"]  # of the weights of any axis, over the noise density, 1/s
     lagged: Regressor  # regressor as the observer would follow it
     ahead: Regressor  # its modelling error, s
+    evidence: Evidence  # whether it helps
+    taken: PerAxis  # over from the observer so far, m/s^2, rad/s^2
 
 
 class Memory(eqx.Module):
     """m = W^T phi(reference), learnt by recursive least squares from what the observer still has to add.
 
     The regressor phi holds 1, the desired acceleration, the direction of gravity, the products of velocities of
-    different axes that turning bodies have, and of each velocity either fuzzy rules or v and v |v|. Every axis sees all
+    different axes that turning bodies have, and of each velocity v and v |v|, fuzzy rules, or both. Every axis sees all
     of them. Rules are the memberships of normalised Gaussian sets without the middle one, less their values at rest.
 
-    The observer follows d - m with its lag, so its estimate is (W* - W)^T phi_f, with phi_f the regressor behind the
-    same lag, where d = W*^T phi. This is the innovation. With r = T phi_f^T P phi_f,
+    The observer follows d - m with its lag. With all of the memory in use its estimate is (W* - W)^T phi_f, with phi_f
+    the regressor behind the same lag, where d = W*^T phi. This is the innovation. With r = T phi_f^T P phi_f,
 
         W += P phi_f d_rest^T T / (1 + r),    P -= e T P phi_f phi_f^T P / (1 + e r),    e = max(1 - q / r, 0),
 
-    q = T / `horizon`. P never grows: in directions that are not excited nothing is learnt or forgotten. In those that
-    are, the gain does not fall below the one that forgets within the horizon. What the memory gains the observer loses
-    in the same step.
+    q = T / `horizon`. In directions that are not excited nothing is learnt or forgotten. In those that are, the gain
+    does not fall below the one that forgets within the horizon. What the memory gains the observer loses in the same
+    step.
+
+    Where the memory harms, less of it is used: m = g W^T phi with the share g of `evidence.trust` for each axis; the
+    weights learn on as if all of it were used. Where it is wrong, P returns towards p_0 I at the rate
+    `evidence.wrong` / `judging_time`, so that a vehicle that has changed is learnt anew. P never exceeds p_0 I.
 
     Raises:
         BadInput: a number that is not positive, or an unknown regressor.
@@ -62,13 +71,14 @@ class Memory(eqx.Module):
         "1/s", "variance of the weights before anything is learnt over the noise density", symbol="p_0", default=10.0
     )
     bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=20.0)
+    judging_time: Float[Param, ""] = param("s", "time over which the memory is judged", symbol="tau_j", default=30.0)
     start: Float[Array, "k n"] | None = None
     variance: Float[Array, " k"] | None = None
-    regressor: str = eqx.field(static=True, default="rules")
+    regressor: str = eqx.field(static=True, default="both")
 
     def __check_init__(self):
         checks.choice("regressor", self.regressor, REGRESSORS)
-        for name in ("speeds", "horizon", "learning_rate", "bound"):
+        for name in ("speeds", "horizon", "learning_rate", "bound", "judging_time"):
             checks.positive(name, getattr(self, name))
 
     def check_fit(self, axes: int, body: bool) -> None:
@@ -90,14 +100,16 @@ class Memory(eqx.Module):
         """State before the first step: `start` and `variance`, or nothing known."""
         count = self.size(axes, body)
         nothing = jnp.zeros(count)
-        weights = jnp.zeros((count, axes)) if self.start is None else self.start
+        weights = jnp.zeros((count, axes)) if self.start is None else jnp.clip(self.start, -self.bound, self.bound)
         variance = jnp.ones(count) if self.variance is None else self.variance
-        return MemoryState(weights, jnp.diag(self.learning_rate * variance), nothing, nothing)
+        covariance = jnp.diag(self.learning_rate * variance)
+        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes), jnp.zeros(axes))
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
-        own = axes * (self.fuzzy.rules - 1 if self.regressor == "rules" else 2)
-        return 1 + own + axes + (3 + 9 if body else 0)
+        rules = 0 if self.regressor == "linear" else self.fuzzy.rules - 1
+        shapes = 0 if self.regressor == "rules" else 2
+        return 1 + axes * (rules + shapes) + axes + (3 + 9 if body else 0)
 
     def regressors(self, y: Measurement, velocity: PerAxis, off: TrackingError, body: bool) -> Regressor:
         """phi at the reference.
@@ -109,14 +121,14 @@ class Memory(eqx.Module):
             body: whether the plant is a body, with an attitude and products of velocities.
         """
         share = (velocity + off.rate) / self.speeds
-        if self.regressor == "rules":
+        parts = [jnp.ones(1), off.acceleration]
+        if self.regressor != "linear":
             still = self.fuzzy.basis(jnp.zeros((1, 1)))
             rules = self.fuzzy.basis(share[:, None]) - still
             middle = self.fuzzy.rules // 2
-            own = jnp.concatenate([rules[:, :middle], rules[:, middle + 1 :]], -1).reshape(-1)
-        else:
-            own = jnp.concatenate([share, share * jnp.abs(share)])
-        parts = [jnp.ones(1), own, off.acceleration]
+            parts += [jnp.concatenate([rules[:, :middle], rules[:, middle + 1 :]], -1).reshape(-1)]
+        if self.regressor != "rules":
+            parts += [share, share * jnp.abs(share)]
         if body:
             down = body_of(y).rotation[2]
             u, turning = share[:3], share[3:]
@@ -128,10 +140,10 @@ class Memory(eqx.Module):
 
     def value(self, state: MemoryState, phi: Regressor) -> PerAxis:
         """m, m/s^2 and rad/s^2."""
-        return matvec(state.weights.T, phi)
+        return evidence.trust(state.evidence) * matvec(state.weights.T, phi)
 
     def advance(
-        self, state: MemoryState, phi: Regressor, rest: PerAxis, gains, free, dt
+        self, state: MemoryState, phi: Regressor, rest: PerAxis, error: PerAxis, gains, free, dt
     ) -> tuple[MemoryState, PerAxis]:
         """State one sampling time later, and what the memory gains at this regressor, m/s^2 and rad/s^2.
 
@@ -139,48 +151,58 @@ class Memory(eqx.Module):
             state: now.
             phi: regressor now.
             rest: what the observer adds to the memory, m/s^2 and rad/s^2.
+            error: modelling error of the observer, m/s and rad/s.
             gains: of the observer, per sampling time and 1/s.
             free: 1, or 0 while limits bind and nothing is learnt.
             dt: sampling time, s.
         """
         of_rates, of_estimate = gains
+        used, span = evidence.trust(state.evidence), free * dt
+        innovation = rest - (1 - used) * matvec(state.weights.T, state.lagged)
         towards = matvec(state.covariance, state.lagged)
         size = dt * (state.lagged * towards).sum()
         forgets = dt / self.horizon
         share = jnp.where(size > forgets, 1 - forgets / jnp.where(size > forgets, size, 1.0), 0.0)
-        step = free * dt / (1 + size) * towards[:, None] * rest[None, :]
-        weights = jnp.clip(state.weights + step, -self.bound, self.bound)
-        shrunk = free * share * dt / (1 + share * size) * towards[:, None] * towards[None, :]
-        gained = matvec((weights - state.weights).T, phi)
-        return MemoryState(
-            weights=weights,
-            covariance=state.covariance - shrunk,
+        weights = state.weights + span / (1 + size) * towards[:, None] * innovation[None, :]
+        shrunk = share * span / (1 + share * size) * towards[:, None] * towards[None, :]
+        reopened = evidence.wrong(state.evidence) * span / self.judging_time
+        unknown = self.learning_rate * jnp.eye(phi.shape[0])
+        explained = matvec(state.weights.T, state.ahead)
+        after = MemoryState(
+            weights=jnp.clip(weights, -self.bound, self.bound),
+            covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),
             lagged=state.lagged - of_estimate * state.ahead,
             ahead=state.ahead + dt * (state.lagged - phi) - of_rates * state.ahead,
-        ), gained
+            evidence=evidence.gathered(state.evidence, error + used * explained, explained, span, self.judging_time),
+            taken=state.taken,
+        )
+        gained = self.value(after, phi) - self.value(state, phi)
+        return after._replace(taken=state.taken + gained), gained
 
 
 def memory(
     axes: int,
     *,
-    regressor: str = "rules",
+    regressor: str = "both",
     rules: int = 5,
     speeds=0.5,
     horizon=300.0,
     learning_rate=10.0,
     bound=20.0,
+    judging_time=30.0,
     knowledge=None,
 ) -> Memory:
     """A memory beside an observer.
 
     Args:
         axes: number of axes.
-        regressor: `rules`, or `linear` for v and v |v|.
+        regressor: `rules` of each velocity, `linear` for v and v |v|, or `both`.
         rules: sets of each velocity, an odd number from 3.
         speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
         horizon: time over which what is excited forgets, s.
         learning_rate: p_0, 1/s: how fast it learns at first.
         bound: largest weight, m/s^2 and rad/s^2.
+        judging_time: time over which the memory is judged by the modelling error, s.
         knowledge: what was learnt before: path of a file of `save_knowledge`, or None.
 
     Raises:
@@ -195,34 +217,8 @@ def memory(
         horizon=horizon,
         learning_rate=learning_rate,
         bound=bound,
+        judging_time=judging_time,
         start=learnt[0],
         variance=learnt[1],
         regressor=regressor,
     )
-
-
-def save_knowledge(path, run) -> None:
-    """Write what was learnt by the end of a run to a file (.npz).
-
-    Args:
-        path: of the file.
-        run: dataset with the signals `memory_weights` and `memory_variance`.
-    """
-    weights, variance = (run[name].values[-1] for name in ("memory_weights", "memory_variance"))
-    np.savez(path, weights=weights, variance=variance)
-
-
-def load_knowledge(path) -> tuple[Array, Array]:
-    """Weights and variance of a file of `save_knowledge`.
-
-    Raises:
-        BadInput: the file cannot be read, or holds something else.
-    """
-    try:
-        with np.load(path) as held:
-            weights, variance = np.asarray(held["weights"], dtype=float), np.asarray(held["variance"], dtype=float)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInput("knowledge", "be a file of `save_knowledge`", str(path)) from error
-    checks.finite("knowledge", weights)
-    checks.finite("knowledge", variance)
-    return jnp.asarray(weights), jnp.asarray(variance)

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from undertow.controllers.bandwidths import largest_forces
 from undertow.controllers.law_signals import ADAPTIVE_LAW, MEMORY, lyapunov_signals, weight_signals
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
+from undertow.controllers.robust import evidence
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
 from undertow.controllers.robust.memory import Memory, MemoryState
 from undertow.controllers.thruster_allocation import allocate, attained
@@ -122,6 +123,8 @@ class RobustRCAF(AbstractInformedController):
             signals |= {
                 "memory": plan.remembered,
                 "memory_weights": z.memory.weights,
+                "memory_taken": z.memory.taken,
+                "memory_trust": evidence.trust(z.memory.evidence),
                 "memory_variance": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
             }
         return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
@@ -137,7 +140,7 @@ class RobustRCAF(AbstractInformedController):
         if self.memory is not None and z.memory is not None and plan.phi is not None:
             rest, free = plan.seen.uncertainty - plan.remembered, jnp.where(share < _WHOLE, 0.0, 1.0)
             gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
-            remembered, gained = self.memory.advance(z.memory, plan.phi, rest, gains, free, dt)
+            remembered, gained = self.memory.advance(z.memory, plan.phi, rest, plan.seen.error, gains, free, dt)
             estimator = self.estimator.lowered(estimator, gained)
         return RobustState(
             estimator=estimator,

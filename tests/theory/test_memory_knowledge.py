@@ -1,0 +1,154 @@
+"""What was learnt has names, survives a file, and enters the bound of the estimation error."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty
+from undertow.analysis.theory import SteadyWindow, theory_of
+from undertow.controllers import rcaf
+from undertow.controllers.robust.knowledge import load_knowledge, regressor_names, strongest
+from undertow.controllers.robust.memory import memory
+from undertow.core.contracts import TrackingError
+from undertow.core.errors import BadInput
+from undertow.disturbances import sinusoid
+from undertow.loop import simd_batch
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.dataset import to_dataset
+from undertow.navigation import perfect
+from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.references import sine
+from undertow.report.run_tables import memory_rows
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy
+
+DT = 0.02
+OPTIONS = {"sampling_time": DT, "bandwidth": 4.0, "tracking": 2.0}
+
+
+@pytest.mark.parametrize("regressor", ["both", "rules", "linear"])
+def test_every_entry_of_the_regressor_has_its_name(regressor):
+    """Velocities and accelerations at which each named entry has a known value."""
+    model = hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()
+    axes, part = model.coordinates.axes, memory(6, regressor=regressor, speeds=0.5)
+    names = regressor_names(axes, 5, regressor, body=True)
+    assert len(names) == len(set(names)) == part.size(6, True)
+    y = model.coordinates.measurement(jnp.zeros(6), jnp.zeros(6))
+    velocity, acceleration = jnp.asarray([0.25, -0.1, 0.0, 0.0, 0.3, 0.0]), jnp.asarray([0.0, 0.0, 0.7, 0.0, 0.0, 0.0])
+    phi = part.regressors(y, velocity, TrackingError(jnp.zeros(6), jnp.zeros(6), acceleration), True)
+    found = dict(zip(names, np.asarray(phi), strict=True))
+    u, v, w, _, q, r = axes
+    expected = {"1": 1.0, f"acceleration of {w}": 0.7, f"{u} {v}": -0.1, f"{q} {w}": 0.0, f"{q} {u}": 0.3}
+    if regressor != "rules":
+        expected |= {u: 0.5, f"{u} |{u}|": 0.25, v: -0.2, f"{v} |{v}|": -0.04, r: 0.0}
+    for name, value in expected.items():
+        np.testing.assert_allclose(found[name], value, atol=1e-12, err_msg=name)
+    if regressor != "linear":
+        still = part.fuzzy.basis(jnp.zeros((1, 1)))[0]
+        at_half = part.fuzzy.basis(jnp.full((1, 1), 0.5))[0]
+        np.testing.assert_allclose(found[f"rule of {u} at +0.5 of its range"], at_half[3] - still[3])
+        assert found[f"rule of {u} at +0.5 of its range"] > 0.2
+        assert found[f"rule of {w} at -1 of its range"] == 0.0
+
+
+def damage(kind, path):
+    """Write a file that holds no knowledge."""
+    good = {"weights": np.zeros((3, 1)), "variance": np.ones(3)}
+    np.savez(path, **good)
+    whole = path.read_bytes()
+    if kind == "text":
+        path.write_text("weights: 3\n", encoding="utf-8")
+    elif kind == "empty":
+        path.write_bytes(b"")
+    elif kind == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif kind == "flipped":
+        path.write_bytes(whole[:120] + bytes(b ^ 0xFF for b in whole[120:200]) + whole[200:])
+    elif kind == "array":
+        with path.open("wb") as file:
+            np.save(file, np.zeros(3))
+    elif kind == "objects":
+        np.savez(path, weights=np.array([None, {}]), variance=np.ones(2))
+    else:
+        np.savez(path, **(good | kind))
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "text",
+        "empty",
+        "cut",
+        "flipped",
+        "array",
+        "objects",
+        {"variance": np.ones(2)},
+        {"weights": np.zeros(3)},
+        {"weights": np.full((3, 1), np.nan)},
+        {"variance": np.full(3, -0.1)},
+        {"variance": np.full(3, 2.0)},
+    ],
+    ids=str,
+)
+def test_a_damaged_file_is_refused_in_one_line(kind, tmp_path):
+    damage(kind, tmp_path / "learnt.npz")
+    with pytest.raises(BadInput, match="knowledge") as caught:
+        load_knowledge(tmp_path / "learnt.npz")
+    assert "\n" not in str(caught.value)
+
+
+def test_weights_of_a_file_beyond_the_bound_are_projected_onto_it(tmp_path):
+    plant = double_integrator(1)
+    count = memory(1).size(1, False)
+    np.savez(tmp_path / "large.npz", weights=np.full((count, 1), 9.0), variance=np.ones(count))
+    law = rcaf(plant.model(), preset="learning", memory_bound=2.0, knowledge=str(tmp_path / "large.npz"), **OPTIONS)
+    np.testing.assert_array_equal(law.memory.init(1, False).weights, 2.0)
+
+
+@pytest.fixture(scope="module")
+def dives(tmp_path_factory):
+    """Runs with a load that repeats with the reference: without a memory, with one, and with one of the wrong sign."""
+    plant, file = double_integrator(1), tmp_path_factory.mktemp("knowledge") / "turned.npz"
+    found = {}
+    for name in ("robust", "learning", "turned"):
+        more = {"preset": "robust" if name == "robust" else "learning"}
+        if name == "turned":
+            _, learnt = found["learning"]
+            np.savez(file, weights=-learnt["memory_weights"].values[-1], variance=learnt["memory_variance"].values[-1])
+            more["knowledge"] = str(file)
+        law = rcaf(plant.model(), **more, **OPTIONS)
+        loop = ClosedLoop(plant, law, sine(0.5, 1.0), sinusoid(0.8, 1.0, phase=0.3), perfect())
+        run = simd_batch.simulate(loop, duration=80.0, dt=DT, record_every=1)
+        found[name] = law, to_dataset(run, loop)
+    return found
+
+
+@pytest.mark.parametrize("name", ["robust", "learning", "turned"])
+def test_the_estimation_error_is_within_the_bound_of_what_the_memory_does_not_explain(dives, name):
+    """The bound is an L1 norm: it holds for any weights, right or wrong, once the start is forgotten."""
+    law, run = dives[name]
+    late = run.isel(time=run["time"].values > 6.0)
+    error = np.abs(late["estimate"].values - late["uncertainty"].values)
+    allowed = estimation_bound(law.estimator, DT, fastest_uncertainty(late))
+    assert (error <= allowed + 1e-9).all()
+    assert error.max() > 0.2 * allowed.max()
+
+
+def test_what_is_learnt_makes_the_bound_small(dives):
+    late = {name: run.isel(time=run["time"].values > 60.0) for name, (_, run) in dives.items()}
+    rates = {name: fastest_uncertainty(run)[0] for name, run in late.items()}
+    np.testing.assert_allclose(rates["robust"], 0.8, rtol=0.02)  # amplitude times frequency of the load
+    assert rates["learning"] < 0.25 * rates["robust"]
+
+
+def test_the_run_says_what_was_learnt(dives):
+    law, run = dives["learning"]
+    found = theory_of(law).certificate(run, run, SteadyWindow(40.0, 80.0), DT).numbers
+    table = memory_rows(found)
+    weights, variance = (run[f"memory_{name}"].values[-1] for name in ("weights", "variance"))
+    largest = np.abs(weights[:, 0]).argmax()
+    assert len(table.rows) == 3
+    assert table.rows[0][2] == weights[largest, 0]
+    names = regressor_names(["x"], 5, "both", body=False)
+    assert strongest(weights, variance, names, ["x"])[0].regressor == names[largest]
+    assert found["memory_trust"] == run["memory_trust"].values.min(0).tolist()
