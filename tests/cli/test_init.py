@@ -24,7 +24,7 @@ LISTED = {
     "Controllers": "controllers",
     "References": "references",
     "Disturbances": "disturbances",
-    "Navigation filters, which give the controller its measurement": "navigation",
+    "Navigation filters, which give a law its measurement": "navigation",
 }
 
 
