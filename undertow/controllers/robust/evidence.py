@@ -53,8 +53,10 @@ def best_share(found: Evidence) -> tuple[PerAxis, PerAxis]:
     """The share of the memory that leaves the least modelling error, and twice its standard error."""
     known = found.explained > _NOTHING
     size = jnp.where(known, found.explained, 1.0)
-    left = jnp.maximum(found.alone * found.explained - found.shared**2, 0.0)
-    spread = 2 * jnp.sqrt(left * _CORRELATED / jnp.maximum(found.time, _CORRELATED)) / size
+    left = found.alone * found.explained - found.shared**2
+    # The root only of what is positive: at zero it has no slope.
+    root = jnp.where(left > 0, jnp.sqrt(jnp.where(left > 0, left, 1.0)), 0.0)
+    spread = 2 * root * jnp.sqrt(_CORRELATED / jnp.maximum(found.time, _CORRELATED)) / size
     return jnp.where(known, found.shared / size, 1.0), jnp.where(known, spread, 1.0)
 
 
