@@ -1,9 +1,7 @@
-"""pid and lqi: gains of textbooks, and those of python-control for the same cost."""
+"""pid and lqi: gains of textbooks."""
 
-import control
 import jax.numpy as jnp
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
 
 from undertow.controllers import pid
@@ -60,26 +58,3 @@ def test_regulator_of_the_double_integrator():
     integral, error, rate, given = gains(1.0, 1e-9, 1.0)
     np.testing.assert_allclose([error, rate], [1.0, np.sqrt(3)], rtol=1e-4)
     assert abs(integral) < 1e-8 and given == 0.0
-
-
-@pytest.mark.parametrize(("w", "rho", "sigma"), [(2.0, 0.1, 1.0), (1.0, 0.5, 2.0), (5.0, 0.2, 0.5)])
-def test_gains_of_python_control(w, rho, sigma):
-    """`control.lqr` with integral action, of the same cost; its states are position, velocity and integral."""
-    plant = control.ss([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], np.eye(2), 0)
-    cost = np.diag([w**2, sigma * w, rho * w**3]) ** 2
-    expected = np.asarray(control.lqr(plant, cost, np.eye(1), integral_action=np.array([[1.0, 0.0]]))[0])[0]
-    integral, error, rate, _ = gains(w, rho, sigma)
-    np.testing.assert_allclose([error, rate, integral], expected, rtol=2e-4)
-
-
-@pytest.mark.parametrize("lag", [0.05, 0.3])
-def test_gains_of_python_control_with_the_lag_of_actuators(lag):
-    """The acceleration that actuators give is a fourth state."""
-    w, rho, sigma = 3.0, 0.2, 1.0
-    a = np.zeros((4, 4))
-    a[0, 1] = a[2, 0] = a[1, 3] = 1.0  # position, velocity, integral, given acceleration
-    a[3, 3] = -1 / lag
-    cost = np.diag([w**2, sigma * w, rho * w**3, 0.0]) ** 2
-    expected = np.asarray(control.lqr(a, [[0.0], [0.0], [0.0], [1 / lag]], cost, np.eye(1))[0])[0]
-    integral, error, rate, given = gains(w, rho, sigma, lag)
-    np.testing.assert_allclose([error, rate, integral, given], expected, rtol=1e-3)
