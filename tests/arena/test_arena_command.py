@@ -1,4 +1,4 @@
-"""`undertow arena`: laws enter one after the other, nothing is repeated, and damage is told from results."""
+"""`undertow arena`: laws enter one after the other, nothing is repeated, and damage is no result."""
 
 import csv
 import json

@@ -14,6 +14,7 @@ from undertow.arena.leader_board import (
     failures,
     leader_rows,
     margin_rows,
+    ranked,
     ratio_rows,
     task_rows,
 )
@@ -60,6 +61,11 @@ def test_tables(board):
     lines = as_csv(board).splitlines()
     assert lines[0].startswith("law,task,vehicle,error") and lines[1] == "robust,payload,odin,0.1,0.05,0.05,0.5,0,3"
     assert lines[-1] == "pid,delay,odin,10.0,,,0.5,3,3"
+
+
+def test_rank_is_by_error():
+    good, bad = standing("good", (0.1, 0.1, 0.1), 3), standing("bad", (0.2, 0.2, 0.2), 3)
+    assert [one.score.name for one in ranked([bad, good])] == ["good", "bad"]
 
 
 def test_figures_show_the_numbers(board):

@@ -7,7 +7,7 @@ import pytest
 
 from undertow.arena.leader_board import as_markdown
 from undertow.arena.robustness import Curve
-from undertow.arena.scores import CellResult, geometric_mean, ranked, scored, trial_errors
+from undertow.arena.scores import CellResult, geometric_mean, scored, trial_errors
 from undertow.comparison.tables import Rows
 
 STATION, MOTION = ("station_keeping", "odin"), ("delay", "odin")  # tolerances: 0.05 m, 5 degrees
@@ -40,11 +40,6 @@ def test_score_is_the_geometric_mean_of_medians():
 def test_interval_of_equal_trials_is_a_point():
     score = scored("law", {STATION: result([0.1, 0.1, 0.1])})
     assert score.low == score.high == pytest.approx(score.error)
-
-
-def test_rank_is_by_error():
-    good, bad = scored("good", {STATION: result([0.01] * 3)}), scored("bad", {STATION: result([0.1] * 3)})
-    assert [one.name for one in ranked([bad, good])] == ["good", "bad"]
 
 
 def test_geometric_mean():

@@ -1,20 +1,20 @@
 """A law as it enters the arena: one campaign whose variants are the tasks, and the folder that keeps its results."""
 
 import json
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.arena.tasks import CELLS, VERSION, scenario_keys
-from undertow.arena.tuned_gains import Gains
+from undertow.arena.tuned_gains import Gains, controller_of
 from undertow.campaign.campaign_schema import validate
 from undertow.campaign.prepare import Prepared, prepare_campaign
-from undertow.comparison.candidates import Candidate
+from undertow.comparison.candidates import Candidate, in_letters
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.finished_run import to_json
-from undertow.scenario.reading import Text, from_data
+from undertow.scenario.reading import from_data
 
 LAWS, ENTRY = "laws", "entry.json"
 
@@ -43,7 +43,7 @@ class Entry(NamedTuple):
 
 def folder_of(out: Path, name: str) -> Path:
     """Folder of a law among the results of an arena."""
-    return out / LAWS / re.sub(r"[^a-zA-Z0-9_-]+", "-", name).strip("-")
+    return out / LAWS / in_letters(name)
 
 
 def variant(cell: Cell) -> str:
@@ -68,9 +68,7 @@ def prepare_entry(
     Raises:
         BadInput: the law accepts no task, or the campaign cannot be built.
     """
-    part = law.changes["controller"]
-    tuned = lambda vehicle: {} if gains is None else gains.options.get(vehicle, {})
-    scenarios = {cell: scenario_keys(*cell) | {"controller": part | tuned(cell[1])} for cell in cells}
+    scenarios = {cell: scenario_keys(*cell) | {"controller": controller_of(law, cell[1], gains)} for cell in cells}
     refused: dict[Cell, str] = {}
     try:
         prepared = campaign_of({variant(cell): keys for cell, keys in scenarios.items()}, trials)
@@ -81,13 +79,13 @@ def prepare_entry(
         accepted = {variant(cell): keys for cell, keys in scenarios.items() if cell not in refused}
         prepared = campaign_of(accepted, trials)
     sentences = {} if gains is None else gains.sentences
-    return Entry(law.name, VERSION, part, tuple(cells), refused, sentences), prepared
+    return Entry(law.name, VERSION, law.changes["controller"], tuple(cells), refused, sentences), prepared
 
 
 def campaign_of(scenarios: dict[str, dict[str, Any]], trials: int) -> Prepared:
     """A campaign whose variants are whole scenarios with the same keys."""
     data = {"scenario": next(iter(scenarios.values())), "trials": trials, "variants": scenarios}
-    text: Text = from_data(data)
+    text = from_data(data)
     return prepare_campaign(validate(text), text)
 
 
@@ -101,11 +99,9 @@ def _why_not(keys: dict[str, Any]) -> str:
 
 
 def write_entry(entry: Entry, folder: Path) -> None:
-    """Write what is kept of a law, whole or not at all."""
+    """Write what is kept of a law."""
     data = entry._asdict() | {"refused": [[*cell, why] for cell, why in entry.refused.items()]}
-    partial = (folder / ENTRY).with_suffix(".partial")
-    partial.write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
-    partial.replace(folder / ENTRY)
+    write_whole(folder / ENTRY, to_json(data, indent=1) + "\n")
 
 
 def read_entry(folder: Path) -> Entry:

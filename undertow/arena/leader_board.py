@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -87,7 +88,12 @@ def board_of(out: Path) -> Board:
             hint = "Choose another folder for other tasks or vehicles"
             got = f"others for {one.entry.name} than for {found[0].entry.name}"
             raise BadInput("--out", "have the same tasks and vehicles for all laws", got, hint=hint)
-    return Board(tuple(sorted(found, key=lambda one: one.score.error)), cells)
+    return Board(tuple(ranked(found)), cells)
+
+
+def ranked(standings: Sequence[Standing]) -> list[Standing]:
+    """Best first."""
+    return sorted(standings, key=lambda one: one.score.error)
 
 
 _HEAD = ("law", "error / tolerance", "within tolerance", "lost", "against robust", "input variation (%/s)", "step (us)")

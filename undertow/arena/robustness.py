@@ -14,6 +14,7 @@ import numpy as np
 from undertow.arena.entry import campaign_of
 from undertow.arena.scores import METRICS, trial_errors
 from undertow.arena.tasks import Keys, motion_keys
+from undertow.arena.tuned_gains import Gains, controller_of
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.store_results import load
@@ -128,18 +129,18 @@ class Curve(NamedTuple):
         return {name: list(map(float, column)) for name, column in self._asdict().items()}
 
 
-def prepare_robustness(law: Candidate, trials: int, options: dict[str, Any]) -> Prepared:
+def prepare_robustness(law: Candidate, trials: int, gains: Gains | None) -> Prepared:
     """The campaign of a law: a variant for every level of every parameter.
 
     Args:
         law: the law.
         trials: at every level.
-        options: tuned gains for the vehicle; empty for those that the law has by itself.
+        gains: tuned for each vehicle; None for those that the law has by itself.
 
     Raises:
         BadInput: the law does not accept the vehicle.
     """
-    part = {"controller": law.changes["controller"] | options}
+    part = {"controller": controller_of(law, VEHICLE, gains)}
     same = {"navigation": "perfect", "model": {}} | motion_keys(VEHICLE) | part
     scenarios = {
         _variant(name, level): same | one.keys(level) for name, one in PARAMETERS.items() for level in one.levels

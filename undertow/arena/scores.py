@@ -102,9 +102,9 @@ def score_of(entry: Entry, folder: Path) -> Score:
     except OSError as error:
         hint = f"Run the arena again for {entry.name} with --overwrite"
         raise BadInput("--out", "have results that can be read", str(error).partition(";")[0], hint=hint) from None
-    refused = {cell: _refused(results.campaign.trials) for cell in entry.refused}
-    ran = _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
-    return scored(entry.name, {cell: (refused | ran)[cell] for cell in entry.cells})
+    every = {cell: _refused(results.campaign.trials) for cell in entry.refused}
+    every |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
+    return scored(entry.name, {cell: every[cell] for cell in entry.cells})
 
 
 def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
@@ -125,11 +125,6 @@ def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
         geometric_mean([max(one, 1e-9) for one in active]),
         cells,
     )
-
-
-def ranked(scores: Sequence[Score]) -> list[Score]:
-    """Best first."""
-    return sorted(scores, key=lambda one: one.error)
 
 
 def tolerances(cell: Cell) -> tuple[float, ...]:

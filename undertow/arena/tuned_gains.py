@@ -22,6 +22,11 @@ class Gains(NamedTuple):
     sentences: dict[str, str]
 
 
+def controller_of(law: Candidate, vehicle: str, gains: Gains | None) -> dict[str, Any]:
+    """Part `controller` of a law on a vehicle, with its tuned gains if there are any."""
+    return law.changes["controller"] | ({} if gains is None else gains.options.get(vehicle, {}))
+
+
 def tuned_gains(
     law: Candidate, vehicles: Sequence[str], budget: int, folder: Path, say: Callable[[str], None]
 ) -> Gains:

@@ -3,16 +3,16 @@
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import typer
 from rich.console import Console
 
 from undertow.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, write_entry
 from undertow.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
-from undertow.arena.robustness import FOLDER, VEHICLE, prepare_robustness
+from undertow.arena.robustness import FOLDER, prepare_robustness
 from undertow.arena.tasks import CELLS, TASKS, scenario_keys
-from undertow.arena.tuned_gains import Gains, tuned_gains
+from undertow.arena.tuned_gains import Gains, controller_of, tuned_gains
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.run_campaign import STORE
@@ -21,7 +21,7 @@ from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
-from undertow.cli.stages import stage
+from undertow.cli.stages import new_lines, stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import run_trials, worker_count
 from undertow.comparison.candidates import Candidate, laws
@@ -154,22 +154,14 @@ def _run(console: Console, law: Candidate, folder: Path, asked: _Asked) -> None:
             found = interruptible(lambda: step_time(prepared.first))
             (folder / STEP).write_text(to_json(found._asdict()) + "\n", encoding="utf-8")
     if asked.robustness:
-        options = {} if gains is None else gains.options.get(VEHICLE, {})
         with stage(console, "building robustness"):
-            harder = interruptible(lambda: prepare_robustness(law, max(2, asked.trials // 4), options))
+            harder = interruptible(lambda: prepare_robustness(law, max(2, asked.trials // 4), gains))
         _trials(console, harder, folder / FOLDER, asked.workers)
 
 
 def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> Gains:
     """Gains for every vehicle, tuned on a task of its own."""
-    vehicles = list(dict.fromkeys(vehicle for _, vehicle in cells))
-    said: list[str] = []
-
-    def say(words: str) -> None:
-        if words not in said[-1:]:
-            said.append(words)
-            console.print(words, markup=False, highlight=False)
-
+    vehicles, say = list(dict.fromkeys(vehicle for _, vehicle in cells)), new_lines(console)
     return interruptible(lambda: tuned_gains(law, vehicles, budget, folder / _TUNING, say))
 
 
@@ -181,11 +173,9 @@ def _trials(console: Console, prepared: Prepared, folder: Path, workers: int) ->
 
 def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
     """Write the scenario of every task, which `undertow simulate` runs."""
-    part: dict[str, Any] = law.changes["controller"]
     folder.mkdir(exist_ok=True)
     for task, vehicle in cells:
-        tuned = {} if gains is None else gains.options.get(vehicle, {})
-        text = dump(scenario_keys(task, vehicle) | {"controller": part | tuned})
+        text = dump(scenario_keys(task, vehicle) | {"controller": controller_of(law, vehicle, gains)})
         said = f"# {law.name} in task {task} on {vehicle}: {TASKS[task].question}.\n"
         (folder / f"{task}-{vehicle}.yaml").write_text(said + text, encoding="utf-8")
 

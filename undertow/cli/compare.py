@@ -17,7 +17,7 @@ from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
-from undertow.cli.stages import stage
+from undertow.cli.stages import new_lines, stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.comparison.budget_tables import budget_sentences
@@ -85,14 +85,7 @@ def _tuning(console: Console, folder: Path, budget: int | None, again: Sequence[
     if budget is None:
         yield None
         return
-    place = folder / FOLDER
-    said: list[str] = []
-
-    def say(words: str) -> None:
-        if words not in said[-1:]:
-            said.append(words)
-            console.print(words, markup=False, highlight=False)
-
+    place, say = folder / FOLDER, new_lines(console)
     try:
         yield lambda candidates, scenario: equal_budgets(candidates, scenario, budget, place, say)
     except BaseException as error:

@@ -27,6 +27,19 @@ def stage(console: Console, name: str) -> Iterator[None]:
     console.print(f"{name:<24}{time.perf_counter() - started:6.1f} s", highlight=False)
 
 
+def new_lines(console: Console) -> Callable[[str], None]:
+    """A function that prints a line unless it is the one before."""
+    last = ""
+
+    def say(words: str) -> None:
+        nonlocal last
+        if words != last:
+            last = words
+            console.print(words, markup=False, highlight=False)
+
+    return say
+
+
 @contextlib.contextmanager
 def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
     """A function that shows a message and the share done: as a bar on a terminal, as lines elsewhere.

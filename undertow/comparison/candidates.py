@@ -176,7 +176,12 @@ def label(part: Mapping[str, Any]) -> str:
 
 def file_stem(number: int, name: str) -> str:
     """Name of the files of a candidate: its number, from 0, and its name in letters of every file system."""
-    return f"{number + 1}-{re.sub(r'[^a-zA-Z0-9_-]+', '-', name).strip('-')}"
+    return f"{number + 1}-{in_letters(name)}"
+
+
+def in_letters(name: str) -> str:
+    """A name in letters of every file system."""
+    return re.sub(r"[^a-zA-Z0-9_-]+", "-", name).strip("-")
 
 
 def _unique(found: Sequence[Candidate]) -> list[Candidate]:

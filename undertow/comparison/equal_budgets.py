@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.comparison.candidates import Candidate, file_stem, part_of
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.finished_run import to_json
@@ -194,9 +195,7 @@ def _tuned(one: Candidate, text: Text, budget: int, file: Path, say: Say) -> dic
     if entry is None:
         nothing = dict.fromkeys(("train", "held_out", "radius", "sets"))
         entry = {"name": one.name, "gains": {}, "untuned": untuned, "parameters": 0, "evaluations": 0, **nothing}
-    partial = finished.with_suffix(".partial")
-    partial.write_text(to_json({"about": about, **entry}, indent=1) + "\n", encoding="utf-8")
-    partial.replace(finished)  # whole or not at all
+    write_whole(finished, to_json({"about": about, **entry}, indent=1) + "\n")
     checkpoint.unlink(missing_ok=True)
     return _read(finished, about)
 

@@ -40,6 +40,13 @@ def lock_of(path: Path) -> Path:
     return path / name if path.is_dir() and not os.access(path.parent, os.W_OK) else path.with_name(name)
 
 
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    partial = path.with_suffix(".partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
 def settle(path: Path) -> None:
     """Wait until a file, or everything in a folder, is on the disk and survives a power cut."""
     if path.is_dir():
