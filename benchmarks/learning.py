@@ -28,6 +28,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics
+from undertow.controllers.law_signals import INERTIA
 from undertow.controllers.robust.knowledge import save_knowledge
 from undertow.core.contracts import AbstractReference, Target
 from undertow.loop import simd_batch
@@ -150,7 +151,7 @@ def run_seeds(
     """Runs of one loop with different seeds, as one SIMD batch; errors over start < t <= stop, s."""
     metrics = Metrics(start, stop, loop.plant.output_units)
     steps, keys = round(duration * rate), [jax.random.PRNGKey(seed) for seed in seeds]
-    names = ("position", "reference", "measured_position", "memory_weights", "memory_variance")
+    names = ("position", "reference", "measured_position", "memory_weights", "memory_variance", *INERTIA)
     signals = tuple(name for name in names if name in loop.signals())
     plan = simd_batch.Plan(steps, 1 / rate, rate // 10, signals)
     one = simd_batch.Run(loop, (metrics,), loop.outputs_at_start(None, None), keys[0])

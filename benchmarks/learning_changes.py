@@ -40,11 +40,13 @@ def changes(time: float) -> dict[str, dict[str, Any]]:
 
 
 def foreign(path: Path, motion: str, law: str, case: str, lap: float) -> None:
-    """Write knowledge that is wrong: learnt with another model, or with all signs turned."""
+    """Write knowledge that is wrong: learnt with another model, or with all signs and inertias turned round."""
     loop = built(LAWS[law], 50, {"model": {"vehicle": {"parameters": "px4"}}} if case == "other model" else {}, motion)
     final = run_seeds(loop, 50, np.round(BEFORE * lap), [0], 0.0, np.inf).final
     sign = 1.0 if case == "other model" else -1.0
-    np.savez(path, weights=sign * final["memory_weights"][0], variance=final["memory_variance"][0])
+    knowledge = {name: final[f"memory_{name}"][0] for name in ("weights", "variance")}
+    knowledge |= {"inertia": final["inertia"][0] ** sign, "inertia_error": final["inertia_error"][0]}
+    np.savez(path, **(knowledge | {"weights": sign * knowledge["weights"]}))
 
 
 def ratios(motion: str, law: str, case: str) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ import pytest
 from undertow.controllers import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.knowledge import load_knowledge, save_knowledge
-from undertow.controllers.robust.memory import memory
+from undertow.controllers.robust.memory import Observed, memory
 from undertow.core.contracts import Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
@@ -29,11 +29,18 @@ GAINS = OBSERVER.gains(jnp.asarray(DT))
 ONE = jnp.ones(())
 
 
+def observed(rest, error):
+    """A step of an observer, for a memory that does not identify inertias."""
+    still = jnp.zeros_like(rest)
+    return Observed(rest, error, still, still, still)
+
+
 def learnt(part, state, regressors, rest_of, free=ONE, error_of=lambda state: jnp.zeros(2)):
     """States over a sequence of regressors; what the observer adds, and its modelling error, are functions of them."""
 
     def step(state, phi):
-        after, gained = part.advance(state, phi, rest_of(state), error_of(state), GAINS, free, jnp.asarray(DT))
+        seen = observed(rest_of(state), error_of(state))
+        after, gained = part.advance(state, phi, seen, GAINS, free, jnp.asarray(DT))
         return after, (state, gained)
 
     return jax.jit(lambda state: jax.lax.scan(step, state, regressors))(state)
@@ -112,11 +119,13 @@ def test_the_observer_loses_what_the_memory_gains():
     state, phi = part.init(2, False), motion(7, part.size(2, False), 1)[0]
     state = state._replace(lagged=0.9 * phi)
     observer = OBSERVER.init(jnp.zeros(2))._replace(weights=jnp.asarray([[0.4], [-0.3]]))
-    after, gained = part.advance(state, phi, jnp.asarray([0.4, -0.3]), jnp.zeros(2), GAINS, ONE, jnp.asarray(DT))
+    after, gained = part.advance(
+        state, phi, observed(jnp.asarray([0.4, -0.3]), jnp.zeros(2)), GAINS, ONE, jnp.asarray(DT)
+    )
     lowered = OBSERVER.lowered(observer, gained)
-    total = part.value(after, phi) + lowered.weights[:, 0]
+    total = part.recalled(after, phi) + lowered.weights[:, 0]
     assert np.abs(gained).min() > 1e-3
-    np.testing.assert_allclose(total, part.value(state, phi) + observer.weights[:, 0], atol=1e-12)
+    np.testing.assert_allclose(total, part.recalled(state, phi) + observer.weights[:, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("regressor", ["both", "rules", "linear"])
@@ -162,7 +171,7 @@ def test_knowledge_is_saved_and_the_next_run_begins_with_it(dive, tmp_path):
     loop, one = dive
     file = tmp_path / "learnt.npz"
     save_knowledge(file, to_dataset(one, loop))
-    weights, variance = load_knowledge(file)
+    weights, variance = load_knowledge(file)[:2]
     np.testing.assert_array_equal(weights, one.signals["memory_weights"][-1])
     np.testing.assert_array_equal(variance, one.signals["memory_variance"][-1])
     options = {"preset": "learning", "sampling_time": DT, "bandwidth": 4.0, "tracking": 2.0, "regressor": "linear"}

@@ -25,13 +25,17 @@ LYAPUNOV = {
 }
 ATTAINED_SHARE = {"attained_share": Signal((), "1", "share of the desired acceleration that the command can give")}
 MEMORY = {
-    "memory": Signal(("axis",), "[axis]/s^2", "share of the estimate that the memory gives"),
+    "memory": Signal(("axis",), "[axis]/s^2", "share of the estimate that the memory and the learnt inertia give"),
     "memory_weights": Signal(("regressor", "axis"), "[axis]/s^2", "weights of the memory"),
     "memory_taken": Signal(("axis",), "[axis]/s^2", "what the memory has taken over from the observer so far"),
     "memory_trust": Signal(("axis",), "1", "share of what was learnt that is used: 1 unless it harms"),
     "memory_variance": Signal(
         ("regressor",), "1", "variance of a weight over that before learning: 1 where not excited"
     ),
+}
+INERTIA = {
+    "inertia": Signal(("axis",), "1", "inertia over that of the nominal model, as identified by probing"),
+    "inertia_error": Signal(("axis",), "1", "standard error of the identified inertia; large where nothing is known"),
 }
 ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | ATTAINED_SHARE
 

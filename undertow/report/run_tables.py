@@ -73,13 +73,17 @@ def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
     rows: list[tuple[str | float, ...]] = [
         (one["axis"], one["regressor"], one["weight"], _share(one["variance"])) for one in certificate["memory"]
     ]
-    sentences = (
+    sentences = [
         "The largest weights of each axis, in the unit of its acceleration. A variance of 100 % means that the motion "
         "did not show that entry.",
         f"Of what was learnt at least {_share(min(certificate['memory_trust']))} was used on every axis. No weight "
         f"exceeds {_number(certificate['memory_bound'])}.",
-    )
-    return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, sentences)
+    ]
+    if "inertia" in certificate:
+        both = zip(certificate["inertia"], certificate["inertia_error"], strict=True)
+        found = ", ".join(f"{ratio:.2f} ± {error:.2f}" if error < 1 else "unknown" for ratio, error in both)
+        sentences.append(f"Inertia of each axis over that of the nominal model, by probing: {found}.")
+    return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, tuple(sentences))
 
 
 def fault_rows(faults: Sequence[Mapping[str, Any]]) -> RunTable:

@@ -10,6 +10,7 @@ from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
 from undertow.analysis.small_signal import of_axis
 from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
+from undertow.controllers.law_signals import INERTIA
 from undertow.controllers.robust.knowledge import regressor_names, strongest
 from undertow.controllers.robust.robust_law import RobustRCAF
 
@@ -65,7 +66,8 @@ def _learnt(law: RobustRCAF, lived: xr.Dataset) -> dict[str, Any]:
     axes = list(coordinates.axes) or [str(name) for name in lived["axis"].values]
     names = regressor_names(axes, memory.fuzzy.rules, memory.regressor, bool(coordinates.axes))
     weights, variance = (lived[f"memory_{name}"].values[-1] for name in ("weights", "variance"))
-    return {
+    found = {name: lived[name].values[-1].tolist() for name in INERTIA if name in lived}
+    return found | {
         "memory": [one._asdict() for one in strongest(weights, variance, names, axes)],
         "memory_trust": lived["memory_trust"].values.min(0).tolist(),
         "memory_bound": float(memory.bound),

@@ -3,11 +3,19 @@
 import dataclasses
 from typing import Annotated
 
+import jax.numpy as jnp
+import numpy as np
+
 from undertow.controllers.presets.robust import robust
+from undertow.controllers.robust.inertia import InertiaIdentification
+from undertow.controllers.robust.knowledge import Knowledge, load_knowledge
 from undertow.controllers.robust.memory import memory
 from undertow.controllers.robust.robust_law import RobustRCAF
-from undertow.core import catalogue
+from undertow.core import catalogue, checks
 from undertow.core.contracts import Model
+
+_PROBING = 0.12  # rad/s^2
+_SPREAD = 0.8, 1.2  # of the frequencies of the axes
 
 
 def learning(
@@ -32,6 +40,7 @@ def learning(
     learning_rate=10.0,
     memory_bound=20.0,
     judging_time=30.0,
+    probing=None,
     knowledge: Annotated[str | None, catalogue.FILE] = None,
 ) -> RobustRCAF:
     """The robust law with a memory: d_hat = memory(reference) + observer(rest), at the gains of preset `robust`.
@@ -59,6 +68,8 @@ def learning(
         memory_bound: largest weight of the memory, m/s^2 and rad/s^2.
         judging_time: time over which the memory is judged; one that harms is used less, and a vehicle that has changed
             is learnt anew, s.
+        probing: acceleration of the oscillation that identifies the inertia in the first minutes, m/s^2 and rad/s^2;
+            one number or one per axis, 0 for none; None: 0.12 rad/s^2 for angles, which is 0.2 degrees at 100 Hz.
         knowledge: path of a file of `save_knowledge`: what was learnt before.
 
     Raises:
@@ -79,8 +90,10 @@ def learning(
         actuator_rate=actuator_rate,
         direction=direction,
     )
+    axes = len(law.model.coordinates.angles)
+    learnt = None if knowledge is None else load_knowledge(knowledge)
     remembered = memory(
-        len(law.model.coordinates.angles),
+        axes,
         regressor=regressor,
         rules=rules,
         speeds=speeds,
@@ -88,6 +101,18 @@ def learning(
         learning_rate=learning_rate,
         bound=memory_bound,
         judging_time=judging_time,
-        knowledge=knowledge,
+        inertia=_identification(law, axes, probing, learnt),
+        knowledge=learnt,
     )
     return dataclasses.replace(law, memory=remembered)
+
+
+def _identification(law: RobustRCAF, axes: int, probing, learnt: Knowledge | None) -> InertiaIdentification | None:
+    """Between the bandwidths of tracking and observer, another frequency for each axis."""
+    angles = np.asarray(law.model.coordinates.angles)
+    amplitude = np.where(angles, _PROBING, 0.0) if probing is None else np.broadcast_to(probing, (axes,))
+    if not checks.traced(amplitude) and not np.any(amplitude):
+        return None
+    middle = jnp.sqrt(jnp.sqrt(law.feedback[..., 0]) * law.estimator.bandwidth)
+    known = None if learnt is None else learnt.inertia
+    return InertiaIdentification(amplitude=amplitude, frequency=middle * np.linspace(*_SPREAD, axes), known=known)

@@ -15,6 +15,22 @@ from undertow.core.errors import BadInput
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)
 _MUST = "be a file of `save_knowledge`"
+# Entries of a file and the signals they come from.
+_SIGNALS = {
+    "weights": "memory_weights",
+    "variance": "memory_variance",
+    "inertia": "inertia",
+    "inertia_error": "inertia_error",
+}
+_ALWAYS = ("weights", "variance")
+
+
+class Knowledge(NamedTuple):
+    """What a memory has learnt, with n axes and k entries of the regressor."""
+
+    weights: Array  # (k, n), m/s^2, rad/s^2
+    variance: Array  # (k,), over that before learning, 0 to 1
+    inertia: tuple[Array, Array] | None = None  # (n,) over that of the nominal model, and its standard error
 
 
 def save_knowledge(path, run) -> None:
@@ -22,33 +38,41 @@ def save_knowledge(path, run) -> None:
 
     Args:
         path: of the file.
-        run: dataset with the signals `memory_weights` and `memory_variance`.
+        run: dataset with the signals `memory_weights` and `memory_variance`, and `inertia` and `inertia_error` where
+            the inertia was identified.
     """
-    weights, variance = (run[name].values[-1] for name in ("memory_weights", "memory_variance"))
-    np.savez(path, weights=weights, variance=variance)
+    np.savez(path, **{name: run[signal].values[-1] for name, signal in _SIGNALS.items() if signal in run})
 
 
-def load_knowledge(path) -> tuple[Array, Array]:
-    """Weights, (k, n), and variance, (k,), of a file of `save_knowledge`.
+def load_knowledge(path) -> Knowledge:
+    """What a file of `save_knowledge` holds.
 
     Raises:
         BadInput: the file cannot be read, or holds something else.
     """
     try:
         with Path(path).open("rb") as file, np.load(file) as held:
-            weights, variance = np.asarray(held["weights"], dtype=float), np.asarray(held["variance"], dtype=float)
+            found = {name: np.asarray(held[name], dtype=float) for name in _SIGNALS if name in held or name in _ALWAYS}
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
-    if weights.ndim != 2 or variance.shape != weights.shape[:1]:
-        got = f"{path} with weights of shape {weights.shape} and variance of shape {variance.shape}"
-        raise BadInput("knowledge", _MUST, got)
-    checks.finite("knowledge", weights)
-    checks.finite("knowledge", variance)
+    weights, variance = (found[name] for name in _ALWAYS)
+    inertia = [found[name] for name in _SIGNALS if name in found and name not in _ALWAYS]
+    good = weights.ndim == 2 and variance.shape == weights.shape[:1] and len(inertia) in (0, 2)
+    if not good or any(one.shape != weights.shape[1:] for one in inertia):
+        got = ", ".join(f"{name} of shape {value.shape}" for name, value in found.items())
+        raise BadInput("knowledge", _MUST, f"{path} with {got}")
+    for value in found.values():
+        checks.finite("knowledge", value)
     if (variance < 0).any() or (variance > 1 + 1e-9).any():
         raise BadInput(
             "knowledge", "have a variance from 0 to 1", f"{path} with {variance.min():g} to {variance.max():g}"
         )
-    return jnp.asarray(weights), jnp.asarray(variance)
+    if not inertia:
+        return Knowledge(jnp.asarray(weights), jnp.asarray(variance))
+    ratio, error = inertia
+    if (ratio <= 0).any() or (error < 0).any():
+        raise BadInput("knowledge", "have inertias above 0 and standard errors from 0", str(path))
+    return Knowledge(jnp.asarray(weights), jnp.asarray(variance), (jnp.asarray(ratio), jnp.asarray(error)))
 
 
 def regressor_names(axes: Sequence[str], rules: int, regressor: str, body: bool) -> list[str]:

@@ -13,7 +13,8 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.robust import evidence
 from undertow.controllers.robust.evidence import Evidence
-from undertow.controllers.robust.knowledge import load_knowledge
+from undertow.controllers.robust.inertia import InertiaIdentification, InertiaState
+from undertow.controllers.robust.knowledge import Knowledge
 from undertow.core import checks
 from undertow.core.contracts import Measurement, TrackingError
 from undertow.core.errors import BadInput
@@ -38,6 +39,17 @@ class MemoryState(NamedTuple):
     ahead: Regressor  # its modelling error, s
     evidence: Evidence  # whether it helps
     taken: PerAxis  # over from the observer so far, m/s^2, rad/s^2
+    inertia: InertiaState | None  # what probing has found
+
+
+class Observed(NamedTuple):
+    """What one control step tells a memory, per axis."""
+
+    rest: PerAxis  # what the observer adds to the memory, m/s^2, rad/s^2
+    error: PerAxis  # modelling error of the observer, m/s, rad/s
+    correction: PerAxis  # desired acceleration besides that of the reference, less `rest`, m/s^2, rad/s^2
+    rate: PerAxis  # velocity of the plant besides that of the reference, m/s, rad/s
+    nominal: PerAxis  # F + G u of the applied input besides the acceleration of the reference, m/s^2, rad/s^2
 
 
 class Memory(eqx.Module):
@@ -60,6 +72,10 @@ class Memory(eqx.Module):
     weights learn on as if all of it were used. Where it is wrong, P returns towards p_0 I at the rate
     `evidence.wrong` / `judging_time`, so that a vehicle that has changed is learnt anew. P never exceeds p_0 I.
 
+    With the inertia h of `InertiaIdentification`, which is not that of the nominal model, the observer adds d_rest to
+    h v_dot = F + G u + m - (1 - h) a_r + h d_rest, with the acceleration a_r of the reference. What is known besides
+    the observer is then m + (1 - h) c, where a_r + c + d_rest is the acceleration that feedback asks for.
+
     Raises:
         BadInput: a number that is not positive, or an unknown regressor.
     """
@@ -72,6 +88,7 @@ class Memory(eqx.Module):
     )
     bound: Float[Param, ""] = param("m/s^2, rad/s^2", "largest weight", symbol="w_max", default=20.0)
     judging_time: Float[Param, ""] = param("s", "time over which the memory is judged", symbol="tau_j", default=30.0)
+    inertia: InertiaIdentification | None = None
     start: Float[Array, "k n"] | None = None
     variance: Float[Array, " k"] | None = None
     regressor: str = eqx.field(static=True, default="both")
@@ -88,6 +105,8 @@ class Memory(eqx.Module):
             BadInput: velocities or knowledge for another number of axes or regressors.
         """
         checks.length("speeds", self.speeds, axes, "axes")
+        if self.inertia is not None:
+            self.inertia.check_fit(axes)
         shapes, count = (
             tuple(None if one is None else one.shape for one in (self.start, self.variance)),
             self.size(axes, body),
@@ -103,7 +122,8 @@ class Memory(eqx.Module):
         weights = jnp.zeros((count, axes)) if self.start is None else jnp.clip(self.start, -self.bound, self.bound)
         variance = jnp.ones(count) if self.variance is None else self.variance
         covariance = jnp.diag(self.learning_rate * variance)
-        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes), jnp.zeros(axes))
+        inertia = None if self.inertia is None else self.inertia.init(axes)
+        return MemoryState(weights, covariance, nothing, nothing, evidence.none(axes), jnp.zeros(axes), inertia)
 
     def size(self, axes: int, body: bool) -> int:
         """Number k of regressors."""
@@ -138,27 +158,49 @@ class Memory(eqx.Module):
             parts += [u * around, turning * around, turning * further]
         return jnp.concatenate(parts)
 
-    def value(self, state: MemoryState, phi: Regressor) -> PerAxis:
+    def inertia_ratio(self, state: MemoryState) -> PerAxis:
+        """h: inertia over that of the nominal model."""
+        if self.inertia is None or state.inertia is None:
+            return jnp.ones_like(state.taken)
+        return self.inertia.ratio(state.inertia)
+
+    def inertia_signals(self, state: MemoryState) -> dict[str, PerAxis]:
+        """Signals of the identified inertia, if it is identified."""
+        if self.inertia is None or state.inertia is None:
+            return {}
+        return {"inertia": self.inertia.ratio(state.inertia), "inertia_error": self.inertia.error(state.inertia)}
+
+    def probing(self, state: MemoryState, feedback: Float[Array, "*#n 2"]) -> PerAxis:
+        """Desired acceleration of the probing oscillation, with the feedback K of its motion, m/s^2 and rad/s^2."""
+        if self.inertia is None or state.inertia is None:
+            return jnp.zeros_like(state.taken)
+        displacement, rate, acceleration = self.inertia.motion(state.inertia)
+        return acceleration + feedback[..., 0] * displacement + feedback[..., 1] * rate
+
+    def recalled(self, state: MemoryState, phi: Regressor) -> PerAxis:
         """m, m/s^2 and rad/s^2."""
         return evidence.trust(state.evidence) * matvec(state.weights.T, phi)
 
+    def value(self, state: MemoryState, phi: Regressor, correction: PerAxis) -> PerAxis:
+        """What is known besides the observer: m, and what the inertia adds to a correction, m/s^2 and rad/s^2."""
+        return self.recalled(state, phi) + (1 - self.inertia_ratio(state)) * correction
+
     def advance(
-        self, state: MemoryState, phi: Regressor, rest: PerAxis, error: PerAxis, gains, free, dt
+        self, state: MemoryState, phi: Regressor, seen: Observed, gains, free, dt
     ) -> tuple[MemoryState, PerAxis]:
-        """State one sampling time later, and what the memory gains at this regressor, m/s^2 and rad/s^2.
+        """State one sampling time later, and what the observer loses of its estimate, m/s^2 and rad/s^2.
 
         Args:
             state: now.
             phi: regressor now.
-            rest: what the observer adds to the memory, m/s^2 and rad/s^2.
-            error: modelling error of the observer, m/s and rad/s.
+            seen: what this step tells.
             gains: of the observer, per sampling time and 1/s.
             free: 1, or 0 while limits bind and nothing is learnt.
             dt: sampling time, s.
         """
         of_rates, of_estimate = gains
-        used, span = evidence.trust(state.evidence), free * dt
-        innovation = rest - (1 - used) * matvec(state.weights.T, state.lagged)
+        used, span, h = evidence.trust(state.evidence), free * dt, self.inertia_ratio(state)
+        innovation = h * seen.rest - (1 - used) * matvec(state.weights.T, state.lagged)
         towards = matvec(state.covariance, state.lagged)
         size = dt * (state.lagged * towards).sum()
         forgets = dt / self.horizon
@@ -168,16 +210,22 @@ class Memory(eqx.Module):
         reopened = evidence.wrong(state.evidence) * span / self.judging_time
         unknown = self.learning_rate * jnp.eye(phi.shape[0])
         explained = matvec(state.weights.T, state.ahead)
+        alone, inertia = h * seen.error + used * explained, None
+        if self.inertia is not None and state.inertia is not None:
+            expected = seen.nominal + self.recalled(state, phi)
+            inertia = self.inertia.advance(state.inertia, seen.rate, expected, free, dt)
         after = MemoryState(
             weights=jnp.clip(weights, -self.bound, self.bound),
             covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),
             lagged=state.lagged - of_estimate * state.ahead,
             ahead=state.ahead + dt * (state.lagged - phi) - of_rates * state.ahead,
-            evidence=evidence.gathered(state.evidence, error + used * explained, explained, span, self.judging_time),
+            evidence=evidence.gathered(state.evidence, alone, explained, span, self.judging_time),
             taken=state.taken,
+            inertia=inertia,
         )
-        gained = self.value(after, phi) - self.value(state, phi)
-        return after._replace(taken=state.taken + gained), gained
+        gained = self.value(after, phi, seen.correction) - self.value(state, phi, seen.correction)
+        lost = gained / self.inertia_ratio(after)
+        return after._replace(taken=state.taken + lost), lost
 
 
 def memory(
@@ -190,7 +238,8 @@ def memory(
     learning_rate=10.0,
     bound=20.0,
     judging_time=30.0,
-    knowledge=None,
+    inertia: InertiaIdentification | None = None,
+    knowledge: Knowledge | None = None,
 ) -> Memory:
     """A memory beside an observer.
 
@@ -203,14 +252,14 @@ def memory(
         learning_rate: p_0, 1/s: how fast it learns at first.
         bound: largest weight, m/s^2 and rad/s^2.
         judging_time: time over which the memory is judged by the modelling error, s.
-        knowledge: what was learnt before: path of a file of `save_knowledge`, or None.
+        inertia: identification of the inertia by probing, or None.
+        knowledge: what was learnt before.
 
     Raises:
-        BadInput: a number out of its range, or a file that holds no knowledge.
+        BadInput: a number out of its range.
     """
     if not isinstance(rules, int) or rules < 3 or rules % 2 == 0:
         raise BadInput("rules", "be an odd number from 3", rules)
-    learnt = (None, None) if knowledge is None else load_knowledge(knowledge)
     return Memory(
         fuzzy=gaussian_sets(rules),
         speeds=np.broadcast_to(speeds, (axes,)) if np.ndim(speeds) == 0 else speeds,
@@ -218,7 +267,8 @@ def memory(
         learning_rate=learning_rate,
         bound=bound,
         judging_time=judging_time,
-        start=learnt[0],
-        variance=learnt[1],
+        inertia=inertia,
+        start=None if knowledge is None else knowledge.weights,
+        variance=None if knowledge is None else knowledge.variance,
         regressor=regressor,
     )

@@ -7,11 +7,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
-from undertow.controllers.law_signals import ADAPTIVE_LAW, MEMORY, lyapunov_signals, weight_signals
+from undertow.controllers.law_signals import ADAPTIVE_LAW, INERTIA, MEMORY, lyapunov_signals, weight_signals
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.robust import evidence
 from undertow.controllers.robust.estimator import Estimate, Estimator, EstimatorState
-from undertow.controllers.robust.memory import Memory, MemoryState
+from undertow.controllers.robust.memory import Memory, MemoryState, Observed
 from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
@@ -46,9 +46,10 @@ class Plan(NamedTuple):
     seen: Estimate
     off: Tracking  # error from the target, filtered if there is a filter
     robust: PerAxis  # u_r
+    desired: PerAxis  # acceleration, m/s^2, rad/s^2
     forces: Float[Array, " m"]  # for the desired acceleration, without limits
     phi: Float[Array, " k"] | None  # regressor of the memory
-    remembered: PerAxis  # m, m/s^2, rad/s^2; zero without a memory
+    remembered: PerAxis  # what is known besides the observer, m/s^2, rad/s^2; zero without a memory
 
 
 class RobustRCAF(AbstractInformedController):
@@ -127,6 +128,7 @@ class RobustRCAF(AbstractInformedController):
                 "memory_trust": evidence.trust(z.memory.evidence),
                 "memory_variance": jnp.diagonal(z.memory.covariance) / self.memory.learning_rate,
             }
+            signals |= self.memory.inertia_signals(z.memory)
         return u, signals | weight_signals(z.estimator.weights, self.estimator.bound)
 
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
@@ -135,13 +137,20 @@ class RobustRCAF(AbstractInformedController):
         going = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
-        known = self._known(plan.actuators, y, u_applied)
-        estimator, remembered = self.estimator.advance(z.estimator, plan.seen, known, learnt, dt), None
+        known, remembered, lost = self._known(plan.actuators, y, u_applied), None, None
         if self.memory is not None and z.memory is not None and plan.phi is not None:
-            rest, free = plan.seen.uncertainty - plan.remembered, jnp.where(share < _WHOLE, 0.0, 1.0)
+            off, rest = plan.off, plan.seen.uncertainty - plan.remembered
+            correction = plan.desired - off.acceleration - rest
+            observed = Observed(rest, plan.seen.error, correction, -off.rate, known - off.acceleration)
             gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
-            remembered, gained = self.memory.advance(z.memory, plan.phi, rest, plan.seen.error, gains, free, dt)
-            estimator = self.estimator.lowered(estimator, gained)
+            free = jnp.where(share < _WHOLE, 0.0, 1.0)
+            remembered, lost = self.memory.advance(z.memory, plan.phi, observed, gains, free, dt)
+            # What differs from the desired acceleration acts on the inertia that was learnt.
+            expected = known + plan.seen.uncertainty
+            known = known + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
+        estimator = self.estimator.advance(z.estimator, plan.seen, known, learnt, dt)
+        if lost is not None:
+            estimator = self.estimator.lowered(estimator, lost)
         return RobustState(
             estimator=estimator,
             actuators=actuators.advance(plan.actuators, u_applied, dt),
@@ -168,7 +177,9 @@ class RobustRCAF(AbstractInformedController):
         return self._known(self.model.actuators.update_from_report(z.actuators, y.actuator), y, u_applied)
 
     def signals(self):
-        return ADAPTIVE_LAW if self.memory is None else ADAPTIVE_LAW | MEMORY
+        if self.memory is None:
+            return ADAPTIVE_LAW
+        return ADAPTIVE_LAW | MEMORY if self.memory.inertia is None else ADAPTIVE_LAW | MEMORY | INERTIA
 
     def lyapunov(self) -> Float[Array, "*#n 2 2"]:
         """P of Eq. (21)."""
@@ -186,10 +197,12 @@ class RobustRCAF(AbstractInformedController):
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         velocity = coordinates.velocity(y)
         seen, remembered = self.estimator.estimate(z.estimator, velocity), jnp.zeros_like(velocity)
+        desired = off.acceleration + off.feedback(self.feedback) + u_r
         if self.memory is not None and z.memory is not None:
             at = TrackingError(off.error, off.rate, off.acceleration)
             phi = self.memory.regressors(y, velocity, at, bool(coordinates.axes))
-            remembered = self.memory.value(z.memory, phi)
+            desired = desired + self.memory.probing(z.memory, self.feedback)
+            remembered = self.memory.value(z.memory, phi, desired - off.acceleration - seen.uncertainty)
             seen = seen._replace(uncertainty=seen.uncertainty + remembered)
-        demand = off.acceleration + off.feedback(self.feedback) + u_r - seen.uncertainty - dynamics.drift(y)
-        return Plan(reported, seen, off, u_r, dynamics.invert(y, demand), phi, remembered)
+        forces = dynamics.invert(y, desired - seen.uncertainty - dynamics.drift(y))
+        return Plan(reported, seen, off, u_r, desired, forces, phi, remembered)

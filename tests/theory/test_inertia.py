@@ -1,0 +1,135 @@
+"""Inertia from the response to a probing oscillation: closed forms, its standard error, and a vehicle with a wrong model."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty
+from undertow.controllers import rcaf
+from undertow.controllers.robust.estimator import Estimator
+from undertow.controllers.robust.inertia import InertiaIdentification
+from undertow.controllers.robust.memory import Observed, memory
+from undertow.core.errors import BadInput
+from undertow.disturbances import none
+from undertow.estimation.fuzzy_system import gaussian_sets
+from undertow.loop import simd_batch
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.dataset import to_dataset
+from undertow.navigation import perfect
+from undertow.plants import hybrid_vehicle
+from undertow.references import lissajous
+from undertow.thrusters import t200
+from undertow.vehicles import bluerov2_heavy
+
+DT = 0.01
+
+
+def part(axes=2, **options):
+    return InertiaIdentification(amplitude=jnp.full(axes, 0.1), frequency=jnp.linspace(5.0, 6.0, axes), **options)
+
+
+def identified(one, inertia, drag, noise):
+    """State after a vehicle whose motion is that of the probing target, with `noise` in the applied acceleration."""
+
+    def step(state, extra):
+        _, rate, _ = one.motion(state)
+        late = state._replace(angle=state.angle + one.frequency * DT / 2)  # the mean over a step is that of its middle
+        _, middle, acceleration = one.motion(late)
+        nominal = inertia * acceleration + drag * middle + extra
+        return one.advance(state, rate, nominal, 1.0, DT), None
+
+    return jax.jit(lambda state, noise: jax.lax.scan(step, state, noise)[0])(one.init(len(inertia)), noise)
+
+
+@pytest.mark.parametrize("inertia", [(2.0, 0.6), (1.0, 1.4)])
+def test_the_ratio_of_inertias_is_found_whatever_the_drag_is(inertia):
+    one = part(plausible=1e3)
+    state = identified(one, jnp.asarray(inertia), jnp.asarray([0.8, -0.5]), jnp.zeros((9000, 2)))
+    left = 1 / (one.frequency * state.time)  # of the oscillation at twice the frequency that demodulation adds
+    assert (np.abs(one.ratio(state) / jnp.asarray(inertia) - 1) < left).all()
+    np.testing.assert_allclose(one.error(state), 10.0 / state.time, rtol=0.05)
+
+
+def test_the_standard_error_is_the_scatter_over_noises():
+    """White noise of 1 m/s^2 in each step: real parts of the transfer over 64 runs against the mean of `error`."""
+    one = part(2, plausible=1e3, window=2.0)
+    noise = jnp.asarray(np.random.default_rng(0).normal(size=(64, 9000, 2)))
+    found = jax.vmap(lambda each: identified(one, jnp.ones(2), jnp.zeros(2), each))(noise)
+    ratios, errors = (np.asarray(jax.vmap(rule)(found)) for rule in (one.ratio, one.error))
+    seen = np.sqrt((errors**2).mean(0) - (2.0 / np.asarray(found.time[0])) ** 2)
+    np.testing.assert_allclose(seen, ratios.std(0), rtol=0.3)
+    assert np.abs(ratios.mean(0) - 1).max() < 4 * ratios.std(0).max() / 8
+
+
+def test_noise_that_hides_the_response_leaves_the_nominal_inertia():
+    """Used is h shrunk towards 1 by its standard error."""
+    noise = 30 * jnp.asarray(np.random.default_rng(1).normal(size=(9000, 2)))
+    one = part()
+    state = identified(one, jnp.asarray([2.0, 2.0]), jnp.zeros(2), noise)
+    assert np.asarray(one.error(state)).min() > 0.5
+    assert np.abs(np.asarray(one.ratio(state)) - 1).max() < 0.4
+
+
+def test_probing_ends_and_begins_gently_again():
+    """Information t_p obeys dt_p/dt = 1 - t_p / duration - t_p / horizon."""
+    one = part(duration=20.0, horizon=200.0)
+    state = identified(one, jnp.ones(2), jnp.zeros(2), jnp.zeros((30000, 2)))
+    np.testing.assert_allclose(state.time, 1 / (1 / 20 + 1 / 200), rtol=1e-3)
+    size = np.sqrt(1 - np.asarray(state.time) / 20.0) * 0.1
+    _, rate, acceleration = one.motion(state)
+    np.testing.assert_allclose(np.hypot(acceleration, rate * one.frequency), size, rtol=1e-9)
+
+
+def test_an_axis_that_is_not_probed_keeps_its_inertia():
+    one = InertiaIdentification(amplitude=jnp.asarray([0.0, 0.1]), frequency=jnp.asarray([5.0, 6.0]))
+    state = identified(one, jnp.asarray([2.0, 2.0]), jnp.zeros(2), jnp.zeros((9000, 2)))
+    assert one.ratio(state)[0] == 1.0
+    assert one.ratio(state)[1] > 1.8
+
+
+def test_what_is_known_is_used_at_once_and_not_probed_again():
+    known = jnp.asarray([1.6, 0.7]), jnp.asarray([0.2, 0.3])
+    one = part(known=known)
+    state = one.init(2)
+    np.testing.assert_allclose(one.ratio(state), known[0], rtol=1e-6)
+    np.testing.assert_allclose(one.error(state), known[1], rtol=1e-6)
+    np.testing.assert_array_equal(one.motion(state), np.zeros((3, 2)))
+
+
+def test_the_command_does_not_jump_when_the_inertia_changes():
+    """What is desired less what is estimated, at the same feedback, before and after a step that learns."""
+    one = part(known=(jnp.asarray([1.5, 0.7]), jnp.asarray([0.2, 0.2])), horizon=1.0)
+    law = memory(2, regressor="linear", inertia=one)
+    state = law.init(2, False)
+    state = state._replace(weights=state.weights + 0.3, lagged=state.lagged + 0.5)
+    rest, beside = jnp.asarray([0.4, -0.3]), jnp.asarray([1.2, 0.8])
+    seen = Observed(rest, jnp.asarray([0.1, 0.2]), beside - rest, jnp.asarray([0.3, -0.2]), jnp.asarray([5.0, 7.0]))
+    gains, phi = Estimator(gaussian_sets(1), bandwidth=8.0).gains(jnp.asarray(DT)), 0.5 + state.lagged
+    after, lost = law.advance(state, phi, seen, gains, jnp.ones(()), jnp.asarray(DT))
+    assert np.abs(law.inertia_ratio(after) - law.inertia_ratio(state)).min() > 1e-4
+    before = law.value(state, phi, beside - rest) + rest
+    np.testing.assert_allclose(law.value(after, phi, beside - rest + lost) + rest - lost, before, rtol=1e-12)
+
+
+def test_bad_probing_is_refused():
+    model = hybrid_vehicle(bluerov2_heavy(), t200()).model(rate_term=True)
+    for value in (-0.1, float("nan"), [0.1, 0.1]):
+        with pytest.raises((BadInput, ValueError)):
+            rcaf(model, preset="learning", sampling_time=DT, probing=value)
+    law = rcaf(model, preset="learning", sampling_time=DT, probing=0.0)
+    assert law.memory.inertia is None
+    assert "inertia" not in law.signals()
+
+
+@pytest.mark.slow
+def test_a_vehicle_with_a_wrong_model_finds_its_inertia_and_keeps_its_bound():
+    """BlueROV2 Heavy, true moments of inertia 1.59, 1.30 and 2.11 times those of its model wu2018, 100 Hz."""
+    plant = hybrid_vehicle(bluerov2_heavy(), t200(supply=16.0), ledger=False)
+    law = rcaf(plant.model(vehicle=bluerov2_heavy("wu2018"), rate_term=True), preset="learning", sampling_time=DT)
+    loop = ClosedLoop(plant, law, lissajous([2.0, 1.0, 0.5, 0.8], [0.2, 0.4, 0.3, 0.25]), none(), perfect())
+    run = to_dataset(simd_batch.simulate(loop, duration=120.0, dt=DT, record_every=1), loop)
+    np.testing.assert_allclose(run["inertia"].values[-1], [1, 1, 1, 1.59, 1.30, 2.11], rtol=0.12)
+    late = run.isel(time=run["time"].values > 20.0)
+    error = np.abs(late["estimate"].values - late["uncertainty"].values)
+    assert (error <= estimation_bound(law.estimator, DT, fastest_uncertainty(late)) + 1e-9).all()
