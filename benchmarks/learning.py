@@ -7,7 +7,7 @@ navigation from readings. Rates of inputs are counted at every control step, err
 
     python benchmarks/learning.py [--seeds 6] [--first 2000] [--laps 2] [--motions lissajous,lawn_mower,six_axis]
         [--models wu2018,px4] [--rates 50,100] [--seas still,current,waves,navigation] [--laws both,rules,linear]
-        [--height 0.25] [--depth 3] [--current 0.15 0.1] [--long] [--next-dive]
+        [--height 0.25] [--depth 3] [--current 0.15 0.1] [--probing 0] [--long] [--next-dive]
 
 Seeds are `first`, `first` + 1, ...; still water needs one. `worst` is the largest ratio of a seed. `--long` runs the
 first motion for 2,000 s more and compares its last lap with the second. `--next-dive` saves what was learnt in three
@@ -266,6 +266,7 @@ if __name__ == "__main__":
     parser.add_argument("--height", type=float, default=0.25)
     parser.add_argument("--depth", type=float, default=3.0)
     parser.add_argument("--current", type=float, nargs=2, default=(0.15, 0.1))
+    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--next-dive", action="store_true")
     chosen = parser.parse_args()
@@ -273,6 +274,9 @@ if __name__ == "__main__":
         {"kind": "current", "velocity": [*chosen.current, 0.0]},
         {"kind": "waves", "height": chosen.height, "depth": chosen.depth},
     ]
+    if chosen.probing is not None:
+        for law in chosen.laws.split(","):
+            LAWS[law]["probing"] = chosen.probing
     if chosen.long:
         long_run(chosen)
     elif chosen.next_dive:
