@@ -6,6 +6,7 @@ quarter of a lap after it. `above` is the time after the change for which the er
 that of `robust`, counted up to the last such quarter.
 
     python benchmarks/learning_changes.py [--motions lissajous,six_axis] [--laws rules,linear] [--cases all]
+        [--probing 0]
 """
 
 import argparse
@@ -79,7 +80,11 @@ def main() -> None:
     parser.add_argument("--motions", default="lissajous,six_axis")
     parser.add_argument("--laws", default="both,linear")
     parser.add_argument("--cases", default="all")
+    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
     chosen = parser.parse_args()
+    if chosen.probing is not None:
+        for law in chosen.laws.split(","):
+            LAWS[law]["probing"] = chosen.probing
     cases = [*changes(0.0), "other model", "signs turned"] if chosen.cases == "all" else chosen.cases.split(",")
     for motion in chosen.motions.split(","):
         part = motions()[motion][1] / QUARTERS

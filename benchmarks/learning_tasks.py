@@ -5,6 +5,7 @@ have the gains of preset `robust`. Errors are rms over the whole run, medians ov
 memory learns counts. A ratio above 1.1 is marked.
 
     python benchmarks/learning_tasks.py [--seeds 6] [--first 3000] [--rates 50] [--tasks all] [--laws rules,linear]
+        [--probing 0]
 """
 
 import argparse
@@ -109,7 +110,11 @@ def main() -> None:
     parser.add_argument("--rates", default="50")
     parser.add_argument("--tasks", default="all")
     parser.add_argument("--laws", default="both,linear")
+    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
     chosen = parser.parse_args()
+    if chosen.probing is not None:
+        for law in chosen.laws.split(","):
+            LAWS[law]["probing"] = chosen.probing
     print(f"{'task':<22}{'Hz':>4}  {'law':<8}{'position':>12}{'attitude':>14}{'variation':>12}   ratios to robust")
     for rate in map(int, chosen.rates.split(",")):
         for task in TASKS if chosen.tasks == "all" else chosen.tasks.split(","):
