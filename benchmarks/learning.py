@@ -51,6 +51,14 @@ LAWS = {
     "rules": {"preset": "learning", "regressor": "rules"},
     "linear": {"preset": "learning", "regressor": "linear"},
 }
+PROBING = "acceleration of the probing oscillation, m/s^2 and rad/s^2; 0 for none"
+
+
+def set_probing(options) -> None:
+    """Give the chosen laws the option `probing`, where it is asked for."""
+    if options.probing is not None:
+        for law in options.laws.split(","):
+            LAWS[law]["probing"] = options.probing
 
 
 class ThereAndBack(AbstractReference):
@@ -266,7 +274,7 @@ if __name__ == "__main__":
     parser.add_argument("--height", type=float, default=0.25)
     parser.add_argument("--depth", type=float, default=3.0)
     parser.add_argument("--current", type=float, nargs=2, default=(0.15, 0.1))
-    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
+    parser.add_argument("--probing", type=float, help=PROBING)
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--next-dive", action="store_true")
     chosen = parser.parse_args()
@@ -274,9 +282,7 @@ if __name__ == "__main__":
         {"kind": "current", "velocity": [*chosen.current, 0.0]},
         {"kind": "waves", "height": chosen.height, "depth": chosen.depth},
     ]
-    if chosen.probing is not None:
-        for law in chosen.laws.split(","):
-            LAWS[law]["probing"] = chosen.probing
+    set_probing(chosen)
     if chosen.long:
         long_run(chosen)
     elif chosen.next_dive:

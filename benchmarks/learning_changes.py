@@ -16,7 +16,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from learning import LAWS, motions, run_seeds
+from learning import LAWS, PROBING, motions, run_seeds, set_probing
 from learning_tasks import built
 
 jax.config.update("jax_enable_x64", True)
@@ -45,9 +45,10 @@ def foreign(path: Path, motion: str, law: str, case: str, lap: float) -> None:
     loop = built(LAWS[law], 50, {"model": {"vehicle": {"parameters": "px4"}}} if case == "other model" else {}, motion)
     final = run_seeds(loop, 50, np.round(BEFORE * lap), [0], 0.0, np.inf).final
     sign = 1.0 if case == "other model" else -1.0
-    knowledge = {name: final[f"memory_{name}"][0] for name in ("weights", "variance")}
-    knowledge |= {"inertia": final["inertia"][0] ** sign, "inertia_error": final["inertia_error"][0]}
-    np.savez(path, **(knowledge | {"weights": sign * knowledge["weights"]}))
+    knowledge = {"weights": sign * final["memory_weights"][0], "variance": final["memory_variance"][0]}
+    if "inertia" in final:
+        knowledge |= {"inertia": final["inertia"][0] ** sign, "inertia_error": final["inertia_error"][0]}
+    np.savez(path, **knowledge)
 
 
 def ratios(motion: str, law: str, case: str) -> tuple[np.ndarray, np.ndarray]:
@@ -80,11 +81,9 @@ def main() -> None:
     parser.add_argument("--motions", default="lissajous,six_axis")
     parser.add_argument("--laws", default="both,linear")
     parser.add_argument("--cases", default="all")
-    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
+    parser.add_argument("--probing", type=float, help=PROBING)
     chosen = parser.parse_args()
-    if chosen.probing is not None:
-        for law in chosen.laws.split(","):
-            LAWS[law]["probing"] = chosen.probing
+    set_probing(chosen)
     cases = [*changes(0.0), "other model", "signs turned"] if chosen.cases == "all" else chosen.cases.split(",")
     for motion in chosen.motions.split(","):
         part = motions()[motion][1] / QUARTERS

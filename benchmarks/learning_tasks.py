@@ -15,7 +15,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
-from learning import LAWS, motions, run_seeds
+from learning import LAWS, PROBING, motions, run_seeds, set_probing
 
 from undertow.core.contracts import AbstractReference
 from undertow.loop.closed_loop import ClosedLoop
@@ -110,11 +110,9 @@ def main() -> None:
     parser.add_argument("--rates", default="50")
     parser.add_argument("--tasks", default="all")
     parser.add_argument("--laws", default="both,linear")
-    parser.add_argument("--probing", type=float, help="acceleration, m/s^2 and rad/s^2; 0 for none")
+    parser.add_argument("--probing", type=float, help=PROBING)
     chosen = parser.parse_args()
-    if chosen.probing is not None:
-        for law in chosen.laws.split(","):
-            LAWS[law]["probing"] = chosen.probing
+    set_probing(chosen)
     print(f"{'task':<22}{'Hz':>4}  {'law':<8}{'position':>12}{'attitude':>14}{'variation':>12}   ratios to robust")
     for rate in map(int, chosen.rates.split(",")):
         for task in TASKS if chosen.tasks == "all" else chosen.tasks.split(","):

@@ -109,6 +109,8 @@ def learning(
 
 def _identification(law: RobustRCAF, axes: int, probing, learnt: Knowledge | None) -> InertiaIdentification | None:
     """Between the bandwidths of tracking and observer, another frequency for each axis."""
+    if probing is not None:
+        checks.per_axis("probing", probing, axes)
     angles = np.asarray(law.model.coordinates.angles)
     amplitude = np.where(angles, _PROBING, 0.0) if probing is None else np.broadcast_to(probing, (axes,))
     if not checks.traced(amplitude) and not np.any(amplitude):
