@@ -85,6 +85,7 @@ def test_an_axis_that_is_not_probed_keeps_its_inertia():
     one = InertiaIdentification(amplitude=jnp.asarray([0.0, 0.1]), frequency=jnp.asarray([5.0, 6.0]))
     state = identified(one, jnp.asarray([2.0, 2.0]), jnp.zeros(2), jnp.zeros((9000, 2)))
     assert one.ratio(state)[0] == 1.0
+    assert one.error(state)[0] == 1000.0
     assert one.ratio(state)[1] > 1.8
 
 

@@ -19,6 +19,7 @@ Phasor = Float[Array, "2 n"]  # real and imaginary part
 
 # Largest inertia over that of the nominal model, and the reciprocal of the smallest.
 _HEAVIEST = 2.5
+_UNKNOWN = 1e3  # standard error where nothing is known
 _NOTHING = 1e-9  # square of a response that is too small to be judged, in m^2/s^2, rad^2/s^2
 
 
@@ -101,10 +102,11 @@ class InertiaIdentification(eqx.Module):
         return jnp.where(self.amplitude > 0, jnp.clip(used, 1 / _HEAVIEST, _HEAVIEST), 1.0)
 
     def error(self, state: InertiaState) -> PerAxis:
-        """Standard error s of h; large before a window has passed, when noise has not been seen."""
+        """Standard error s of h; large without probing, and before a window has passed, when noise is not known."""
         size = (state.response**2).sum(0) * self.frequency**2 + _NOTHING
-        unseen = self.window / jnp.maximum(state.time, 1e-3 * self.window)
-        return jnp.sqrt(self.window * state.noise / size + unseen**2)
+        unseen = self.window / jnp.maximum(state.time, self.window / _UNKNOWN)
+        found = jnp.sqrt(self.window * state.noise / size + unseen**2)
+        return jnp.where(self.amplitude > 0, found, _UNKNOWN)
 
     def motion(self, state: InertiaState) -> tuple[PerAxis, PerAxis, PerAxis]:
         """Displacement (m, rad), rate and acceleration of the target besides those of the reference."""
