@@ -32,7 +32,7 @@ ONE = jnp.ones(())
 def observed(rest, error):
     """A step of an observer, for a memory that does not identify inertias."""
     still = jnp.zeros_like(rest)
-    return Observed(rest, error, still, still, still)
+    return Observed(rest, error, *4 * [still])
 
 
 def learnt(part, state, regressors, rest_of, free=ONE, error_of=lambda state: jnp.zeros(2)):

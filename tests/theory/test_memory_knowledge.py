@@ -87,10 +87,9 @@ def damage(kind, path):
         {"weights": np.full((3, 1), np.nan)},
         {"variance": np.full(3, -0.1)},
         {"variance": np.full(3, 2.0)},
-        {"inertia": np.ones(1)},
-        {"inertia": np.ones(2), "inertia_error": np.ones(2)},
-        {"inertia": np.zeros(1), "inertia_error": np.ones(1)},
-        {"inertia": np.ones(1), "inertia_error": np.full(1, np.inf)},
+        {"inertia": np.ones(2)},
+        {"inertia": np.zeros(1)},
+        {"inertia": np.full(1, np.inf)},
     ],
     ids=str,
 )

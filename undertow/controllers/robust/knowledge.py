@@ -16,12 +16,7 @@ from undertow.core.errors import BadInput
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)
 _MUST = "be a file of `save_knowledge`"
 # Entries of a file and the signals they come from.
-_SIGNALS = {
-    "weights": "memory_weights",
-    "variance": "memory_variance",
-    "inertia": "inertia",
-    "inertia_error": "inertia_error",
-}
+_SIGNALS = {"weights": "memory_weights", "variance": "memory_variance", "inertia": "inertia"}
 _ALWAYS = ("weights", "variance")
 
 
@@ -30,7 +25,7 @@ class Knowledge(NamedTuple):
 
     weights: Array  # (k, n), m/s^2, rad/s^2
     variance: Array  # (k,), over that before learning, 0 to 1
-    inertia: tuple[Array, Array] | None = None  # (n,) over that of the nominal model, and its standard error
+    inertia: Array | None = None  # (n,), over that of the nominal model
 
 
 def save_knowledge(path, run) -> None:
@@ -38,8 +33,7 @@ def save_knowledge(path, run) -> None:
 
     Args:
         path: of the file.
-        run: dataset with the signals `memory_weights` and `memory_variance`, and `inertia` and `inertia_error` where
-            the inertia was identified.
+        run: dataset with the signals `memory_weights` and `memory_variance`, and `inertia` where it was identified.
     """
     np.savez(path, **{name: run[signal].values[-1] for name, signal in _SIGNALS.items() if signal in run})
 
@@ -55,10 +49,9 @@ def load_knowledge(path) -> Knowledge:
             found = {name: np.asarray(held[name], dtype=float) for name in _SIGNALS if name in held or name in _ALWAYS}
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
-    weights, variance = (found[name] for name in _ALWAYS)
-    inertia = [found[name] for name in _SIGNALS if name in found and name not in _ALWAYS]
-    good = weights.ndim == 2 and variance.shape == weights.shape[:1] and len(inertia) in (0, 2)
-    if not good or any(one.shape != weights.shape[1:] for one in inertia):
+    weights, variance, inertia = (found.get(name) for name in _SIGNALS)
+    good = weights.ndim == 2 and variance.shape == weights.shape[:1]
+    if not good or (inertia is not None and inertia.shape != weights.shape[1:]):
         got = ", ".join(f"{name} of shape {value.shape}" for name, value in found.items())
         raise BadInput("knowledge", _MUST, f"{path} with {got}")
     for value in found.values():
@@ -67,12 +60,9 @@ def load_knowledge(path) -> Knowledge:
         raise BadInput(
             "knowledge", "have a variance from 0 to 1", f"{path} with {variance.min():g} to {variance.max():g}"
         )
-    if not inertia:
-        return Knowledge(jnp.asarray(weights), jnp.asarray(variance))
-    ratio, error = inertia
-    if (ratio <= 0).any() or (error < 0).any():
-        raise BadInput("knowledge", "have inertias above 0 and standard errors from 0", str(path))
-    return Knowledge(jnp.asarray(weights), jnp.asarray(variance), (jnp.asarray(ratio), jnp.asarray(error)))
+    if inertia is not None and (inertia <= 0).any():
+        raise BadInput("knowledge", "have inertias above 0", str(path))
+    return Knowledge(**{name: jnp.asarray(value) for name, value in found.items()})
 
 
 def regressor_names(axes: Sequence[str], rules: int, regressor: str, body: bool) -> list[str]:

@@ -47,6 +47,7 @@ class Observed(NamedTuple):
 
     rest: PerAxis  # what the observer adds to the memory, m/s^2, rad/s^2
     error: PerAxis  # modelling error of the observer, m/s, rad/s
+    off: PerAxis  # error of the plant from the reference, m, rad
     correction: PerAxis  # desired acceleration besides that of the reference, less `rest`, m/s^2, rad/s^2
     rate: PerAxis  # velocity of the plant besides that of the reference, m/s, rad/s
     nominal: PerAxis  # F + G u of the applied input besides the acceleration of the reference, m/s^2, rad/s^2
@@ -213,7 +214,7 @@ class Memory(eqx.Module):
         alone, inertia = h * seen.error + used * explained, None
         if self.inertia is not None and state.inertia is not None:
             expected = seen.nominal + self.recalled(state, phi)
-            inertia = self.inertia.advance(state.inertia, seen.rate, expected, free, dt)
+            inertia = self.inertia.advance(state.inertia, seen.off, seen.rate, expected, free, dt)
         after = MemoryState(
             weights=jnp.clip(weights, -self.bound, self.bound),
             covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),

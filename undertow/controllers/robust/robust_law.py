@@ -141,7 +141,7 @@ class RobustRCAF(AbstractInformedController):
         if self.memory is not None and z.memory is not None and plan.phi is not None:
             off, rest = plan.off, plan.seen.uncertainty - plan.remembered
             correction = plan.desired - off.acceleration - rest
-            observed = Observed(rest, plan.seen.error, correction, -off.rate, known - off.acceleration)
+            observed = Observed(rest, plan.seen.error, off.error, correction, -off.rate, known - off.acceleration)
             gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
             free = jnp.where(share < _WHOLE, 0.0, 1.0)
             remembered, lost = self.memory.advance(z.memory, plan.phi, observed, gains, free, dt)
