@@ -10,6 +10,7 @@ from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
+from undertow.numerics.linear_algebra import safe_sqrt
 
 PerAxis = Float[Array, " n"]
 
@@ -70,7 +71,7 @@ class Cascade(AbstractAccelerationLaw):
         """Anti-windup of the integral by back-calculation, with the time constant of `pid`."""
         error = self._rate_error(off)
         squared = self.integral * self.outer / self.inner
-        rate = jnp.where(squared > 0, jnp.sqrt(jnp.where(squared > 0, squared, 1.0)), 0.0)  # a root has no slope at 0
+        rate = safe_sqrt(squared)
         back = jnp.minimum(rate, 1 / dt) * given.missing
         integral = own.integral + dt * (self.integral * error + back)
         smooth = jnp.where(own.elapsed > 0, own.smooth + self._new(own) * (error - own.smooth), error)

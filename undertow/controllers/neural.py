@@ -16,7 +16,7 @@ from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.numerics.linear_algebra import matvec
+from undertow.numerics.linear_algebra import matvec, safe_sqrt
 
 PerAxis = Float[Array, " n"]
 
@@ -85,7 +85,7 @@ class Neural(AbstractAccelerationLaw):
     def adapt(self, own: Weights, y: Measurement, off: TrackingError, given: Given, dt) -> Weights:
         seen = self._seen(own, y, off)
         r, inner = seen.filtered, seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
-        size = _norm((r**2).sum())
+        size = safe_sqrt((r**2).sum())
         regressor = jnp.concatenate([jnp.ones(1), seen.layer - inner * matvec(own.hidden.T, seen.inputs)])
         by_output = (self.adaptation * r)[None, :] * regressor[:, None] - (
             self.e_modification * size * self.adaptation * own.output
@@ -103,7 +103,7 @@ class Neural(AbstractAccelerationLaw):
     def _seen(self, own: Weights, y: Measurement, off: TrackingError) -> Seen:
         inputs = _inputs(self.model, y, off)
         layer = jax.nn.sigmoid(matvec(own.hidden.T, inputs))
-        size = _norm((own.output**2).sum() + (own.hidden**2).sum())
+        size = safe_sqrt((own.output**2).sum() + (own.hidden**2).sum())
         return Seen(off.rate + self.slope * off.error, inputs, layer, size)
 
 
@@ -204,8 +204,3 @@ def _inputs(model: Model, y: Measurement, off: TrackingError) -> Float[Array, " 
     turning = np.flatnonzero(np.array(model.coordinates.angles))
     sines = jnp.sin(y.position[turning])
     return jnp.concatenate([jnp.ones(1), off.error, off.rate, model.coordinates.velocity(y), off.acceleration, sines])
-
-
-def _norm(squared: Float[Array, ""]) -> Float[Array, ""]:
-    """Root of a sum of squares, with a slope of zero at zero."""
-    return jnp.where(squared > 0, jnp.sqrt(jnp.where(squared > 0, squared, 1.0)), 0.0)

@@ -22,6 +22,11 @@ def matvec(matrix: Float[Array, "m n"], vector: Float[Array, " n"]) -> Float[Arr
     return (matrix * vector[None, :]).sum(-1)
 
 
+def safe_sqrt(square: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Square root of what is positive, else 0, with slope 0 there, where that of `sqrt` is infinite."""
+    return jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+
+
 Gain = Float[Array, "n m"]
 Inverse = Float[Array, "m n"]
 Square = Float[Array, "n n"]

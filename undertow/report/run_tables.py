@@ -81,7 +81,9 @@ def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
     ]
     if "inertia" in certificate:
         both = zip(certificate["inertia"], certificate["inertia_error"], strict=True)
-        found = ", ".join(f"{ratio:.2f} +- {error:.2f}" if error < 1 else "unknown" for ratio, error in both)
+        found = ", ".join(
+            f"{ratio:.2f} +- {error:.2f}" if error < 1 else f"{ratio:.2f} (nothing found)" for ratio, error in both
+        )
         sentences.append(f"Inertia of each axis over that of the nominal model, by probing: {found}.")
     return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, tuple(sentences))
 

@@ -10,6 +10,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import AbstractMemorylessActuator
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, Sources, param, sources_field
+from undertow.numerics.linear_algebra import safe_sqrt
 from undertow.thrusters.thruster import AbstractMotorlessThruster, PerThruster
 
 _HALVINGS = 45  # of the interval in which the steady thrust of a voltage is looked for
@@ -172,8 +173,7 @@ class AxialFlowCurve(AbstractMemorylessActuator):
 def _positive_root(a: PerThruster, b: PerThruster, c: PerThruster) -> PerThruster:
     """x >= 0 with a x^2 + b x = c, for a > 0 and c >= 0; slope 0 at c = 0 where b is not positive."""
     square = b * b + 4 * a * c
-    root = jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
-    return (root - b) / (2 * a)
+    return (safe_sqrt(square) - b) / (2 * a)
 
 
 def axial_flow(supply: float = 5.0, current_per_torque: float = 0.0) -> AxialFlowThruster:

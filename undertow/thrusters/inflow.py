@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.numerics.linear_algebra import safe_sqrt
 from undertow.thrusters.thruster import PerThruster
 
 
@@ -22,7 +23,7 @@ def with_inflow(static_thrust: PerThruster, loss: Float[Array, ""], speed: PerTh
         loss: lambda.
         speed: advance speed u, m/s; negative while the propeller is driven backwards through the water.
     """
-    return static_thrust - loss * _root(jnp.abs(static_thrust)) * speed
+    return static_thrust - loss * safe_sqrt(jnp.abs(static_thrust)) * speed
 
 
 def static_thrust_for(thrust: PerThruster, loss: Float[Array, ""], speed: PerThruster) -> PerThruster:
@@ -35,10 +36,5 @@ def static_thrust_for(thrust: PerThruster, loss: Float[Array, ""], speed: PerThr
     c = loss * speed
     ahead = 4 * thrust > -c * jnp.abs(c)
     sign = jnp.where(ahead, 1.0, -1.0)
-    q = (c + sign * _root(jnp.maximum(c * c + 4 * sign * thrust, 0.0))) / 2
+    q = (c + sign * safe_sqrt(jnp.maximum(c * c + 4 * sign * thrust, 0.0))) / 2
     return q * jnp.abs(q)
-
-
-def _root(size: PerThruster) -> PerThruster:
-    """Square root with slope 0 at 0."""
-    return jnp.where(size > 0, jnp.sqrt(jnp.where(size > 0, size, 1.0)), 0.0)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from undertow.numerics.linear_algebra import safe_sqrt
+
 PerAxis = Float[Array, " n"]
 
 # Modelling errors further apart than this count as independent, s.
@@ -54,9 +56,7 @@ def best_share(found: Evidence) -> tuple[PerAxis, PerAxis]:
     known = found.explained > _NOTHING
     size = jnp.where(known, found.explained, 1.0)
     left = found.alone * found.explained - found.shared**2
-    # The root only of what is positive: at zero it has no slope.
-    root = jnp.where(left > 0, jnp.sqrt(jnp.where(left > 0, left, 1.0)), 0.0)
-    spread = 2 * root * jnp.sqrt(_CORRELATED / jnp.maximum(found.time, _CORRELATED)) / size
+    spread = 2 * safe_sqrt(left) * jnp.sqrt(_CORRELATED / jnp.maximum(found.time, _CORRELATED)) / size
     return jnp.where(known, found.shared / size, 1.0), jnp.where(known, spread, 1.0)
 
 

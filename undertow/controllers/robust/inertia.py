@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.param import Param, param
+from undertow.numerics.linear_algebra import safe_sqrt
 
 PerAxis = Float[Array, " n"]
 Phasor = Float[Array, "2 n"]  # real and imaginary part
@@ -54,8 +55,8 @@ class InertiaIdentification(eqx.Module):
     A drag that the model does not have is in the imaginary part. V and N are sums over windows of `window`, each with
     the weight m / (m + l^2): l is what is left of its N, and m nine times the mean l^2 plus what the oscillation itself
     would give. A load that changes at once, which looks like an inertia, then counts little. The standard error s of h
-    comes from the mean l^2, of which the half is in the real part. Used is h_0 + (h - h_0) p^2 / (p^2 + s^2), with what is expected before anything is found, h_0,
-    and its standard deviation p. Axes without an amplitude have h = h_0.
+    comes from the mean l^2, half of which is in the real part. Used is h_0 + (h - h_0) p^2 / (p^2 + s^2), with what is
+    expected before anything is found, h_0, and its standard deviation p. Axes without an amplitude have h = h_0.
 
     Raises:
         BadInput: a number that is negative, or not positive where it must be.
@@ -155,11 +156,11 @@ class InertiaIdentification(eqx.Module):
 
     def _size(self, state: InertiaState) -> PerAxis:
         """a, m/s^2 and rad/s^2."""
-        largest = jnp.minimum(self.amplitude, self.error_share * self.frequency**2 * _root(state.square))
+        largest = jnp.minimum(self.amplitude, self.error_share * self.frequency**2 * safe_sqrt(state.square))
         return self._share(state) * largest
 
     def _share(self, state: InertiaState) -> PerAxis:
-        return _root(1 - state.time / self.duration)
+        return safe_sqrt(1 - state.time / self.duration)
 
     def _transfer(self, state: InertiaState) -> tuple[PerAxis, PerAxis]:
         """N / (j w_p V), real and imaginary part; 1 where there is no response."""
@@ -167,11 +168,6 @@ class InertiaIdentification(eqx.Module):
         size = (motion**2).sum(0) + _NOTHING
         real = (state.applied * motion).sum(0) + _NOTHING
         return real / size, (state.applied * _turned(motion)).sum(0) / size
-
-
-def _root(value: PerAxis) -> PerAxis:
-    """Of what is positive, else 0: at zero it has no slope."""
-    return jnp.where(value > 0, jnp.sqrt(jnp.where(value > 0, value, 1.0)), 0.0)
 
 
 def _demodulated(value: PerAxis, angle: PerAxis) -> Phasor:

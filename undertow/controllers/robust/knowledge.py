@@ -49,7 +49,7 @@ def load_knowledge(path) -> Knowledge:
             found = {name: np.asarray(held[name], dtype=float) for name in _SIGNALS if name in held or name in _ALWAYS}
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
-    weights, variance, inertia = (found.get(name) for name in _SIGNALS)
+    weights, variance, inertia = found["weights"], found["variance"], found.get("inertia")
     good = weights.ndim == 2 and variance.shape == weights.shape[:1]
     if not good or (inertia is not None and inertia.shape != weights.shape[1:]):
         got = ", ".join(f"{name} of shape {value.shape}" for name, value in found.items())

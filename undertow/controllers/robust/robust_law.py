@@ -39,6 +39,14 @@ class RobustState(NamedTuple):
     memory: MemoryState | None = None
 
 
+class Recalled(NamedTuple):
+    """What a memory gives at one instant."""
+
+    phi: Float[Array, " k"]  # regressor
+    correction: PerAxis  # desired acceleration besides that of the reference, less what the observer adds
+    value: PerAxis  # what is known besides the observer, m/s^2, rad/s^2
+
+
 class Plan(NamedTuple):
     """Decisions of one instant."""
 
@@ -48,8 +56,7 @@ class Plan(NamedTuple):
     robust: PerAxis  # u_r
     desired: PerAxis  # acceleration, m/s^2, rad/s^2
     forces: Float[Array, " m"]  # for the desired acceleration, without limits
-    phi: Float[Array, " k"] | None  # regressor of the memory
-    remembered: PerAxis  # what is known besides the observer, m/s^2, rad/s^2; zero without a memory
+    recalled: Recalled | None
 
 
 class RobustRCAF(AbstractInformedController):
@@ -120,9 +127,9 @@ class RobustRCAF(AbstractInformedController):
             "attained_share": attained(effect, plan.forces, forces),
         }
         signals |= lyapunov_signals(plan.off, self.lyapunov(), self.weight)
-        if self.memory is not None and z.memory is not None:
+        if self.memory is not None and z.memory is not None and plan.recalled is not None:
             signals |= {
-                "memory": plan.remembered,
+                "memory": plan.recalled.value,
                 "memory_weights": z.memory.weights,
                 "memory_taken": z.memory.taken,
                 "memory_trust": evidence.trust(z.memory.evidence),
@@ -138,13 +145,13 @@ class RobustRCAF(AbstractInformedController):
         share = attained(effect, plan.forces, going)
         learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         known, remembered, lost = self._known(plan.actuators, y, u_applied), None, None
-        if self.memory is not None and z.memory is not None and plan.phi is not None:
-            off, rest = plan.off, plan.seen.uncertainty - plan.remembered
-            correction = plan.desired - off.acceleration - rest
-            observed = Observed(rest, plan.seen.error, off.error, correction, -off.rate, known - off.acceleration)
+        if self.memory is not None and z.memory is not None and plan.recalled is not None:
+            off, rest = plan.off, plan.seen.uncertainty - plan.recalled.value
+            correction, beside = plan.recalled.correction, known - off.acceleration
+            observed = Observed(rest, plan.seen.error, off.error, correction, -off.rate, beside)
             gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
             free = jnp.where(share < _WHOLE, 0.0, 1.0)
-            remembered, lost = self.memory.advance(z.memory, plan.phi, observed, gains, free, dt)
+            remembered, lost = self.memory.advance(z.memory, plan.recalled.phi, observed, gains, free, dt)
             # What differs from the desired acceleration acts on the inertia that was learnt.
             expected = known + plan.seen.uncertainty
             known = known + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
@@ -193,16 +200,17 @@ class RobustRCAF(AbstractInformedController):
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        off, phi = tracking(coordinates, self.lyapunov(), y, target), None
+        off, recalled = tracking(coordinates, self.lyapunov(), y, target), None
         u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
         velocity = coordinates.velocity(y)
-        seen, remembered = self.estimator.estimate(z.estimator, velocity), jnp.zeros_like(velocity)
+        seen = self.estimator.estimate(z.estimator, velocity)
         desired = off.acceleration + off.feedback(self.feedback) + u_r
         if self.memory is not None and z.memory is not None:
             at = TrackingError(off.error, off.rate, off.acceleration)
             phi = self.memory.regressors(y, velocity, at, bool(coordinates.axes))
             desired = desired + self.memory.probing(z.memory, self.feedback)
-            remembered = self.memory.value(z.memory, phi, desired - off.acceleration - seen.uncertainty)
-            seen = seen._replace(uncertainty=seen.uncertainty + remembered)
+            correction = desired - off.acceleration - seen.uncertainty
+            recalled = Recalled(phi, correction, self.memory.value(z.memory, phi, correction))
+            seen = seen._replace(uncertainty=seen.uncertainty + recalled.value)
         forces = dynamics.invert(y, desired - seen.uncertainty - dynamics.drift(y))
-        return Plan(reported, seen, off, u_r, desired, forces, phi, remembered)
+        return Plan(reported, seen, off, u_r, desired, forces, recalled)
