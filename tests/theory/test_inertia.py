@@ -131,12 +131,19 @@ def test_a_sudden_load_is_no_inertia():
     assert (np.abs(one.ratio(state) - 1) < unweighted / 10).all()
 
 
+def test_a_vehicle_with_less_inertia_than_its_model_is_not_corrected_less():
+    one = part()
+    state = identified(one, jnp.asarray([0.5, 2.0]), jnp.zeros(2), jnp.zeros((9000, 2)))
+    np.testing.assert_array_equal(one.used(state), [1.0, one.ratio(state)[1]])
+    assert one.ratio(state)[0] < 0.6
+
+
 def test_the_command_does_not_jump_when_the_inertia_changes():
     """What is desired less what is estimated, at the same feedback, before and after a step that learns."""
-    one = part(expected=jnp.asarray([1.5, 0.7]))
+    one = part(expected=jnp.asarray([1.5, 1.2]))
     law = memory(2, regressor="linear", inertia=one)
     state = law.init(2, False)
-    window = identified(one, jnp.asarray([1.2, 0.9]), jnp.zeros(2), jnp.zeros((2999, 2)))
+    window = identified(one, jnp.asarray([1.2, 1.8]), jnp.zeros(2), jnp.zeros((2999, 2)))
     state = state._replace(weights=state.weights + 0.3, lagged=state.lagged + 0.5)
     state = state._replace(inertia=window._replace(since=jnp.asarray(one.window)))
     rest, beside = jnp.asarray([0.4, -0.3]), jnp.asarray([1.2, 0.8])

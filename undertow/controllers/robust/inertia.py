@@ -55,8 +55,11 @@ class InertiaIdentification(eqx.Module):
     A drag that the model does not have is in the imaginary part. V and N are sums over windows of `window`, each with
     the weight m / (m + l^2): l is what is left of its N, and m nine times the mean l^2 plus what the oscillation itself
     would give. A load that changes at once, which looks like an inertia, then counts little. The standard error s of h
-    comes from the mean l^2, half of which is in the real part. Used is h_0 + (h - h_0) p^2 / (p^2 + s^2), with what is
-    expected before anything is found, h_0, and its standard deviation p. Axes without an amplitude have h = h_0.
+    comes from the mean l^2, half of which is in the real part. The result is h_0 + (h - h_0) p^2 / (p^2 + s^2), with
+    what is expected before anything is found, h_0, and its standard deviation p. Axes without an amplitude have h_0.
+
+    Corrections are scaled by max(h, 1). A vehicle with less inertia than its model has a faster loop than was designed,
+    which reduces errors and margins as it does without identification; slowing it down would make errors larger.
 
     Raises:
         BadInput: a number that is negative, or not positive where it must be.
@@ -94,12 +97,16 @@ class InertiaIdentification(eqx.Module):
         return InertiaState(axis, axis, axis, phasor, phasor, now, phasor, phasor, axis, axis, axis)
 
     def ratio(self, state: InertiaState) -> PerAxis:
-        """h as used."""
+        """h, shrunk towards what is expected by its standard error."""
         real, _ = self._transfer(state)
         prior = self.plausible**2
         expected = 1.0 if self.expected is None else self.expected
-        used = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
-        return jnp.clip(jnp.where(self.amplitude > 0, used, expected), 1 / _HEAVIEST, _HEAVIEST)
+        found = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
+        return jnp.clip(jnp.where(self.amplitude > 0, found, expected), 1 / _HEAVIEST, _HEAVIEST)
+
+    def used(self, state: InertiaState) -> PerAxis:
+        """h by which corrections are scaled, from 1."""
+        return jnp.maximum(self.ratio(state), 1.0)
 
     def error(self, state: InertiaState) -> PerAxis:
         """Standard error s of h; large without probing, and before two windows, when noise is not known."""

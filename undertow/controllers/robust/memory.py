@@ -160,10 +160,10 @@ class Memory(eqx.Module):
         return jnp.concatenate(parts)
 
     def inertia_ratio(self, state: MemoryState) -> PerAxis:
-        """h: inertia over that of the nominal model."""
+        """h by which corrections are scaled: inertia over that of the nominal model, from 1."""
         if self.inertia is None or state.inertia is None:
             return jnp.ones_like(state.taken)
-        return self.inertia.ratio(state.inertia)
+        return self.inertia.used(state.inertia)
 
     def inertia_signals(self, state: MemoryState) -> dict[str, PerAxis]:
         """Signals of the identified inertia, if it is identified."""
