@@ -268,6 +268,26 @@ def test_what_is_said_of_moving_weights(sets, said):
     assert ("only a run shows" in why_not) == (sets > 1)
 
 
+def test_a_law_that_learns_is_predicted_without_what_it_learns():
+    """A memory adds nothing to the fast part of the loop, and thousands of states and an oscillation to the rest."""
+
+    def at(preset):
+        scenario = {
+            "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16.0}},
+            "model": {"rate_term": True},
+            "controller": {"kind": "rcaf", "preset": preset},
+            "reference": {"kind": "setpoint", "position": [0.0] * 6},
+            "disturbance": [{"kind": "current", "velocity": [0.2, 0.1, 0.0]}],
+            "loop": {"dt": 0.01, "duration": 30.0},
+        }
+        return operating_point(build(from_data(scenario)))
+
+    robust, learning = at("robust"), at("learning")
+    assert learning.radius == robust.radius
+    assert predicted(learning) == predicted(robust)
+    assert predicted(robust)[0] is not None
+
+
 @pytest.mark.parametrize("bound", [pytest.param(None, marks=pytest.mark.slow), 20.0])
 def test_no_figure_is_predicted_that_the_law_forbids(bound):
     """W1: the linear model's robust term passes 10 m/s^2, which tanh cannot."""

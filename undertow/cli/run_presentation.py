@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from undertow.analysis.linearization.response import compare_metrics
+from undertow.analysis.theory import theory_of
 from undertow.cli.exit_codes import warn_of
 from undertow.cli.results_folder import Draft
 from undertow.cli.stages import stage
@@ -101,7 +102,7 @@ def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
     named = ", ".join(f"{one.name} by {100 * one.departure:.0f} %" for one in departing)
-    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed.steady)}"
+    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed, executed.steady)}"
 
 
 def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
@@ -118,7 +119,9 @@ def predict(built: Built) -> PredictedMetrics:
         return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
 
 
-def _because(steady: dict[str, Any]) -> str:
+def _because(executed: Executed, steady: dict[str, Any]) -> str:
+    if theory_of(executed.built.of_the_law().closed_loop.controller).at_rest is not None:
+        return ". What the law learns is not in the linear model"
     limited = steady.get("saturated_fraction", 0.0)
     if limited > 0:
         return f". Actuators were saturated {limited:.1%} of the time, which the linear model does not capture"

@@ -1,5 +1,6 @@
 """Operating point of a scenario under its mean load, and the metrics predicted from there."""
 
+import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
@@ -124,6 +125,7 @@ def input_limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]
 def _start(known: OperatingPoint) -> list[np.ndarray]:
     """States of plant and controller at t = 0 as vectors."""
     loop, initial = known.built.closed_loop, known.built.scenario.initial
+    loop = dataclasses.replace(loop, controller=known.mean.parts.loop.controller)
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
     return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(known.built.scenario.seed), *outputs)]
 

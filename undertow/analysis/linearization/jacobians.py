@@ -5,6 +5,7 @@ limits, measured without error. The controller receives the input `u` that it be
 gets the same.
 """
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -14,6 +15,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
+from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Target, known_acceleration
 from undertow.core.measurement import with_outputs
@@ -79,10 +81,15 @@ class Parts(NamedTuple):
 def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.ndarray]]:
     """A closed loop about a constant reference, and its states at rest there as vectors (`plant` and `law`).
 
+    A law that learns along a moving reference is taken without that: it adds nothing to the fast part of the loop, and
+    has no equilibrium while it probes.
+
     Args:
         loop: the five roles.
         position: reference, m and rad.
     """
+    law = theory_of(loop.controller).at_rest
+    loop = loop if law is None else dataclasses.replace(loop, controller=law)
     loop = without(loop, ("dead_zone",))  # inside a dead zone nothing has a slope
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)

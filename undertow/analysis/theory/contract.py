@@ -30,6 +30,7 @@ class Theory(NamedTuple):
         drift_bound: of one axis at a sampling time (s): the largest gain that drifting weights can add, and the gain at
             which the sampled estimator becomes unstable, 1/s.
         limits: meaning and largest size of signals that the controller bounds, per axis.
+        at_rest: what is linearised instead of it, without what learns along a moving reference; None: itself.
         adapts: whether it has weights that a linearisation holds constant.
         thinnest_layer: at a sampling time (s): the thinnest boundary layer without chattering, and the present one.
         certificate: of a run, given the record up to its end, steady window (s), and sampling time (s).
@@ -40,6 +41,7 @@ class Theory(NamedTuple):
     ramp_error: Callable[[int], float | None] = lambda axis: None
     drift_bound: Callable[[int, float], tuple[float, float] | None] = lambda axis, dt: None
     limits: Mapping[str, tuple[str, Any]] = {}
+    at_rest: AbstractController | None = None
     adapts: bool = False
     thinnest_layer: Callable[[float], tuple[float, float]] | None = None
     certificate: Callable[[xr.Dataset, xr.Dataset, "SteadyWindow", float], RunCertificate] | None = None

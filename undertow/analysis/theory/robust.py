@@ -1,5 +1,6 @@
 """Theory of the robust variant: poles of its estimator and tracking, drift, and the certificate of section X4."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ def theory(law: RobustRCAF) -> Theory:
         ramp_error=lambda axis: 2 * estimator(axis)[1] / estimator(axis)[0],
         drift_bound=lambda axis, dt: (drift.gain_bound(law, axis), drift.largest_gain(law, dt, axis)),
         limits={"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)},
+        at_rest=None if law.memory is None else dataclasses.replace(law, memory=None),
         certificate=lambda run, lived, window, dt: _certificate(law, run, lived, window, dt),
     )
 
