@@ -1,10 +1,16 @@
-"""Strict arithmetic for every test: double precision outside of runs, no silent promotion of types or ranks."""
+"""Which tests run, how their programs are compiled, and strict arithmetic for all of them.
+
+A test without a mark belongs to the quick set, which `pytest` runs. Every other one says in a mark of its own or of its
+file (`pytestmark`) what it belongs to; pyproject.toml lists the marks.
+"""
+
+import os
+import re
 
 from undertow.process_setup import prepare  # isort: skip  (before JAX is imported
 
+GIVEN_XLA_FLAGS = os.environ.get("XLA_FLAGS", "")
 prepare()
-
-import os
 
 import jax
 import jaxtyping
@@ -13,6 +19,11 @@ from jaxtyping import install_import_hook
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
+
+# Parts of the full set; those of the second line need other programs, or minutes.
+IN_THE_FULL_SET = {"full", "docs", "compiler", "interop", "soak"}
+BY_THEMSELVES = {"slow", "slurm", "ssh", "dds"}
+MARK_OF_A_FILE = re.compile(r"^pytestmark = pytest\.mark\.(\w+)$", re.MULTILINE)
 
 # Annotations of arrays are checked at every call of the rooms that compute. `process` comes before JAX; the models of
 # `scenario` and the commands of `cli` are checked by pydantic and typer.
@@ -36,25 +47,49 @@ CHECKED = (
 # Folders of tests where they are: together they trace every part and both loops. Elsewhere the same code runs again, and
 # checking it once more would cost time and find nothing. Arrays of different rank are an error everywhere.
 STRICT = ("numerics", "physics", "conformance")
-install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
 jaxtyping.config.update("jaxtyping_disable", True)
+
+
+def pytest_configure(config):
+    """Annotations are checked in the full set: to prepare for it takes as long as a hundred quick tests."""
+    if "full" in config.getoption("-m"):
+        install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
+    if config.getoption("-m") != "slow":
+        compile_quickly()
+
+
+def compile_quickly():
+    """Tests compile far longer than they run: LLVM need not try hard, unless XLA_FLAGS says so. It takes a fifth of the time."""
+    if "xla_backend_optimization_level" in GIVEN_XLA_FLAGS:
+        return
+    flags = os.environ["XLA_FLAGS"] + " --xla_backend_optimization_level=0"  # of two, the last counts
+    if jax.__version_info__ < (0, 11):  # later ones know no other emitters, and stop at a flag that they do not know
+        flags += " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
+    os.environ["XLA_FLAGS"] = flags
+    os.environ.setdefault("SIMDJIT_OPTIMIZATION", "0")
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Files without a quick test are not even imported for the quick set: all of them take as long as its tests."""
+    if config.getoption("-m") == "quick" and collection_path.suffix == ".py":
+        mark = MARK_OF_A_FILE.search(collection_path.read_text(encoding="utf-8"))
+        return True if mark and mark[1] in IN_THE_FULL_SET | BY_THEMSELVES else None
+    return None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Every test is `quick`, or `full`, or by itself."""
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()}
+        if not marks & BY_THEMSELVES:
+            item.add_marker("full" if marks & IN_THE_FULL_SET else "quick")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     """Before the fixtures of the test are made."""
     jaxtyping.config.update("jaxtyping_disable", item.path.parent.name not in STRICT)
-
-
-def pytest_configure(config):
-    """Quick tests compile far longer than they run: XLA need not try hard, unless XLA_FLAGS says so. It halves the time."""
-    flags, slow = os.environ.get("XLA_FLAGS", ""), config.getoption("-m") == "slow"
-    if "xla_backend_optimization_level" in flags or slow:
-        return
-    flags += " --xla_backend_optimization_level=0"
-    if jax.__version_info__ < (0, 11):  # later ones know no other emitters, and stop at a flag that they do not know
-        flags += " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
-    os.environ["XLA_FLAGS"] = flags.strip()
 
 
 @pytest.fixture

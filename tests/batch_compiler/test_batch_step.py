@@ -6,6 +6,8 @@ import pytest
 
 import simdjit
 
+pytestmark = pytest.mark.compiler
+
 
 def function(numbers, state, inputs):
     """A damped oscillator with a counter: a tree in, a tree out."""

@@ -15,6 +15,8 @@ import simdjit
 from simdjit import c99
 from simdjit.c99 import literal
 
+pytestmark = pytest.mark.compiler
+
 ROWS = 8
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 

@@ -9,6 +9,8 @@ import pytest
 
 from simdjit import cache, cpu
 
+pytestmark = pytest.mark.compiler
+
 CODE = b"compiled " * 1000
 
 

@@ -12,6 +12,8 @@ from simdjit.graph import Graph, flat
 from simdjit.lowering import evaluate, nodes_of
 from simdjit.prologue import inputs
 
+pytestmark = pytest.mark.compiler
+
 ROWS = 16
 
 

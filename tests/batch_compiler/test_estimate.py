@@ -7,6 +7,8 @@ import pytest
 
 from simdjit import Loop, Unsupported, estimate, loop
 
+pytestmark = pytest.mark.compiler
+
 
 def by_xla(function, *arguments):
     return estimate.compiled_by_xla(jax.make_jaxpr(function)(*arguments))

@@ -12,6 +12,8 @@ import simdjit.loop
 from simdjit import Loop
 from simdjit.fingerprint import fingerprint
 
+pytestmark = pytest.mark.compiler
+
 X, K = np.linspace(0.1, 0.9, 3), np.arange(3)
 
 

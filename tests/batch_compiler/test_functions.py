@@ -11,6 +11,8 @@ from simdjit.graph import Graph
 from simdjit.lowering import evaluate, nodes_of
 from simdjit.tracing import Traced
 
+pytestmark = pytest.mark.compiler
+
 # Function, what it must equal, where, and how far it may be off in units of the last place.
 FUNCTIONS = {
     "exp": (jnp.exp, np.exp, (-700, 700), 2),

@@ -7,6 +7,8 @@ import pytest
 
 from simdjit.fused_c99 import FUSED
 
+pytestmark = pytest.mark.compiler
+
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 
 PROGRAM = """

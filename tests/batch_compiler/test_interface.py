@@ -13,6 +13,8 @@ import pytest
 
 import simdjit
 
+pytestmark = pytest.mark.compiler
+
 PACKAGE = Path(simdjit.__file__).parent
 
 

@@ -9,6 +9,8 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 import simdjit
 from simdjit import Driver, Loop, matrix_loop, nvidia
 
+pytestmark = pytest.mark.compiler
+
 RUNS = 11
 
 

@@ -8,6 +8,8 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, Loop, Unsupported, nvidia
 
+pytestmark = pytest.mark.compiler
+
 
 @pytest.fixture
 def gpu(monkeypatch):

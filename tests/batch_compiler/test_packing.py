@@ -11,6 +11,8 @@ from simdjit.graph import F64, Graph
 from simdjit.packing import found, width_of
 from simdjit.scalar import Scalar
 
+pytestmark = pytest.mark.compiler
+
 WIDTH = 8
 
 

@@ -10,6 +10,8 @@ from simdjit.graph import Graph
 from simdjit.lowering import nodes_of
 from simdjit.rules import Equation, results
 
+pytestmark = pytest.mark.compiler
+
 ROWS = np.random.default_rng(6).normal(size=(11, 5))
 MATRICES = np.random.default_rng(7).normal(size=(11, 3, 4))
 WHERE = np.arange(11) - 3  # beyond both ends

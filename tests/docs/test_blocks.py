@@ -27,6 +27,8 @@ from undertow.report.figures import writing
 from undertow.scenario.reading import read
 from undertow.scenario.schema import validate
 
+pytestmark = pytest.mark.docs
+
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 BLOCK = re.compile(

@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+pytestmark = pytest.mark.docs
+
 ROOT = Path(__file__).parents[2]
 DOI = "10.1007/s11071-017-3590-2"
 TITLE = (

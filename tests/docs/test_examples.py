@@ -13,6 +13,8 @@ from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
+pytestmark = pytest.mark.docs
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 # Exit code 0, and what else is known: metric -> (value, relative tolerance), over the steady window.

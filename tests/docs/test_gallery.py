@@ -11,6 +11,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
+pytestmark = pytest.mark.docs
+
 GALLERY = Path(__file__).parents[2] / "examples" / "gallery"
 EXAMPLES = sorted(GALLERY.glob("plot_*.py"))
 

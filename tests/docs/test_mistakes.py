@@ -5,6 +5,8 @@ from test_blocks import FILE, ROOT, blocks
 
 from undertow.cli.main import run
 
+pytestmark = pytest.mark.docs
+
 # Page, its file, what is replaced by what, and the line that follows.
 MISTAKES = [
     (

@@ -14,6 +14,8 @@ from undertow.plants import double_integrator
 from undertow.scenario.reading import dump, from_data
 from undertow.tuning.problem import problem
 
+pytestmark = pytest.mark.docs
+
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
     "controller": {"kind": "./my_controller.py:my_controller", "layer": 0.2},

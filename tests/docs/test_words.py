@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.docs
+
 ROOT = Path(__file__).parents[2]
 SEARCHED = ("undertow", "docs", "examples", "benchmarks", "README.md", "CONTRIBUTING.md")
 SUFFIXES = {".py", ".md", ".yaml", ".css", ".html", ".cff"}

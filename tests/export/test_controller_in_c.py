@@ -11,6 +11,8 @@ from undertow.export.controller import export_controller
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.compiler
+
 COMPILER = next(name for name in ("gcc", "clang") if shutil.which(name))
 SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},

@@ -18,6 +18,8 @@ from undertow.export.fmu import compiled, export_fmu
 from undertow.scenario.build import build
 from undertow.scenario.execute import dump
 
+pytestmark = pytest.mark.compiler
+
 
 def units(scenario, folder, **options):
     """Paths of the two units of a scenario."""

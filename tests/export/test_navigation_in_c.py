@@ -12,6 +12,8 @@ from undertow.export.navigation import export_navigation
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.compiler
+
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 SENSORS = ["imu", "dvl", "depth", "compass", {"kind": "position_fix", "delay": 0.2}]
 SCENARIO = {

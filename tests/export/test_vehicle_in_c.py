@@ -16,6 +16,8 @@ from undertow.export.vehicle import export_vehicle
 from undertow.scenario.build import build
 from undertow.scenario.execute import dump
 
+pytestmark = pytest.mark.compiler
+
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 SANITIZED = "-O1 -fsanitize=undefined,address -fno-sanitize-recover=all"
 RANDOM_CURRENT = {"kind": "gauss_markov_current", "span": 20, "step": 0.1}

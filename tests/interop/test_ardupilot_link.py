@@ -18,6 +18,8 @@ from undertow.interop.ardupilot.session import Session
 from undertow.interop.latency import Latency
 from undertow.interop.thruster_channels import channels_of_vehicle
 
+pytestmark = pytest.mark.interop
+
 
 @pytest.fixture
 def session(vehicle):

@@ -10,6 +10,8 @@ from undertow.interop.ardupilot.packets import ServoPacket, reply
 from undertow.interop.stepped_vehicle import State
 from undertow.interop.thruster_channels import channels_from_text
 
+pytestmark = pytest.mark.interop
+
 # Written out by hand from the documented structure: 18458 = 0x481a, 400 Hz = 0x0190, frame 258 = 0x00000102, and pulses
 # of 1500 = 0x05dc, 1900 = 0x076c, 1100 = 0x044c, 65535 and 12 times 0; little-endian.
 SIXTEEN = bytes.fromhex("1a48900102010000dc056c074c04ffff" + 12 * "0000")

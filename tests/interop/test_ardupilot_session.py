@@ -11,6 +11,8 @@ import undertow as ut
 from undertow.interop.ardupilot.session import SILENCE, Session
 from undertow.interop.thruster_channels import channels_from_text
 
+pytestmark = pytest.mark.interop
+
 SITL, OTHER = ("127.0.0.1", 40001), ("127.0.0.1", 40002)
 REVERSED = "-1,-2,-3,-4,-5,-6,-7,-8"
 

@@ -7,6 +7,8 @@ import pytest
 
 from undertow.controllers.lqi import lqi_gains
 
+pytestmark = pytest.mark.interop
+
 SHORT = 1e-5  # s: the sampled design is the continuous one
 
 

@@ -12,6 +12,8 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.interop import gymnasium as ug
 
+pytestmark = pytest.mark.interop
+
 SHORT = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "rcaf", "preset": "robust"},

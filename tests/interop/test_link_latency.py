@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.interop
+
 
 @pytest.mark.slow
 def test_it_measures():

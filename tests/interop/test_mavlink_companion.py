@@ -11,6 +11,8 @@ from undertow.interop.mavlink import Companion
 from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, HEARTBEAT_TIMEOUT, NEUTRAL_PERIOD
 from undertow.interop.mavlink.link import parsed
 
+pytestmark = pytest.mark.interop
+
 TIMEOUT = 0.5
 STILL = [1500] * 8
 

@@ -18,6 +18,8 @@ from undertow.cli.main import run
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink import Companion, UdpLink, accompany
 
+pytestmark = pytest.mark.interop
+
 FRAMES = round(DRIVEN["loop"]["duration"] / DRIVEN["loop"]["dt"])
 # m and m/s. Odometry holds single precision, and commands whole microseconds: as long as no command lies on the edge
 # between two, nothing differs at all. One that does is 0.04 V in one step: less than this.

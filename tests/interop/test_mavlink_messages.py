@@ -10,6 +10,8 @@ from undertow.interop.mavlink.link import parsed
 from undertow.interop.mavlink.odometry import OdometryReader, in_body_axes, of_local_position, of_odometry
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 
+pytestmark = pytest.mark.interop
+
 NED, FRD, ENU, BODY = (
     mavlink.MAV_FRAME_LOCAL_NED,
     mavlink.MAV_FRAME_LOCAL_FRD,

@@ -12,6 +12,8 @@ from undertow.cli.main import run
 from undertow.core.errors import BadInput
 from undertow.interop import gymnasium as ug
 
+pytestmark = pytest.mark.interop
+
 PENDULUM = {
     "plant": {"kind": "inverted_pendulum", "limit": 30.0},
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},

@@ -15,6 +15,8 @@ from undertow.interop import python_control as upc
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.interop
+
 AUV = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "rcaf", "preset": "robust"},

@@ -10,6 +10,8 @@ from undertow.core.status import Status
 from undertow.interop.stepped_vehicle import STANDARD_GRAVITY, SteppedVehicle
 from undertow.numerics.rotations import rotation_from_quaternion
 
+pytestmark = pytest.mark.interop
+
 STILL = np.full(8, 1500.0)
 
 

@@ -13,6 +13,8 @@ from undertow.interop.thruster_channels import (
     channels_of_vehicle,
 )
 
+pytestmark = pytest.mark.interop
+
 # What the pilot asks of ArduSub, in the order of its factors, and the row and sign of the wrench that must follow:
 # up is against heave, which is down.
 DEMANDS = {

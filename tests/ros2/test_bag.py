@@ -15,6 +15,8 @@ from undertow.interop.ros2.from_messages import Frames
 from undertow.interop.ros2.write_bag import STORAGES, BagWriter, write_rosbag2
 from undertow.numerics.rotations import quaternion_from_euler
 
+pytestmark = pytest.mark.interop
+
 STILL = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24}},
     "controller": {"kind": "pid", "frequency": 1.0},

@@ -20,6 +20,8 @@ from undertow.interop.ros2.node import Reporter, Topics
 from undertow.interop.ros2.to_messages import odometry_of, target_message
 from undertow.logs.frames import quaternions
 
+pytestmark = pytest.mark.interop
+
 SCENARIO = """
 plant: {vehicle: odin, thruster: {kind: paper_table3, fidelity: shaft, supply: 24}}
 controller: {kind: pid, frequency: 1.0}

@@ -10,6 +10,8 @@ from undertow.interop.ros2.frames import between_attitudes
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
 from undertow.logs.frames import quaternions
 
+pytestmark = pytest.mark.interop
+
 FRAMES = Frames()
 STAMP = ros.Time(12, 345)
 MOTION = PoseAndVelocity(

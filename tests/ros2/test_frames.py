@@ -9,6 +9,8 @@ from undertow.interop.ros2 import frames
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
 
+pytestmark = pytest.mark.interop
+
 WORLD = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED -> ENU
 BODY = np.diag([1, -1, -1])  # FRD -> FLU
 

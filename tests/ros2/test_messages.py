@@ -9,6 +9,8 @@ from random_messages import random_message
 from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
 
+pytestmark = pytest.mark.interop
+
 
 def plain(message):
     """A message of either library as dictionaries, lists and numbers."""

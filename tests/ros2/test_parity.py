@@ -18,6 +18,8 @@ from undertow.interop.ros2.write_bag import BagWriter
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
+pytestmark = pytest.mark.interop
+
 # Thrusters reach their limits at the start.
 SCENARIO = """
 plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}

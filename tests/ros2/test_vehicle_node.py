@@ -18,6 +18,8 @@ from undertow.interop.ros2.to_messages import thrusters_of
 from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
 from undertow.scenario.build import build
 
+pytestmark = pytest.mark.interop
+
 SCENARIO = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "shaft", "supply": 24}},
     "controller": {"kind": "pid", "frequency": 1.0},

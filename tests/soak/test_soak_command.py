@@ -11,6 +11,8 @@ from undertow.soak import soak as soaking
 from undertow.soak.inputs import Attack
 from undertow.soak.verdict import EVENTS, Failure
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):

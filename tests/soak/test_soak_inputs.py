@@ -14,6 +14,8 @@ from undertow.soak.inputs import BUILD, KINDS, Attack, attack, planned
 from undertow.soak.trying import try_in_process
 from undertow.soak.verdict import Done, judged
 
+pytestmark = pytest.mark.soak
+
 VALID = {
     "run.nc": b"\x89HDF\r\n\x1a\n" + bytes(200),
     "run.csv": b"time [s],depth [m]\r\n0,1\r\n",

@@ -9,6 +9,8 @@ from undertow.soak.inputs import BUILD, Attack
 from undertow.soak.trying import try_in_process
 from undertow.soak.verdict import judged
 
+pytestmark = pytest.mark.soak
+
 LAW = "return pid(model, frequency=frequency)"
 
 

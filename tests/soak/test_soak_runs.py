@@ -11,6 +11,8 @@ from undertow.soak.controls import CONTROLS, run_controls
 from undertow.soak.judged_runs import Judged, judged_groups, judged_runs
 from undertow.soak.watching import Counts
 
+pytestmark = pytest.mark.soak
+
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 2.0},
     "controller": {"kind": "pid", "frequency": 1.0},

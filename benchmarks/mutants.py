@@ -1,0 +1,170 @@
+"""Do the tests notice a wrong program? Mutants of what computes, drawn at random, and the tests that kill them.
+
+A mutant is the project with one operator, number, comparison or condition of one file changed (operators of Cosmic Ray,
+`pip install cosmic-ray`). Every site of a change in the rooms below is as likely as any other. Each mutant is tested in
+a copy of the project by itself; a mutant that no test notices has survived.
+
+    python benchmarks/mutants.py --out mutants.csv                    # 100 mutants, the quick set
+    python benchmarks/mutants.py --list                               # draw and print them only
+    python benchmarks/mutants.py --only 3,17 --tests "-m full -n 2"   # further tests for some of them
+    python benchmarks/mutants.py --together 3,17 --tests "-m full -n 2"  # all of these in one copy, which saves time
+
+Where many survivors stand together in one copy, a full set that passes has missed all of them.
+"""
+
+import argparse
+import ast
+import csv
+import itertools
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from cosmic_ray.ast import ast_nodes, get_ast_from_path
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+
+ROOT = Path(__file__).parents[1]
+ROOMS = {
+    "core": ("core", "numerics", "estimation"),
+    "physics": ("vehicles", "thrusters", "power", "disturbances", "sensors", "plants", "faults"),
+    "control": ("controllers", "references", "navigation", "supervision"),
+    "simulation": ("loop",),
+}
+# Operators that need arguments, and unions of types, which compute nothing.
+LEFT_OUT = re.compile(r"Variable|RemoveDecorator|BitOr|ExceptionReplacer")
+# What a test of the whole program prints for a test that failed.
+FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+SECONDS = 1800
+
+
+class Mutant(NamedTuple):
+    """One change: the file, the operator, and which of its sites."""
+
+    path: str
+    line: int
+    operator: str
+    occurrence: int
+
+    def code(self, source: str) -> str:
+        """The changed source."""
+        return mutate_code(source, get_operator(self.operator)(), self.occurrence)
+
+    def change(self) -> str:
+        """The line before and after."""
+        before = (ROOT / self.path).read_text()
+        after = self.code(before).splitlines()
+        changed = [(old, new) for old, new in zip(before.splitlines(), after, strict=False) if old != new]
+        return " -> ".join(line.strip() for line in changed[0]) if changed else "?"
+
+
+def annotation_lines(source: str) -> set[tuple[int, int]]:
+    """Positions (line, column) inside annotations, which compute nothing."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        for annotation in (getattr(node, "annotation", None), getattr(node, "returns", None)):
+            if annotation is not None:
+                found |= {(part.lineno, part.col_offset) for part in ast.walk(annotation) if hasattr(part, "lineno")}
+    return found
+
+
+def sites_of(path: Path) -> dict[tuple[int, int], list[Mutant]]:
+    """Every place of a file that can be changed, with the changes that are possible there."""
+    tree, ignored = get_ast_from_path(path), annotation_lines(path.read_text())
+    sites: dict[tuple[int, int], list[Mutant]] = {}
+    for name in operator_names():
+        if LEFT_OUT.search(name):
+            continue
+        operator = get_operator(name)()
+        positions = (start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node))
+        for occurrence, start in enumerate(positions):
+            if start not in ignored:
+                mutant = Mutant(str(path.relative_to(ROOT)), start[0], name, occurrence)
+                sites.setdefault(start, []).append(mutant)
+    return sites
+
+
+def is_python(mutant: Mutant) -> bool:
+    """Whether its code can be read: the star of an argument list is no product."""
+    try:
+        ast.parse(mutant.code((ROOT / mutant.path).read_text()))
+    except SyntaxError:
+        return False
+    return True
+
+
+def draw(count: int, seed: int) -> list[Mutant]:
+    """Mutants, each at another site."""
+    rooms = [ROOT / "undertow" / room for rooms in ROOMS.values() for room in rooms]
+    files = [file for room in rooms for file in sorted(room.rglob("*.py"))]
+    sites = [mutants for file in files for mutants in sites_of(file).values()]
+    chance = random.Random(seed)
+    chance.shuffle(sites)
+    drawn = (chance.choice(mutants) for mutants in sites)
+    return list(itertools.islice(filter(is_python, drawn), count))
+
+
+def project_with(mutants: list[Mutant], folder: Path) -> Path:
+    """A copy of the tracked files with these changes."""
+    copy = folder / "project"
+    files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    for name in files:
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    for mutant in mutants:
+        path = copy / mutant.path
+        path.write_text(mutant.code(path.read_text()))
+    return copy
+
+
+def failures(mutants: list[Mutant], tests: str) -> list[str]:
+    """Tests that fail with these changes; one sentence where the tests did not come to an end."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = project_with(mutants, Path(folder))
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests.split()]
+        try:
+            ended = subprocess.run(command, cwd=copy, capture_output=True, text=True, timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            return [f"no end within {SECONDS} s"]
+        found = FAILED.findall(ended.stdout)
+        return found if found or ended.returncode == 0 else [f"pytest ended with {ended.returncode}"]
+
+
+def main() -> None:
+    """Draw, test, and write a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=38)
+    parser.add_argument("--tests", default="-x", help="arguments of pytest")
+    parser.add_argument("--only", help="numbers of mutants, with commas")
+    parser.add_argument("--together", help="numbers of mutants that stand in one copy")
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    mutants = draw(options.count, options.seed)
+    chosen = options.together or options.only
+    numbers = [int(number) for number in chosen.split(",")] if chosen else range(len(mutants))
+    if options.together:
+        for test in failures([mutants[number] for number in numbers], options.tests):
+            print(test)
+        return
+    rows = []
+    for number in numbers:
+        mutant = mutants[number]
+        killers = [] if options.list else failures([mutant], options.tests)
+        verdict = "" if options.list else ("killed" if killers else "survived")
+        rows.append([number, f"{mutant.path}:{mutant.line}", mutant.change(), verdict, " ".join(killers[:1])])
+        print(*rows[-1], sep=" | ", flush=True)
+    if options.out:
+        with options.out.open("w", newline="") as file:
+            csv.writer(file).writerows([["number", "where", "change", "verdict", "first test that fails"], *rows])
+
+
+if __name__ == "__main__":
+    main()
