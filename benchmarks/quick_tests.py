@@ -3,8 +3,8 @@
     python benchmarks/quick_tests.py [--cold] [--caches DIR]
 
 Processor time is user and system time of all processes. `import jax` is measured in the same minutes, three times
-before and after each run; the least counts. With --cold only empty caches are measured; --caches names the folder, which
-is then kept. The exit code is that of the tests, or 1 where a run took more than its budget.
+before and after each run; the least counts. With --cold only empty caches are measured; --caches names the folder, and
+keeps it. The exit code is that of the tests, or 1 where a run took more than its budget.
 """
 
 import argparse
