@@ -204,6 +204,7 @@ def test_vehicle_holds_its_place_under_constant_loads():
     np.testing.assert_allclose(found.signals["estimate"][-1], [surge, sway, 0.4, 1.0, 0.5, -0.5], atol=2e-3)
 
 
+@pytest.mark.full
 def test_parameters_wait_at_limits_and_stay_plausible():
     plant = double_integrator(1, limit=1.0)
     law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
