@@ -1,6 +1,8 @@
+import functools
 from typing import NamedTuple
 
 import pytest
+import typer
 
 from undertow.cli.main import run
 from undertow.report import run_page
@@ -13,6 +15,14 @@ class Said(NamedTuple):
     code: int
     out: str
     err: str
+
+
+@pytest.fixture(scope="session", autouse=True)
+def commands_are_built_once():
+    """Typer builds every command anew at each call, a third of the time of a refusal; they do not change."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", functools.cache(typer.main.get_command))
+        yield
 
 
 @pytest.fixture

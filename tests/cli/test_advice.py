@@ -33,6 +33,7 @@ def said_of(text):
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+@pytest.mark.full
 def test_examples_get_no_advice(path):
     assert said_of(read(path)) == ()
 
@@ -45,6 +46,7 @@ def test_scenarios_of_the_reproduction_get_no_advice(path):
         assert said_of(several.scenario._replace(data=several.data(combination))) == ()
 
 
+@pytest.mark.full
 def test_top_speed_of_one_thruster_is_where_its_force_balances_linear_drag():
     odin = ut.vehicles.odin()
     plain = eqx.tree_at(lambda v: (v.quadratic_damping, v.buoyancy), odin, (np.zeros((6, 6)), odin.weight))
@@ -61,6 +63,7 @@ def test_top_speed_of_one_thruster_is_where_its_force_balances_linear_drag():
     assert 30.0 / 20.0 < top_speed(heavier) <= 35.0 / 20.0 * (1 + 1e-9)
 
 
+@pytest.mark.full
 def test_top_speed_is_unknown_without_limits():
     assert top_speed(ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3())) == np.inf
     assert np.isfinite(top_speed(ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), t200())))

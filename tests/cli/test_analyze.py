@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+pytestmark = pytest.mark.full
+
 ROBUST = """\
 plant: {kind: double_integrator, axes: 2, limit: 8}
 controller: {kind: rcaf, preset: robust, bandwidth: 30}

@@ -8,6 +8,8 @@ from undertow.scenario.finished_run import compare
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
 
+pytestmark = pytest.mark.full
+
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):

@@ -79,6 +79,7 @@ def test_file_that_is_neither(refused, tmp_path):
     assert refused("check", "x.yaml") == said
 
 
+@pytest.mark.full
 def test_scenario(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("check", "s.yaml")
@@ -87,6 +88,7 @@ def test_scenario(undertow, tmp_path):
     assert "odin (vehicle)" in said.out
 
 
+@pytest.mark.full
 def test_campaign(undertow, tmp_path):
     """As `undertow campaign` checks it before the first trial; nothing is run or written."""
     (tmp_path / "s.yaml").write_text(SMALL)
@@ -97,6 +99,7 @@ def test_campaign(undertow, tmp_path):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["c.yaml", "s.yaml"]
 
 
+@pytest.mark.full
 def test_vehicle_of_a_scenario(undertow, tmp_path):
     rov = (EXAMPLES / "my_rov.yaml").read_text()
     (tmp_path / "my_rov.yaml").write_text(rov.replace("inertia: [0.26, 0.23, 0.37]", "inertia: [26, 23, 37]"))
@@ -119,6 +122,7 @@ def test_bad_scenario(refused, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "name"), [pytest.param(*one, marks=pytest.mark.slow) if one in SLOW else one for one in PARTS]
 )
+@pytest.mark.full
 def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
     needed = {
         "table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"],
@@ -130,6 +134,7 @@ def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
 
 
 @pytest.mark.parametrize("name", sorted(catalogue.names("references")))
+@pytest.mark.full
 def test_references_are_consistent(undertow, name):
     samples = "[[0, 0, 0, 0, 0, 0, 0], [5, 1, 0, 1, 0, 0, 0.3], [10, 1, 2, 1, 0, 0, 0]]"
     needed = {
@@ -174,6 +179,7 @@ def test_vehicle_from_a_python_file(undertow, tmp_path):
     )
 
 
+@pytest.mark.full
 def test_result_file_is_the_scenario_in_it(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SMALL)
     assert undertow("simulate", "s.yaml", "--out", "out").code == 0
@@ -182,6 +188,7 @@ def test_result_file_is_the_scenario_in_it(undertow, tmp_path):
     assert of_result.out == of_scenario.out.replace("s.yaml", "out/run.nc")
 
 
+@pytest.mark.full
 def test_thruster_from_a_python_file(undertow, tmp_path):
     (tmp_path / "mine.py").write_text(
         "import undertow as ut\n\n\ndef mine(gain: float = -5.0):\n    return ut.thrusters.linear_voltage(gain)\n"

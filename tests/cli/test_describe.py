@@ -16,6 +16,7 @@ PARTS = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(ki
 
 
 @pytest.mark.parametrize(("kind", "name"), PARTS)
+@pytest.mark.full
 def test_every_part_is_listed_and_described(undertow, kind, name):
     listed = undertow("list", kind)
     assert listed.code == 0 and name in listed.out
@@ -24,6 +25,7 @@ def test_every_part_is_listed_and_described(undertow, kind, name):
 
 
 @pytest.mark.parametrize(("kind", "name"), PARTS)
+@pytest.mark.full
 def test_every_option_has_a_meaning(kind, name):
     for description in describing.describe(f"{kind}/{name}"):
         assert description.summary
@@ -42,6 +44,7 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
     assert "Advice: torque constant / back-EMF constant is 117" in out
 
 
+@pytest.mark.full
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
     rcaf, sound, learning = describing.describe("rcaf")
     presets = [option.default for one in (rcaf, sound, learning) for option in one.options[:1]]

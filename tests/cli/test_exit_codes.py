@@ -49,6 +49,7 @@ def test_no_command_shows_the_help(undertow):
     assert said.code == 0 and "simulate" in said.out
 
 
+@pytest.mark.full
 def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
     text = SMALL.replace("limit: 20", "limit: 1e30").replace("frequency: 2", "frequency: 1e4")
     text = text.replace("duration: 0.1", "duration: 1")
@@ -61,6 +62,7 @@ def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
     assert (tmp_path / "out" / "run.nc").is_file()
 
 
+@pytest.mark.full
 def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
     monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken\nin two lines")))
     write(tmp_path)
@@ -76,6 +78,7 @@ def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("way", ["option", "environment"])
+@pytest.mark.full
 def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
     monkeypatch.setenv("UNDERTOW_TRACEBACK", "1" if way == "environment" else "")
     monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken")))
@@ -84,6 +87,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
     assert said.code == 3 and "Traceback" in said.err
 
 
+@pytest.mark.full
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "save", raising(OSError(28, "No space left on device", "run.nc")))
     write(tmp_path)
@@ -94,6 +98,7 @@ def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
 
 
+@pytest.mark.full
 def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
     monkeypatch.setattr(simulate, "execute", raising(KeyboardInterrupt()))
     write(tmp_path)
@@ -101,6 +106,7 @@ def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
 
 
+@pytest.mark.full
 def test_interrupt_of_compiled_code(tmp_path):
     """Hours of simulated time end at once, and leave nothing."""
     write(tmp_path, HOURS)
@@ -118,6 +124,7 @@ def test_interrupt_of_compiled_code(tmp_path):
     assert os.listdir(tmp_path) == ["s.yaml"]
 
 
+@pytest.mark.full
 def test_bad_input_as_a_process(tmp_path):
     write(tmp_path, SCENARIO.replace("mass: 125", "mass: -1"))
     command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
@@ -136,6 +143,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.parametrize("interrupted", [SWALLOWED, "import interrupted; assert interrupted.whole"])
+@pytest.mark.full
 def test_an_interrupt_that_was_not_heard_ends_the_next_wait(tmp_path, interrupted):
     """Swallowed by compiled code that calls back into Python, or put off as it came while a module was imported."""
     (tmp_path / "interrupted.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = 'whole'")
@@ -193,6 +201,7 @@ QUICK = {("list", 2), ("simulate", 15)}  # both signals, and a command that wait
         for signal in (2, 15)
     ],
 )
+@pytest.mark.full
 def test_signals_while_modules_are_imported_end_every_command(tmp_path, command, signal):
     """It may not be forgotten by those that wait for no compiled code; SIGTERM ends like Ctrl-C, with its own code."""
     write(tmp_path)
@@ -210,6 +219,7 @@ def test_signals_while_modules_are_imported_end_every_command(tmp_path, command,
     assert sorted(os.listdir(tmp_path)) == ["begun", "s.yaml"]
 
 
+@pytest.mark.full
 def test_sigterm_leaves_nothing_of_a_run(tmp_path):
     """Nor does the lock stay, nor the folder that results were to appear in."""
     write(tmp_path, HOURS)

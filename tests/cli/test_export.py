@@ -8,6 +8,8 @@ import pytest
 
 from undertow.cli.main import run
 
+pytestmark = pytest.mark.full
+
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 
 

@@ -5,6 +5,8 @@ import json
 import pytest
 from ruamel.yaml import YAML
 
+pytestmark = pytest.mark.full
+
 SCENARIO = """\
 plant: {kind: double_integrator, axes: 1, limit: 20}
 controller: {kind: pid, frequency: 2}

@@ -14,6 +14,8 @@ from undertow.scenario.finished_run import compare
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
 
+pytestmark = pytest.mark.full
+
 CODE = """
 import pathlib
 

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 
+pytestmark = pytest.mark.full
+
 VALID = {
     "description": "fuzzed",
     "plant": {

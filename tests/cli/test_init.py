@@ -15,6 +15,8 @@ from undertow.scenario.build import build
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.reading import read
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[2]
 TEMPLATES = ROOT / "undertow" / "scenario" / "templates"
 # Words before the list of names in a comment of the template -> kind of part.

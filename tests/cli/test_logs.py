@@ -9,6 +9,8 @@ import xarray as xr
 import undertow as ut
 from undertow.cli.main import run
 
+pytestmark = pytest.mark.full
+
 SCENARIO = """
 plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}
 controller: {kind: pid, frequency: 1}

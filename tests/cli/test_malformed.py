@@ -15,6 +15,8 @@ from undertow.cli import campaign
 from undertow.core.status import Status
 from undertow.report import plotting
 
+pytestmark = pytest.mark.full
+
 DONE, RUN_FAILED, BAD_INPUT = 0, 1, 2
 BEGIN = int(os.environ.get("UNDERTOW_FUZZ_SEED", 0)) * 1_000_000
 FEW, MANY = 6, 1500

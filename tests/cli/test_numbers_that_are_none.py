@@ -8,6 +8,8 @@ from undertow.report.run_tables import certificate_rows
 from undertow.scenario.execute import execute
 from undertow.scenario.finished_run import certificate_of
 
+pytestmark = pytest.mark.full
+
 BASE = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}, "ledger": False},
     "controller": {"kind": "rcaf", "preset": "paper"},

@@ -3,6 +3,8 @@
 import pytest
 from good_scenario import SCENARIO, SMALL
 
+pytestmark = pytest.mark.full
+
 GOOD = """
 import undertow as ut
 

@@ -10,6 +10,8 @@ from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 
+pytestmark = pytest.mark.full
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TEMPLATE = Path(simulate.__file__).parents[1] / "scenario/templates/my_controller.py"
 

@@ -7,6 +7,8 @@ from good_scenario import SCENARIO
 import undertow as ut
 from undertow.report.figures import writing
 
+pytestmark = pytest.mark.full
+
 
 @pytest.fixture(scope="module")
 def parts():

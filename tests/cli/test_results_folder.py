@@ -155,6 +155,7 @@ def test_earlier_result_is_refused(refused, tmp_path):
     )
 
 
+@pytest.mark.full
 def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     """It is a warning; the other figures are drawn, and the exit code is that of the run."""
 
@@ -180,6 +181,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["error.png", "error.svg"]
 
 
+@pytest.mark.full
 def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_path, monkeypatch):
     def interrupted(run):
         raise KeyboardInterrupt

@@ -13,6 +13,8 @@ import undertow as ut
 from undertow.cli.main import run
 from undertow.interop.ros2 import read_rosbag2
 
+pytestmark = pytest.mark.full
+
 SCENARIO = """
 plant: {vehicle: odin, thruster: {kind: paper_table3, fidelity: shaft, supply: 24}}
 controller: {kind: pid, frequency: 1.0}

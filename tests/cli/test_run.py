@@ -16,6 +16,8 @@ from undertow.cli.main import run
 from undertow.logs.read import read_log
 from undertow.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
 
+pytestmark = pytest.mark.full
+
 SCENARIO = """
 plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}
 controller: {kind: pid, frequency: 2.0}

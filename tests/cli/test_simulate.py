@@ -10,6 +10,8 @@ from ruamel.yaml import YAML
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.scenario.provenance import checksum, content_hash
 
+pytestmark = pytest.mark.full
+
 NOISY = SCENARIO.replace("seed: 3", "seed: 3\nnavigation: white_noise\nsteady: {start: 0.05, stop: 0.1}")
 
 

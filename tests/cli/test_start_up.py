@@ -4,6 +4,10 @@ import subprocess
 import sys
 import time
 
+import pytest
+
+pytestmark = pytest.mark.full
+
 HEAVY = "{'jax', 'numpy', 'xarray', 'matplotlib', 'ruamel', 'diffrax', 'equinox'}"
 
 

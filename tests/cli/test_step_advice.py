@@ -66,6 +66,7 @@ BASE = {
 
 
 @pytest.mark.parametrize("method", ["rk4", pytest.param("euler", marks=pytest.mark.slow)])
+@pytest.mark.full
 def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     """x_ddot = -1000 x_dot + u at 10 ms: 2.785 (2 for Euler's method) over 1000 / s, in so many substeps, and no fewer."""
     failed = execute(BASE | {"loop": BASE["loop"] | {"method": method}})
@@ -82,6 +83,7 @@ def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
         assert (execute(BASE | {"loop": loop}).status is Status.OK) == status
 
 
+@pytest.mark.full
 def test_an_unstable_loop_is_still_called_one():
     """A law of 100 rad/s at 10 ms: the plant is slow, and finer steps of it change nothing."""
     wild = BASE | {"plant": plant_of(1.0), "controller": {"kind": "pid", "frequency": 300.0}}
@@ -127,6 +129,7 @@ def test_a_law_too_stiff_for_one_ode():
         ),
     ],
 )
+@pytest.mark.full
 def test_times_that_are_no_multiples_are_told(loop, said):
     """And what is said of them is what a run does."""
     given = rounded_times(Loop(**loop))
@@ -141,6 +144,7 @@ def test_times_that_are_no_multiples_are_told(loop, said):
         assert (left > 1e-9) == any("last record" in one.says for one in given)
 
 
+@pytest.mark.full
 def test_python_warns_of_them_too():
     plant = ut.plants.double_integrator()
     law = ut.controllers.pid(plant.model(), sampling_time=0.01)
@@ -148,6 +152,7 @@ def test_python_warns_of_them_too():
         ut.simulate(plant, law, ut.references.setpoint([1.0]), duration=0.15, dt=0.01, record=0.1)
 
 
+@pytest.mark.full
 def test_single_precision_says_when_its_clock_stops():
     long = {"duration": 2e5, "dt": 0.01, "record": 1.0}
     said = build(BASE | {"plant": plant_of(1.0), "precision": "float32", "loop": long}).advice()

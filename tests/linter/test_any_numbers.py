@@ -4,11 +4,14 @@ import copy
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from undertow.checks.vehicle_lint import derived, lint
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import read
 from undertow.scenario.vehicle_schema import parse
+
+pytestmark = pytest.mark.full
 
 SOUND = read(Path(__file__).parents[2] / "examples" / "my_rov.yaml").data
 ODD = [

@@ -86,6 +86,7 @@ def test_defect_is_found(name):
 
 
 @pytest.mark.parametrize("name", EXPECTED)
+@pytest.mark.full
 def test_command_line_says_where(name, capsys):
     from undertow.cli.main import run
 
@@ -99,6 +100,7 @@ def test_command_line_says_where(name, capsys):
     assert first.startswith("Error: " if wrong else "Advice: ") and f"({name}.yaml, line " in first
 
 
+@pytest.mark.full
 def test_motor_of_table_3():
     """k_t / k_e = 117: at 10 V the shaft would give 537 W from 78 W."""
     (finding,) = check_contract(paper_table3())
@@ -108,6 +110,7 @@ def test_motor_of_table_3():
     assert float(rows["shaft power / electrical power"].split(",")[0]) == pytest.approx(537 / 78.5, rel=1e-2)
 
 
+@pytest.mark.full
 def test_motor_with_equal_constants():
     assert check_contract(t200()) == ()
     rows = {what: value for what, value, _ in derived_of_thruster(t200())}

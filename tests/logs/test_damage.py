@@ -99,6 +99,7 @@ KINDS = ("mcap", "csv", "json", "db3", "ros_mcap", "bin", "ulg", "odometry.ulg")
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.full
 def test_damaged_files(tmp_path, kind, capsys):
     """Nothing but a log, or one line that names the file, comes of 150 damaged files."""
     path, mapping = good_file(kind, tmp_path)
@@ -246,6 +247,7 @@ def test_missing_topics_and_columns(tmp_path):
             read_log(path, mapping_of({"signals": {"depth": signals}}))
 
 
+@pytest.mark.full
 def test_pulses_become_volts_as_the_speed_controllers_have_it():
     from undertow.logs.mapping import Entry, volts
     from undertow.power.esc import esc

@@ -17,6 +17,8 @@ from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.read import read_log
 from undertow.scenario.build import build
 
+pytestmark = pytest.mark.full
+
 MAGIC = b"\x89MCAP0\r\n"
 MUCH = 2**28  # bytes; few enough for a machine of a build to survive the old code
 

@@ -175,6 +175,7 @@ def test_px4_odometry_says_its_frame(tmp_path, frame, read):
         assert "vehicle_odometry is not read as velocity: its velocity_frame is 2, not 1" in log.notes
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_ros2(tmp_path, storage):
     """East, north, up and forward, port, up become ours; times begin at the first message."""

@@ -20,6 +20,8 @@ from undertow.logs.foxglove_layout import layout
 from undertow.logs.log import Log
 from undertow.scenario.build import build
 
+pytestmark = pytest.mark.full
+
 HEAVY = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "pid", "frequency": 1.0},

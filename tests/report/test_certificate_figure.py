@@ -7,6 +7,8 @@ import pytest
 
 from undertow.report.figures import run_figures, svg
 
+pytestmark = pytest.mark.full
+
 
 @pytest.fixture
 def certified(make_run):

@@ -11,6 +11,8 @@ from undertow.report.figures import fidelity_figure, paper_figures, png, run_fig
 from undertow.report.figures.paper import effort, uncertainty
 from undertow.reproduction.thruster_response import thruster_response
 
+pytestmark = pytest.mark.full
+
 AXES = ["north", "east", "down", "roll", "pitch", "yaw"]
 
 

@@ -9,6 +9,8 @@ from undertow.report.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures.one_column import WIDTH, one_column
 from undertow.report.figures.writing import pdf
 
+pytestmark = pytest.mark.full
+
 
 def boxes(figure):
     """Left, bottom, right, top of every panel, in."""

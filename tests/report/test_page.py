@@ -8,6 +8,8 @@ from undertow.report.formats import chip, number, percent, prose
 from undertow.report.page import Html, document, join, table, tag, text
 from undertow.report.reproduction.report import write_report
 
+pytestmark = pytest.mark.full
+
 VOID = {"meta", "img", "br", "wbr"}
 
 

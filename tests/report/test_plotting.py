@@ -9,6 +9,8 @@ import pytest
 from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
 from undertow.report.run_figures import plotted
 
+pytestmark = pytest.mark.full
+
 # Plots a run as the command does, and says whether this process needed matplotlib.
 ELSEWHERE = """
 import pickle, sys

@@ -28,6 +28,8 @@ from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
 from undertow.thrusters.first_order import first_order
 
+pytestmark = pytest.mark.full
+
 WATER = (0.3, -0.2, 0.1)  # m/s
 
 
