@@ -78,6 +78,7 @@ def test_figures_show_the_numbers(board):
         assert crosses == [parameter.levels[0], parameter.levels[3]]  # where pid, and where robust is lost first
 
 
+@pytest.mark.full
 def test_page(board, tmp_path):
     page, failed = write_board(board, tmp_path)
     text = page.read_text()

@@ -43,6 +43,7 @@ def test_rows_are_runs(campaign, backend):
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
 
 
+@pytest.mark.full
 def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, backend):
     """Tasks of 1, 7 and 20 trials, backwards; fewer and more than there are lanes."""
     two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
@@ -70,6 +71,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     assert len(emulated.launches) == 4 and not emulated.buffers
 
 
+@pytest.mark.full
 def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
     """The same trials with everything that probes share built in, and with nothing built in."""
     found = columns(campaign(), range(9))
@@ -81,6 +83,7 @@ def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
         np.testing.assert_array_equal(general[name], expected, err_msg=name)
 
 
+@pytest.mark.full
 def test_a_trial_unlike_all_probes(campaign):
     """A choice that no probe drew is flown all the same, and like the run itself."""
     rare = campaign(vary={"plant.limit": {"choice": [20.0] * 19 + [0.1]}}, design="random")
@@ -96,6 +99,7 @@ def test_a_trial_unlike_all_probes(campaign):
     )
 
 
+@pytest.mark.full
 def test_a_run_that_fails_costs_no_other(campaign, backend):
     """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
     unlimited = lambda *frequencies: campaign(
@@ -120,6 +124,7 @@ def test_a_task_in_which_no_trial_can_be_built(campaign):
     assert np.isnan(found["position_rms"]).all() and np.isnan(found["ended"]).all()
 
 
+@pytest.mark.full
 def test_series_are_those_of_the_runs(campaign):
     found = columns(campaign(series={"signals": ["position"], "every": 0.5}), range(2))
     built = build(made(campaign()).data(1))
@@ -128,6 +133,7 @@ def test_series_are_those_of_the_runs(campaign):
     np.testing.assert_allclose(found["series:position"][1], run.signals["position"], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.full
 def test_single_precision(campaign):
     """Without noise, which is drawn differently."""
     scenario = campaign()["scenario"] | {"navigation": "perfect"}

@@ -74,6 +74,7 @@ def note(part, law, source=None):
     return tuning_note(part, law(double_integrator(1).model()), DT, Path(), source)
 
 
+@pytest.mark.full
 def test_how_gains_came_about():
     by_rule = note({"kind": "pid"}, pid)
     assert by_rule.tuned and by_rule.sentence == "gains from the rule of `controllers/bandwidths.py`"
