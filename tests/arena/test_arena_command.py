@@ -133,6 +133,7 @@ def test_every_law_of_the_default_list_is_known():
     assert [one.name for one in laws(list(command.EVERY))] == list(command.EVERY)
 
 
+@pytest.mark.full
 def test_a_law_that_no_vehicle_accepts_is_an_error():
     """With the reason, and nothing that could be taken for a result."""
     (law,) = laws(["pid"])

@@ -68,6 +68,7 @@ def test_rank_is_by_error():
     assert [one.score.name for one in ranked([bad, good])] == ["good", "bad"]
 
 
+@pytest.mark.full
 def test_figures_show_the_numbers(board):
     texts = {text.get_text() for text in tasks_figure(board).axes[0].texts}
     assert texts == {"0.20", "10"}

@@ -15,6 +15,7 @@ from undertow.core.disk import alone
 from undertow.scenario.reading import dump
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "changes, said",
     [
@@ -68,12 +69,11 @@ from undertow.scenario.reading import dump
             {"vary": {"controller.frequency": {"uniform": [-2.0, -1.0]}}},  # none of the first trials can be built
             r"`controller.frequency` must be positive, but is -1.\d+ \(small.yaml, line 13, trial 0\)",
         ),
-        pytest.param(
+        (
             {"vary": {}, "scenario": {"reference": "setpont"}},
             r"`reference` .* \(small.yaml, line 1, trial 0\). Did you mean `setpoint`",
-            marks=pytest.mark.full,
         ),
-        pytest.param(
+        (
             {
                 "series": {"every": 0.1},
                 "cross": {"plant.vehicle": ["odin", "bluerov2"]},
@@ -81,7 +81,6 @@ from undertow.scenario.reading import dump
                 "scenario": VEHICLE,
             },
             r"`series` must be of plants with the same outputs and inputs, but is of several",
-            marks=pytest.mark.full,
         ),
         (
             {"cross": {"seed": [1, 2]}},

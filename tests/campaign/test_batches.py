@@ -11,7 +11,7 @@ from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import validate, whole
 from undertow.campaign.task import INVALID, run_trials, site
 from undertow.campaign.trials import Trials, trials
-from undertow.loop import simd_batch
+from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -31,6 +31,7 @@ def columns(data, rows):
     return run_trials(text_of(data), "", rows)
 
 
+@pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.full)], indirect=True)
 def test_rows_are_runs(campaign, backend):
     found = columns(campaign(), range(3))
     for trial in range(3):
@@ -41,6 +42,16 @@ def test_rows_are_runs(campaign, backend):
             if name in found:
                 assert found[name][trial] == pytest.approx(expected, rel=1e-9, abs=1e-12), name
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
+
+
+@pytest.mark.parametrize("runs", [1, 4, 9])
+def test_pieces_of_a_batch_are_in_order(runs):
+    """Four at once; the last piece is filled up, and what fills it is left out."""
+    program = vmap_batch._batched(lambda x: {"double": 2 * x, "sum": x.sum()}, np.zeros(3), 4)
+    x = np.arange(3.0 * runs).reshape(runs, 3)
+    found = program(x)
+    np.testing.assert_array_equal(found["double"], 2 * x)
+    np.testing.assert_array_equal(found["sum"], x.sum(1))
 
 
 @pytest.mark.full
@@ -112,12 +123,14 @@ def test_a_run_that_fails_costs_no_other(campaign, backend):
     np.testing.assert_array_equal(bad["position_rms"][::2], good["position_rms"][::2])
 
 
+@pytest.mark.full
 def test_a_trial_that_cannot_be_built_is_a_row(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), range(4))
     assert found["status"].tolist() == [0, INVALID, 0, INVALID]
     assert np.isnan(found["position_rms"]).tolist() == [False, True, False, True]
 
 
+@pytest.mark.full
 def test_a_task_in_which_no_trial_can_be_built(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), [1, 3])
     assert found["status"].tolist() == [INVALID, INVALID]

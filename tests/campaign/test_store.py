@@ -205,14 +205,22 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
             {"vary": {"disturbance.amplitude": {"uniform": [0.5, 3.0]}}},
             "`vary.disturbance.amplitude.uniform[1]` was 2, is 3",
         ),
-        ({}, {"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
+        pytest.param(
+            {},
+            {"series": {}},
+            "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}",
+            marks=pytest.mark.full,
+        ),
         ({}, {"trials": 80, "requirements": {}, "design": "latin"}, "`design` was random, is latin"),
         ({}, {"trials": 39}, "`trials` was 40, is 39"),
-        ({"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41"),
-        (
+        pytest.param(
+            {"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41", marks=pytest.mark.full
+        ),
+        pytest.param(
             {"cross": {"controller.frequency": [1.0, 2.0]}},
             {"cross": {"controller.frequency": [2.0, 1.0]}},
             "`order of cross.controller.frequency` was 1.0, 2.0, is 2.0, 1.0",
+            marks=pytest.mark.full,
         ),
     ],
 )

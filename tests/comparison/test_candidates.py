@@ -90,6 +90,7 @@ def test_how_gains_came_about():
     assert not paper.tuned and "Table 1" in paper.sentence
 
 
+@pytest.mark.full
 def test_tuned_gains_are_those_of_the_file_beside(tmp_path):
     """Changed by hand since, they are not."""
     costs = {"given": {"held_out_cost": 3.0}, "tuned": {"held_out_cost": 1.5, "options": {"frequency": [2.5]}}}

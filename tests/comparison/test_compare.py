@@ -19,6 +19,8 @@ from undertow.cli.main import run
 from undertow.comparison.prepare import prepare_comparison
 from undertow.scenario.reading import dump
 
+pytestmark = pytest.mark.full
+
 WILD = {"kind": "pid", "frequency": 500.0}
 
 
@@ -30,7 +32,6 @@ def own_law(scenario):
     Path("mine.py").write_text(code.replace("def my_controller(", "def smc("))
 
 
-@pytest.mark.full
 def test_command(scenario, own_law, capsys):
     """A law beside itself, a diverging one and one of a file: numbers, failures, and every file that is left."""
     path, wild = scenario(), scenario("wild", controller=WILD)
@@ -104,7 +105,6 @@ def interrupted(*arguments):
     raise KeyboardInterrupt
 
 
-@pytest.mark.full
 def test_nothing_random(scenario, capsys, monkeypatch):
     """One trial and no interval; equal scenarios differ in nothing. Stopped in a replay, it says how to continue."""
     path = scenario(navigation="perfect")
@@ -126,7 +126,6 @@ def test_nothing_random(scenario, capsys, monkeypatch):
     assert line in capsys.readouterr().err
 
 
-@pytest.mark.full
 def test_scenarios_as_a_whole(scenario, capsys):
     """What differs is said; another folder's relative names stay its own."""
     path = scenario()
@@ -141,7 +140,6 @@ def test_scenarios_as_a_whole(scenario, capsys):
     assert "frequency 3.0), not tuned" in capsys.readouterr().out
 
 
-@pytest.mark.full
 def test_campaign_file(scenario, capsys):
     """Its samples are used for every candidate, and its only axis may be what is compared."""
     varied = {"scenario": scenario(navigation="perfect"), "trials": 6, "seed": 4}

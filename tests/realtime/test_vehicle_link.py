@@ -18,6 +18,8 @@ from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.full
+
 NOISY = {"kind": "white_noise", "position": 0.001, "velocity": 0.01}
 PENDULUM = {
     "plant": "inverted_pendulum",
@@ -54,9 +56,7 @@ def run_of(built):
     return link
 
 
-@pytest.mark.parametrize(
-    "navigation", [*(pytest.param(one, marks=pytest.mark.full) for one in (NOISY, {"kind": "kalman"})), None]
-)
+@pytest.mark.parametrize("navigation", [NOISY, {"kind": "kalman"}, None])
 def test_every_bit_is_that_of_a_simulation(navigation, heavy_data):
     scenario = PENDULUM if navigation is None else heavy_data | {"navigation": navigation}
     link, record = run_of(build(from_data(scenario))), ut.simulate_scenario(scenario).dataset
@@ -95,7 +95,6 @@ class BiasAndLoss(AbstractFaults):
         return (0.2,)
 
 
-@pytest.mark.full
 def test_faults_are_those_of_a_simulation(heavy):
     faulty = heavy._replace(closed_loop=dataclasses.replace(heavy.closed_loop, faults=BiasAndLoss()))
     link, record = run_of(faulty), execute(faulty).dataset
