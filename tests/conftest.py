@@ -6,6 +6,7 @@ file (`pytestmark`) what it belongs to; pyproject.toml lists the marks.
 
 import os
 import re
+import threading
 
 from undertow.process_setup import prepare  # isort: skip  (before JAX is imported
 
@@ -15,6 +16,7 @@ prepare()
 import jax
 import jaxtyping
 import pytest
+from jax._src.interpreters import mlir
 from jaxtyping import install_import_hook
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
@@ -56,6 +58,7 @@ def pytest_configure(config):
         install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
     if config.getoption("-m") != "slow":
         compile_quickly()
+    share_lowering_context()
 
 
 def compile_quickly():
@@ -67,6 +70,22 @@ def compile_quickly():
         flags += " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
     os.environ["XLA_FLAGS"] = flags
     os.environ.setdefault("SIMDJIT_OPTIMIZATION", "0")
+
+
+def share_lowering_context():
+    """JAX lowers each program in an MLIR context of its own, most of the time of a small one; tests have thousands.
+
+    One for each thread is enough. The function is JAX's own; where a version has none of that name, nothing is shared.
+    """
+    make, kept = getattr(mlir, "make_ir_context", None), threading.local()
+
+    def context_of_this_thread():
+        if not hasattr(kept, "context"):
+            kept.context = make()
+        return kept.context
+
+    if make:
+        mlir.make_ir_context = context_of_this_thread
 
 
 def pytest_ignore_collect(collection_path, config):
