@@ -1,6 +1,6 @@
 """The controller in KTH's simulator: always a stand-in with the same interface, and theirs where the file is here.
 
-UNDERTOW_KTH=BlueROV2.py python -m pytest -n 0 tests/peers/test_kth_autopilot.py
+UNDERTOW_KTH=BlueROV2.py python -m pytest tests/peers/test_kth_autopilot.py
 """
 
 import importlib.util

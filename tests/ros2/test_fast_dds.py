@@ -1,6 +1,6 @@
 """Fast DDS of Debian as the other side: messages arrive with their values, none is lost, and garbage harms nobody.
 
-Run them with `pytest -m dds -n 0`; they need fastddsgen, libfastrtps-dev and g++.
+Run them with `pytest -m dds`; they need fastddsgen, libfastrtps-dev and g++.
 """
 
 import fast_dds
