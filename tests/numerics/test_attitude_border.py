@@ -84,6 +84,7 @@ def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
 
 
+@pytest.mark.full
 def test_law_turns_the_short_way_across_the_border_of_the_euler_angles(commanded):
     """From any yaw: 20 deg to port across the border, the same wish a turn lower gets the same voltages."""
     yaws = np.linspace(-np.pi, np.pi, STARTS)

@@ -95,6 +95,7 @@ def test_without_friction_and_back_emf_the_static_motor_is_ideal():
     np.testing.assert_allclose(np.array(gaps[:-1]) / gaps[1:], 100.0, rtol=0.05)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["shaft", "electromechanical"])
 def test_dynamic_rungs_settle_on_the_static_one(name):
     expected = steady(fidelity("static"), VOLTS)
@@ -103,6 +104,7 @@ def test_dynamic_rungs_settle_on_the_static_one(name):
     np.testing.assert_allclose(settled[1], expected[1], rtol=1e-9)
 
 
+@pytest.mark.full
 def test_speed_term_and_thrust_add_up_to_the_voltage():
     """Eq. (15): T = alpha V + phi + Delta_V, with Delta_V = -alpha L I_dot."""
     thruster, rng = fidelity("electromechanical"), np.random.default_rng(9)
@@ -118,17 +120,17 @@ def test_speed_term_and_thrust_add_up_to_the_voltage():
     np.testing.assert_allclose(thruster.thrust(state, VOLTS), total, rtol=0, atol=1e-10 * np.abs(alpha * VOLTS).max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FIDELITIES)
 def test_nothing_turns_inside_the_dead_zone(name):
     """A voltage inside acts as none, a voltage outside as itself."""
     loose, limited = fidelity(name), fidelity(name, dead_zone=4.0)
-    state = jax.tree.map(lambda leaf: leaf + jnp.linspace(-20.0, 20.0, leaf.size), loose.initial_state(5))
-    outside = jnp.where(jnp.abs(VOLTS) > 4, VOLTS, 0.0)
-    for of in ("thrust", "dynamics", "current"):
-        for a, b in zip(
-            *(jax.tree.leaves(getattr(x, of)(state, v)) for x, v in ((limited, VOLTS), (loose, outside))), strict=True
-        ):
-            np.testing.assert_array_equal(a, b)
+    state = jax.tree.map(lambda leaf: np.linspace(-20.0, 20.0, leaf.size), loose.initial_state(5))
+    outside = np.where(np.abs(VOLTS) > 4, VOLTS, 0.0)
+    of = eqx.filter_jit(lambda x, state, v: (x.thrust(state, v), x.dynamics(state, v), x.current(state, v)))
+    found, expected = of(limited, state, VOLTS), of(loose, state, outside)
+    for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_memoryless_models_go_through_the_static_motor_at_ten_volts():

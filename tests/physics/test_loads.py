@@ -68,6 +68,7 @@ def test_payload_is_a_vehicle_with_that_point_mass_built_in():
     assert carried.jumps(10.0) == (1.0, 2.0)
 
 
+@pytest.mark.full
 def test_two_payloads_are_one_after_the_other():
     halves = Together((payload(1.0, 5.0, (0.1, 0, 0)), payload(1.0, 5.0, (0.1, 0, 0))))
     np.testing.assert_allclose(body_rate(PLANT, halves), body_rate(PLANT, payload(2.0, 10.0, (0.1, 0, 0))), atol=1e-12)

@@ -88,10 +88,13 @@ THRUSTERS = {
 }
 
 
+QUICK = {("quadratic", None), ("lagging", None), ("T200 static", LOSS)}
+CASES = [(name, loss) for name in THRUSTERS for loss in (None, LOSS)]
+
+
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.full) if name == "axial flow" else name for name in THRUSTERS]
+    ("name", "loss"), [case if case in QUICK else pytest.param(*case, marks=pytest.mark.full) for case in CASES]
 )
-@pytest.mark.parametrize("loss", [None, LOSS])
 def test_solution_gives_the_demanded_acceleration(name, loss):
     """g(x, solve(x, a)) = a for several accelerations in motion; the affine inverse misses them."""
     plant = hybrid_vehicle(bluerov2_heavy(), THRUSTERS[name], ledger=False, inflow_loss=loss)
@@ -107,7 +110,7 @@ def test_solution_gives_the_demanded_acceleration(name, loss):
     assert (np.abs(missing - accelerations).max(1) > 0.05).all()
 
 
-@pytest.mark.parametrize("loss", [None, LOSS])
+@pytest.mark.parametrize("loss", [pytest.param(None, marks=pytest.mark.full), LOSS])
 def test_model_is_the_plant_in_steady_state(loss):
     """F + g(x, V) of the model = x_ddot of the plant, fidelity `static`, J_dot nu aside."""
     plant = hybrid_vehicle(bluerov2_heavy(), t200("static"), inflow_loss=loss)

@@ -38,6 +38,7 @@ UNEVEN = DCMotor(
     reverse_torque_coefficient=5e-6,
 )
 MOTORS = {"uneven": UNEVEN, "t200": t200().motor, "t500": t500().motor, "table3": paper_table3().motor}
+EVERY_MOTOR = ["uneven", *(pytest.param(name, marks=pytest.mark.full) for name in MOTORS if name != "uneven")]
 VOLTS = np.array([-20.0, -12.0, -3.0, -0.1, 0.1, 3.0, 12.0, 20.0])
 
 
@@ -102,7 +103,7 @@ def test_each_direction_has_its_own_coefficients():
     np.testing.assert_array_equal(even.thrust(speed), -even.thrust(speed)[::-1])
 
 
-@pytest.mark.parametrize("name", MOTORS)
+@pytest.mark.parametrize("name", EVERY_MOTOR)
 def test_steady_speed_solves_eq_13_in_both_directions(name):
     motor = MOTORS[name]
     speed = call("steady_speed", motor, VOLTS)
@@ -111,7 +112,7 @@ def test_steady_speed_solves_eq_13_in_both_directions(name):
     np.testing.assert_allclose(back, VOLTS, rtol=1e-12, err_msg="and Ohm's law")
 
 
-@pytest.mark.parametrize("name", MOTORS)
+@pytest.mark.parametrize("name", EVERY_MOTOR)
 def test_thrust_and_speed_are_inverse(name):
     speed = np.linspace(-300, 300, 61)
     found = call("speed_at", MOTORS[name], call("thrust", MOTORS[name], speed))
@@ -135,7 +136,7 @@ def test_gradients_are_finite_at_rest(fidelity):
 # ------------------------------------------------------------------------------------------------------ fidelities
 
 
-@pytest.mark.parametrize("name", ["uneven", "t200"])
+@pytest.mark.parametrize("name", ["uneven", pytest.param("t200", marks=pytest.mark.full)])
 @pytest.mark.parametrize("fidelity", ["shaft", "electromechanical"])
 def test_dynamic_rungs_settle_on_the_static_one(name, fidelity):
     motor, static = MOTORS[name], with_fidelity(MOTORS[name], "static")
@@ -173,8 +174,11 @@ def test_speed_term_and_thrust_add_up_in_reverse_too():
     )
 
 
-@pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])
-@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize("make", [t200, pytest.param(t500, marks=pytest.mark.full)], ids=["t200", "t500"])
+@pytest.mark.parametrize(
+    "fidelity",
+    ["static", "electromechanical", *(pytest.param(name, marks=pytest.mark.full) for name in ("ideal", "shaft"))],
+)
 def test_dead_zone_of_real_thrusters(make, fidelity):
     thruster = make(fidelity)
     inside = np.array([-1.2, -0.6, 0.0, 0.6, 1.2])
