@@ -13,7 +13,7 @@ from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
-from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
+from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
 from undertow.scenario import factory
 from undertow.scenario.execute import execute
 
@@ -40,6 +40,7 @@ CASES = {
     ),
     "waypoints": (waypoints(SQUARE, 0.5, "along"), SQUARE_TIMES, 40),
     "recorded": (recorded(ROWS), ROWS[:, 0], 8),
+    "sine": (sine([2.0, 0.5], [0.4, 1.1], [1.0, -1.0], [0.3, 0.0]), [], 50),
 }
 # Where the acceleration jumps (s).
 JUMPS = {"lawn mower": MOWER_JOINTS, "waypoints": SQUARE_TIMES[[0, -1]], "recorded": ROWS[[0, -1], 0]}
@@ -207,6 +208,15 @@ def test_lissajous_closes():
     np.testing.assert_allclose(position[1], [2, 0, 4.0, 0, 0, 0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(position[2], position[0], rtol=0, atol=1e-13)
     np.testing.assert_allclose(velocity[0], [0.2, 0.2, 0, 0, 0, 0], rtol=0, atol=1e-14)
+
+
+def test_sine_in_closed_form():
+    times = np.array([0.0, 1.0, 7.3])
+    position, _, _ = at(CASES["sine"][0], times)
+    np.testing.assert_allclose(position[:, 0], 1 + 2 * np.sin(0.4 * times + 0.3), rtol=1e-14)
+    np.testing.assert_allclose(position[:, 1], -1 + 0.5 * np.sin(1.1 * times), rtol=1e-14)
+    with pytest.raises(BadInput, match="`amplitude` must be one number, or 3 of them"):
+        sine([1.0, 2.0], [1.0, 2.0, 3.0])
 
 
 def test_line_has_its_speed_in_the_middle():
