@@ -20,6 +20,10 @@ QUATERNIONS /= np.linalg.norm(QUATERNIONS, axis=1, keepdims=True)
 UPRIGHT = jnp.array([1.0, 0.0, 0.0, 0.0])
 
 
+errors = jax.jit(jax.vmap(attitude_error))
+error = jax.jit(attitude_error)
+
+
 def about(axis, angle):
     """Unit quaternion of a turn by `angle` about a unit vector."""
     return np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * np.asarray(axis)])
@@ -28,8 +32,7 @@ def about(axis, angle):
 @pytest.mark.parametrize(("sign_target", "sign_actual"), [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
 def test_sign_of_either_quaternion_does_not_change_the_error(sign_target, sign_actual):
     targets, actuals = QUATERNIONS[::-1], QUATERNIONS
-    plain = jax.vmap(attitude_error)(targets, actuals)
-    flipped = jax.vmap(attitude_error)(sign_target * targets, sign_actual * actuals)
+    plain, flipped = errors(targets, actuals), errors(sign_target * targets, sign_actual * actuals)
     np.testing.assert_allclose(flipped, plain, rtol=0, atol=1e-12)
 
 
@@ -41,9 +44,7 @@ def test_quaternion_error_is_the_short_turn_in_body_axes(degrees):
     w0, v0, w1, v1 = base[0], base[1:], turn[0], turn[1:]
     target = np.concatenate([[w0 * w1 - v0 @ v1], w0 * v1 + w1 * v0 + np.cross(v0, v1)])  # base, then the turn
     short = np.radians(degrees if degrees <= 180 else degrees - 360)
-    np.testing.assert_allclose(
-        attitude_error(jnp.asarray(target), jnp.asarray(base)), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14
-    )
+    np.testing.assert_allclose(error(target, base), 2 * np.sin(short / 2) * axis, rtol=0, atol=1e-14)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def test_both_quaternions_of_an_attitude_get_the_same_voltages(commanded):
 def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
     model = hybrid_vehicle(odin(), paper_table3("ideal")).model()
     targets, actuals = RNG.uniform(-20, 20, (2, 200, 6))
-    error = np.asarray(jax.vmap(model.coordinates.difference)(targets, actuals))
+    error = np.asarray(jax.jit(jax.vmap(model.coordinates.difference))(targets, actuals))
     raw = targets - actuals
     np.testing.assert_array_equal(error[:, :3], raw[:, :3])
     assert np.abs(error[:, 3:]).max() <= np.pi + 1e-14
@@ -83,6 +84,7 @@ def test_euler_error_differs_by_whole_turns_and_is_at_most_half_a_turn():
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
 
 
+@pytest.mark.full
 def test_law_turns_the_short_way_across_the_border_of_the_euler_angles(commanded):
     """From any yaw: 20 deg to port across the border, the same wish a turn lower gets the same voltages."""
     yaws = np.linspace(-np.pi, np.pi, STARTS)

@@ -39,6 +39,11 @@ def terms(peer):
     plant = hybrid_vehicle(peer.vehicle, paper_table3("shaft"))
     # The file's accelerations were computed with its own thruster matrix, rounded to 8 decimals.
     plant = eqx.tree_at(lambda p: p.thruster_matrix, plant, jnp.asarray(peer.file["thruster_matrix"]))
+    return _terms(plant, peer.cases["eta"], peer.cases["nu"], peer.cases["thrust"])
+
+
+@eqx.filter_jit
+def _terms(plant, *cases):
     motor = plant.thruster.motor
 
     def evaluate(eta, nu, thrust):
@@ -54,7 +59,7 @@ def terms(peer):
             "nu_dot": plant.dynamics(jnp.zeros(()), x, jnp.zeros(8), Load(jnp.zeros(6), jnp.zeros(6))).nu,
         }
 
-    return jax.jit(jax.vmap(evaluate))(peer.cases["eta"], peer.cases["nu"], peer.cases["thrust"])
+    return jax.vmap(evaluate)(*cases)
 
 
 def test_there_are_fifty_states(peer):

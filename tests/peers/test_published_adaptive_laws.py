@@ -137,7 +137,7 @@ def unknown_mass(reference, mass=0.0):
         return [v, mass * asked / MASS, -RATE * asked * (rate + FILTER * e)]
 
     grid = jnp.linspace(0, 3, 3001)
-    table = CubicSpline(grid, np.concatenate(jax.vmap(reference.at)(grid), axis=1))
+    table = CubicSpline(grid, np.concatenate(jax.jit(jax.vmap(lambda t: reference.at(t)))(grid), axis=1))
     time, start = np.linspace(0, 3, 301), table(0.0)[0]
     found = solve_ivp(flow, (0, 3), [start, 0.0, mass], t_eval=time, rtol=1e-8, atol=1e-10)
     return found.y[2], found.y[0] - table(time)[:, 0]

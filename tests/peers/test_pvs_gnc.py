@@ -111,5 +111,6 @@ def test_cross_flow_drag_tends_to_its_integral():
     np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 4.0, rtol=1e-6)
 
 
+@pytest.mark.full
 def test_lift_and_drag():
     close(lift_and_drag(0.19, 0.2128, 0.05596, 0.1, 2.0), golden("forceLiftDrag("))

@@ -7,6 +7,7 @@ from the manufacturer's public performance data (T200, September 2019; T500, plo
 import importlib.util
 from pathlib import Path
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -30,12 +31,19 @@ def table(name):
     return np.loadtxt(DATA / f"{name}_table.csv", delimiter=",", skiprows=1, unpack=True)
 
 
+@eqx.filter_jit
+def steady(thruster, volts):
+    """Speed, electrical power and thrust."""
+    speed = thruster.motor.steady_speed(thruster.terminal(volts))
+    return speed, thruster.electrical_power((), volts), thruster.thrust((), volts)
+
+
 def misfit(thruster, name):
     """Rms over all rows of speed (rad/s), current from the supply (A) and thrust (N); and the rows."""
     supply, pwm, *measured = table(name)
     volts = jnp.asarray((pwm - 1500) / 400 * supply)
-    speed = thruster.motor.steady_speed(thruster.terminal(volts))
-    modelled = speed, thruster.electrical_power((), volts) / supply, thruster.thrust((), volts)
+    speed, power, thrust = map(np.asarray, steady(thruster, volts))
+    modelled = speed, power / supply, thrust
     rms = [float(np.sqrt(np.mean((m - t) ** 2))) for m, t in zip(modelled, measured, strict=True)]
     return rms, len(pwm)
 
@@ -73,7 +81,7 @@ def test_dead_band_in_pulses_and_direction(part, name):
     thruster, (supply, pwm, _, _, thrust) = part("static"), table(name)
     for bus in np.unique(supply):
         rows = supply == bus
-        found = np.asarray(thruster.thrust((), jnp.asarray((pwm[rows] - 1500) / 400 * bus)))
+        found = np.asarray(steady(thruster, (pwm[rows] - 1500) / 400 * bus)[2])
         bands = [pwm[rows][of == 0.0] for of in (found, thrust[rows])]
         assert abs(bands[0].min() - bands[1].min()) <= 8 and abs(bands[0].max() - bands[1].max()) <= 8, bus
         rising = np.diff(found[np.argsort(pwm[rows])])

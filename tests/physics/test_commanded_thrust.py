@@ -31,11 +31,15 @@ LAWS = {"robust": lambda model, **how: rcaf(model, preset="robust", **how), "pid
 
 def settle(thruster, command, duration, start=None, dt=1e-3):
     """State a time after a command, from rest or from where it starts."""
-    command = jnp.asarray(command)
+    command = np.asarray(command)
+    start = thruster.initial_state(command.size) if start is None else start
+    return _settle(thruster, command, start, np.asarray(dt), np.asarray(round(duration / dt)))
+
+
+@eqx.filter_jit
+def _settle(thruster, command, start, dt, steps):
     step = lambda _, state: rk4(lambda t, x: thruster.dynamics(x, command), 0.0, state, dt)
-    return jax.jit(lambda state: jax.lax.fori_loop(0, round(duration / dt), step, state))(
-        thruster.initial_state(command.size) if start is None else start
-    )
+    return jax.lax.fori_loop(0, steps, step, start)
 
 
 def test_step_response():
@@ -57,14 +61,21 @@ def test_rate_limit():
 
 def test_each_side_is_clipped_at_its_own_limit():
     plant = hybrid_vehicle(odin(), ONE_TO_FOUR)
-    asked = jnp.array([-50.0, -12.0, -11.0, 0.0, 12.0, 29.0, 30.0, 50.0])
+    asked = np.array([-50.0, -12.0, -11.0, 0.0, 12.0, 29.0, 30.0, 50.0])
     x = plant.initial_state()
-    given = plant.admissible(x, asked)
+
+    @jax.jit
+    def evaluate(asked):
+        given = plant.admissible(x, asked)
+        return given, plant.effort(x, given)
+
+    given, effort = jax.tree.map(np.asarray, evaluate(asked))
     np.testing.assert_array_equal(given, [-12.0, -12.0, -11.0, 0.0, 12.0, 29.0, 30.0, 30.0])
-    np.testing.assert_array_equal(plant.effort(x, given).saturated, [1, 1, 0, 0, 0, 0, 1, 1])
-    np.testing.assert_allclose(plant.effort(x, given).power, 7.6 * np.abs(given))
+    np.testing.assert_array_equal(effort.saturated, [1, 1, 0, 0, 0, 0, 1, 1])
+    np.testing.assert_allclose(effort.power, 7.6 * np.abs(given))
     assert plant.input_unit == "N"
-    assert np.isnan(plant.admissible(x, asked.at[3].set(jnp.nan))[3])
+    asked[3] = np.nan
+    assert np.isnan(evaluate(asked)[0][3])
 
 
 class Asking(AbstractController):
@@ -130,15 +141,21 @@ THRUSTERS = {
 def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     thruster, limits = THRUSTERS[name]
     drive = thruster.actuator_model(3, False)
-    still, natural = drive.init(), 10.0  # 1/s: no faster than by itself
-    np.testing.assert_allclose(drive.range(still, natural), np.repeat(np.array(limits)[:, None], 3, 1))
-    np.testing.assert_allclose(drive.range(still, 2 * natural), np.repeat(np.array(limits)[:, None], 3, 1) / 2)
-    assert float(drive.time_constant()) == 0.1
-    newtons = np.array([-5.0, 0.5, 11.0])
-    commands = drive.command(still, newtons, natural)
+    natural, newtons = np.asarray(10.0), np.array([-5.0, 0.5, 11.0])  # 1/s: no faster than by itself
+
+    @jax.jit
+    def evaluate(rate):
+        still = drive.init()
+        commands = drive.command(still, newtons, natural)
+        back = drive.quasi_static().force((), commands), drive.target_of(still, commands, natural)
+        return jnp.stack(drive.range(still, rate)), commands, back, drive.time_constant()
+
+    within, commands, back, time_constant = jax.tree.map(np.asarray, evaluate(natural))
+    np.testing.assert_allclose(within, np.repeat(np.array(limits)[:, None], 3, 1))
+    np.testing.assert_allclose(evaluate(2 * natural)[0], np.repeat(np.array(limits)[:, None], 3, 1) / 2)
+    assert time_constant == 0.1
     np.testing.assert_allclose(settle(thruster, commands, 3.0).thrust, newtons, rtol=1e-9)
-    np.testing.assert_allclose(drive.quasi_static().force((), commands), newtons, rtol=1e-12)
-    np.testing.assert_allclose(drive.target_of(still, commands, natural), newtons, rtol=1e-12)
+    np.testing.assert_allclose(back, [newtons, newtons], rtol=1e-12)
 
 
 @pytest.mark.full
@@ -147,11 +164,18 @@ def test_a_drive_predicts_the_thrust_behind_its_lag(name):
     """Step by step with the thruster itself; made to follow faster than by itself, it does: exp(-rate t)."""
     thruster, _ = THRUSTERS[name]
     drive, rate, dt = thruster.actuator_model(3, False), 30.0, 0.01
-    wanted, believed, true = jnp.array([-1.0, 0.5, 3.0]), drive.init(), thruster.initial_state(3)
-    for k in range(1, 20):
+    wanted, believed, true = np.array([-1.0, 0.5, 3.0]), drive.init(), thruster.initial_state(3)
+
+    @jax.jit
+    def predict(believed):
         volts = drive.command(believed, wanted, rate)
-        believed, true = drive.advance(believed, volts, dt), settle(thruster, volts, dt, true)
-        np.testing.assert_allclose(drive.force(believed, volts), true.thrust, rtol=1e-6)
+        believed = drive.advance(believed, volts, dt)
+        return volts, believed, drive.force(believed, volts)
+
+    for k in range(1, 20):
+        volts, believed, force = predict(believed)
+        true = settle(thruster, volts, dt, true)
+        np.testing.assert_allclose(force, true.thrust, rtol=1e-6)
         # Held over dt the command does in each step what exp(-dt / tau) leaves of it.
         left = (1 - rate * 0.1 * -np.expm1(-dt / 0.1)) ** k
         np.testing.assert_allclose(true.thrust, wanted * (1 - left), rtol=1e-6)

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -29,10 +30,15 @@ ZERO = jnp.zeros(())
 
 def body_rate(plant, load=None, t=0.0):
     """nu_dot at a state in motion; without the paper's convention on J_dot nu, which is about d."""
+    return np.asarray(_body_rate(plant, load, jnp.asarray(t)))
+
+
+@eqx.filter_jit
+def _body_rate(plant, load, t):
     x = plant.initial_state(POSE, RATES)
     calm = plant.no_load()
-    felt = calm if load is None else load.at(load.realize(jax.random.PRNGKey(7)), jnp.asarray(t), plant.pose(x), calm)
-    return np.asarray(plant.dynamics(ZERO, x, VOLTS, felt).nu)
+    felt = calm if load is None else load.at(load.realize(jax.random.PRNGKey(7)), t, plant.pose(x), calm)
+    return plant.dynamics(ZERO, x, VOLTS, felt).nu
 
 
 def changed(**changes):
@@ -62,21 +68,32 @@ def test_payload_is_a_vehicle_with_that_point_mass_built_in():
     assert carried.jumps(10.0) == (1.0, 2.0)
 
 
+@pytest.mark.full
 def test_two_payloads_are_one_after_the_other():
     halves = Together((payload(1.0, 5.0, (0.1, 0, 0)), payload(1.0, 5.0, (0.1, 0, 0))))
     np.testing.assert_allclose(body_rate(PLANT, halves), body_rate(PLANT, payload(2.0, 10.0, (0.1, 0, 0))), atol=1e-12)
 
 
+@pytest.fixture(scope="module")
+def terms():
+    """Of the equation of motion, by the name of the factor that scales each, N and N m."""
+
+    def evaluate():
+        x = PLANT.initial_state(POSE, RATES)
+        return {
+            "mass": -PLANT.body.coriolis(x.nu),
+            "damping": -PLANT.body.damping(x.nu),
+            "restoring": -PLANT.body.restoring(rotation_from_euler(POSE[3:])[2]),
+            "thrust": PLANT.thruster_matrix @ THRUSTER.thrust(x.thrusters, VOLTS),
+        }
+
+    return {name: np.asarray(term) for name, term in jax.jit(evaluate)().items()}
+
+
 @pytest.mark.parametrize("name", ["mass", "damping", "restoring", "thrust"])
-def test_factor_scales_its_term_of_the_equation_of_motion(name):
+def test_factor_scales_its_term_of_the_equation_of_motion(name, terms):
     factors = {"mass": 1.0, "damping": 1.0, "restoring": 1.0, "thrust": 1.0} | {name: 1.3}
-    body, x = PLANT.body, PLANT.initial_state(POSE, RATES)
-    terms = {
-        "mass": -body.coriolis(x.nu),
-        "damping": -body.damping(x.nu),
-        "restoring": -body.restoring(rotation_from_euler(POSE[3:])[2]),
-        "thrust": PLANT.thruster_matrix @ THRUSTER.thrust(x.thrusters, VOLTS),
-    }
+    body = PLANT.body
     # Remark 2: on this fidelity J_dot nu belongs to what is prescribed, whatever the body is.
     prescribed = body_rate(PLANT) - np.linalg.solve(body.mass_matrix, sum(terms.values()))
     force = sum(factors[key] * term for key, term in terms.items())
@@ -87,9 +104,8 @@ def test_factor_scales_its_term_of_the_equation_of_motion(name):
 
 @pytest.mark.full
 def test_factors_are_drawn_from_their_ranges():
-    drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).realize)(
-        jax.random.split(jax.random.PRNGKey(1), 2000)
-    )
+    keys = jax.random.split(jax.random.PRNGKey(1), 2000)
+    drawn = jax.jit(jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).realize))(keys)
     for values, (low, high) in ((drawn.mass, (0.9, 1.1)), (drawn.damping, (0.5, 2.0))):
         assert low <= float(values.min()) and float(values.max()) <= high
         assert float(values.mean()) == pytest.approx((low + high) / 2, abs=0.03 * (high - low))
@@ -98,7 +114,12 @@ def test_factors_are_drawn_from_their_ranges():
 
 def pull(cable, position, angles=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0)):
     place = Pose(jnp.asarray(position), rotation_from_euler(jnp.asarray(angles)), jnp.asarray(velocity))
-    return -np.asarray(cable.at((), ZERO, place, PLANT.no_load()).wrench)
+    return -np.asarray(_wrench(cable, place))
+
+
+@eqx.filter_jit
+def _wrench(cable, place):
+    return cable.at((), ZERO, place, PLANT.no_load()).wrench
 
 
 def test_tether():

@@ -32,9 +32,14 @@ def alike(one, other, tolerance=1e-12):
 
 
 def test_outputs_and_pose_lead_to_each_other():
+
+    @jax.jit
+    def both(eta, rate):
+        y = measurement_of_outputs(eta, rate)
+        return measurement_of_pose(y.position[:3], y.body.attitude, y.body.nu), y
+
     for _ in range(20):
-        y = measurement_of_outputs(*somewhere())
-        alike(measurement_of_pose(y.position[:3], y.body.attitude, y.body.nu), y, 1e-10)
+        alike(*both(*somewhere()), 1e-10)
 
 
 def test_turning_is_the_derivative_of_the_attitude():
@@ -45,35 +50,39 @@ def test_turning_is_the_derivative_of_the_attitude():
 
     @jax.jit
     def both(t):
-        by_quaternion = jax.jacfwd(lambda t: quaternion_from_euler(way(t)))(t)
-        return found(t), by_quaternion, jax.jacfwd(lambda t: found(t)[1])(t)
+        attitude, omega, turning = found(t)
+        same, by_quaternion = jax.jvp(lambda t: quaternion_from_euler(way(t)), (t,), (jnp.ones_like(t),))
+        omega_rate = jax.jacfwd(lambda t: found(t)[1])(t)
+        return (attitude, omega, turning), same, quaternion_rate(attitude, omega), by_quaternion, omega_rate
 
     for t in (0.0, 0.3, float(np.pi / 2 - 1.1), 0.9):
-        (attitude, omega, turning), by_quaternion, omega_rate = both(t)
-        np.testing.assert_allclose(attitude, quaternion_from_euler(way(t)), atol=1e-15)
-        np.testing.assert_allclose(quaternion_rate(attitude, omega), by_quaternion, atol=1e-12)
+        (attitude, _, turning), same, rate_of_attitude, by_quaternion, omega_rate = both(t)
+        np.testing.assert_allclose(attitude, same, atol=1e-15)
+        np.testing.assert_allclose(rate_of_attitude, by_quaternion, atol=1e-12)
         np.testing.assert_allclose(turning, omega_rate, atol=1e-12)
 
 
 @pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2])
 def test_body_axes_know_no_vertical(pitch):
     """Nose up or down, a vehicle that is on target has no error, and a lead of 1 m world is 1 m in its own axes."""
-    attitude, nu = quaternion_from_euler(jnp.array([0.2, pitch, -0.7])), jnp.asarray(RNG.normal(size=6))
-    y = measurement_of_pose(jnp.array([1.0, 2.0, 3.0]), attitude, nu)
-    lead = jnp.array([0.0, 1.0, 0.0])
-    world = rotation_from_quaternion(attitude) @ nu[:3]
-    still = jnp.zeros(3)
-    r = Target(
-        jnp.concatenate([y.position[:3] + lead, jnp.array([0.2, pitch, -0.7])]),
-        jnp.concatenate([world, still]),
-        jnp.zeros(6),
-    )
-    error, rate, acceleration = BodyCoordinates().tracking_error(y, r)
-    np.testing.assert_allclose(error[:3], rotation_from_quaternion(attitude).T @ lead, atol=1e-14)
+    nu, lead = RNG.normal(size=6), np.array([0.0, 1.0, 0.0])
+    rotation, (error, rate, acceleration) = jax.tree.map(np.asarray, on_target(pitch, nu, lead))
+    np.testing.assert_allclose(error[:3], rotation.T @ lead, atol=1e-14)
     np.testing.assert_allclose(error[3:], 0, atol=1e-14)
-    np.testing.assert_allclose(rate, jnp.concatenate([still, -nu[3:]]), atol=1e-14)
+    np.testing.assert_allclose(rate, np.concatenate([np.zeros(3), -nu[3:]]), atol=1e-14)
     np.testing.assert_allclose(acceleration[:3], -np.cross(nu[3:], nu[:3]), atol=1e-13)
     assert np.isfinite(acceleration).all()
+
+
+@jax.jit
+def on_target(pitch, nu, lead):
+    """Rotation of a vehicle that moves as its target does, which is ahead, and its tracking error."""
+    angles = jnp.stack([jnp.asarray(0.2), pitch, jnp.asarray(-0.7)])
+    attitude = quaternion_from_euler(angles)
+    y, rotation = measurement_of_pose(jnp.array([1.0, 2.0, 3.0]), attitude, nu), rotation_from_quaternion(attitude)
+    velocity = jnp.concatenate([rotation @ nu[:3], jnp.zeros(3)])
+    r = Target(jnp.concatenate([y.position[:3] + lead, angles]), velocity, jnp.zeros(6))
+    return rotation, BodyCoordinates().tracking_error(y, r)
 
 
 def test_noise_on_outputs_reaches_the_pose():

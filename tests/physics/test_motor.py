@@ -1,5 +1,6 @@
 """I6, I7: where a motor's power goes, what it does at rest, and the misprint in k_2."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,7 +26,7 @@ CONSTANTS = dict(
     torque_coefficient=3.45e-6,
 )
 RNG = np.random.default_rng(6)
-SPEED, CURRENT, VOLTS = (jnp.asarray(scale) * RNG.normal(size=(200, 8)) for scale in (40.0, 10.0, 15.0))
+SPEED, CURRENT, VOLTS = (scale * RNG.normal(size=(200, 8)) for scale in (40.0, 10.0, 15.0))
 
 
 def test_table_3_gains():
@@ -63,7 +64,9 @@ def test_power_of_the_plant_is_volts_times_amperes():
     plant = hybrid_vehicle(odin(), PAPER)
     x = plant.initial_state()
     x = x._replace(thrusters=x.thrusters._replace(current=CURRENT[0]))
-    np.testing.assert_allclose(plant.effort(x, VOLTS[0]).power, VOLTS[0] * CURRENT[0], rtol=1e-15)
+    np.testing.assert_allclose(
+        jax.jit(lambda x, volts: plant.effort(x, volts).power)(x, VOLTS[0]), VOLTS[0] * CURRENT[0], rtol=1e-15
+    )
 
 
 @settings(max_examples=50, deadline=None)
@@ -80,12 +83,15 @@ def test_advice_names_the_ratio_and_the_worst_of_several_motors():
     assert "0.5" in mixed.advice()[0]
 
 
-voltages = jnp.concatenate([-jnp.logspace(-6, 3, 100)[::-1], jnp.zeros(1), jnp.logspace(-6, 3, 100)])
+voltages = np.concatenate([-np.logspace(-6, 3, 100)[::-1], np.zeros(1), np.logspace(-6, 3, 100)])
+steady_speed, steady_current, thrust = map(
+    eqx.filter_jit, (DCMotor.steady_speed, DCMotor.steady_current, DCMotor.thrust)
+)
 
 
 @pytest.mark.parametrize("motor", [MOTOR, DCMotor(**CONSTANTS)], ids=["paper", "consistent"])
 def test_steady_speed_solves_its_equation_is_odd_and_rises_with_voltage(motor):
-    speed = np.asarray(motor.steady_speed(voltages))
+    speed = np.asarray(steady_speed(motor, voltages))
     quadratic = float(motor.k3 * motor.torque_coefficient)
     residual = quadratic * speed * np.abs(speed) + float(motor.k2) * speed - voltages
     assert (np.abs(residual) <= 1e-9 * np.maximum(np.abs(voltages), 1e-6)).all()
@@ -93,31 +99,36 @@ def test_steady_speed_solves_its_equation_is_odd_and_rises_with_voltage(motor):
     assert (np.diff(speed) > 0).all()
     for volts in (0.01, 3.0, 24.0):
         by_search = brentq(lambda w, volts=volts: quadratic * w * w + float(motor.k2) * w - volts, 0, 1e5, xtol=1e-13)
-        np.testing.assert_allclose(motor.steady_speed(jnp.asarray(volts)), by_search, rtol=1e-9)
+        np.testing.assert_allclose(steady_speed(motor, np.asarray(volts)), by_search, rtol=1e-9)
 
 
 def test_steady_current_is_what_ohms_law_leaves():
     """V = R I + k_e Om at rest: Eqs. (8) and (9) agree on the steady state."""
-    speed = MOTOR.steady_speed(voltages)
-    left = (voltages - MOTOR.back_emf_constant * speed) / MOTOR.resistance
-    np.testing.assert_allclose(MOTOR.steady_current(speed), left, rtol=1e-9)
+    speed = np.asarray(steady_speed(MOTOR, voltages))
+    left = (voltages - np.asarray(MOTOR.back_emf_constant) * speed) / np.asarray(MOTOR.resistance)
+    np.testing.assert_allclose(steady_current(MOTOR, speed), left, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("volts", "newtons"), [(5, 45), (10, 108.8), (12, 136), (24, 306)])
 def test_steady_thrust_of_table_3(volts, newtons):
-    found = MOTOR.thrust(MOTOR.steady_speed(jnp.asarray(float(volts))))
+    found = thrust(MOTOR, steady_speed(MOTOR, np.asarray(float(volts))))
     np.testing.assert_allclose(found, newtons, rtol=0, atol=0.05 if volts == 10 else 0.5)
 
 
 def test_misprint_in_k2_would_give_a_third_more_thrust():
     """With k_e in place of k_f, as printed after Eq. (13), 10 V would give 148.3 N; the motor gives 108.8 N."""
-    printed = MOTOR.k3 * (MOTOR.torque_constant * MOTOR.back_emf_constant / MOTOR.resistance + MOTOR.back_emf_constant)
+    k_t, k_e, resistance = map(float, (MOTOR.torque_constant, MOTOR.back_emf_constant, MOTOR.resistance))
+    printed = float(MOTOR.k3) * (k_t * k_e / resistance + k_e)
     np.testing.assert_allclose(printed, 0.02112, rtol=3e-3)
     quadratic = float(MOTOR.k3 * MOTOR.torque_coefficient)
-    speed = (-float(printed) + np.sqrt(float(printed) ** 2 + 40 * quadratic)) / (2 * quadratic)
-    np.testing.assert_allclose(MOTOR.thrust(jnp.asarray(speed)), 148.3, rtol=0, atol=0.05)
-    state = PAPER.initial_state(1)._replace(
-        speed=MOTOR.steady_speed(jnp.array([10.0])), current=MOTOR.steady_current(MOTOR.steady_speed(jnp.array([10.0])))
-    )
-    rates = PAPER.dynamics(state, jnp.array([10.0]))
+    speed = (-printed + np.sqrt(printed**2 + 40 * quadratic)) / (2 * quadratic)
+    np.testing.assert_allclose(thrust(MOTOR, np.asarray(speed)), 148.3, rtol=0, atol=0.05)
+
+    @jax.jit
+    def rates_at_rest(volts):
+        speed = MOTOR.steady_speed(volts)
+        state = PAPER.initial_state(1)._replace(speed=speed, current=MOTOR.steady_current(speed))
+        return PAPER.dynamics(state, volts)
+
+    rates = rates_at_rest(np.array([10.0]))
     np.testing.assert_allclose([rates.speed[0], rates.current[0]], 0.0, atol=1e-9)

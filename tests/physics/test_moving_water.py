@@ -31,6 +31,7 @@ def at(position):
     return Pose(jnp.asarray(position), rotation_from_euler(POSE[3:]), jnp.zeros(3))
 
 
+@eqx.filter_jit
 def fly(disturbance, velocity):
     """Outputs after five seconds."""
     path = disturbance.realize(jax.random.PRNGKey(0))
@@ -41,9 +42,8 @@ def fly(disturbance, velocity):
     def step(k, x):
         return rk4(rate, k.astype(float) * STEP, x, jnp.asarray(STEP))
 
-    x = jax.jit(lambda x: jax.lax.fori_loop(0, TICKS, step, x))(PLANT.initial_state(POSE, velocity))
-    y = PLANT.output(0.0, x)
-    return np.concatenate([y.position, y.velocity])
+    y = PLANT.output(0.0, jax.lax.fori_loop(0, TICKS, step, PLANT.initial_state(POSE, velocity)))
+    return jnp.concatenate([y.position, y.velocity])
 
 
 @pytest.mark.full
@@ -69,8 +69,9 @@ def test_einstein():
     """A neutral body with CB on CG, at rest in the water, goes where accelerating water takes it."""
     neutral = eqx.tree_at(lambda p: (p.body.buoyancy, p.body.r_b), PLANT, (PLANT.body.weight, PLANT.body.r_g))
     push = [0.3, -0.2, 0.1]
-    x = neutral.initial_state(POSE, jnp.zeros(6))
-    rate = neutral.acceleration(jnp.zeros(()), x, jnp.zeros(8), accelerating(push))
+    rate = jax.jit(lambda plant, x, load: plant.acceleration(0.0, x, jnp.zeros(8), load))(
+        neutral, neutral.initial_state(POSE, jnp.zeros(6)), accelerating(push)
+    )
     np.testing.assert_allclose(rate, [*push, 0, 0, 0], rtol=0, atol=1e-12)
 
 
@@ -78,8 +79,8 @@ def test_morison():
     """Held at rest in accelerating water: the displaced water's inertia at CB and the added mass, as a wrench."""
     body, push = odin(), np.array([0.5, -0.3, 0.2])
     x = PLANT.initial_state(jnp.zeros(6), jnp.zeros(6))
-    rate = PLANT.dynamics(jnp.zeros(()), x, jnp.zeros(8), accelerating(push)).nu
-    still = PLANT.dynamics(jnp.zeros(()), x, jnp.zeros(8), CALM).nu
+    under = lambda load: PLANT.dynamics(jnp.zeros(()), x, jnp.zeros(8), load).nu
+    rate, still = map(np.asarray, jax.jit(lambda load: (under(load), under(CALM)))(accelerating(push)))
     displaced = float(body.buoyancy / (body.weight / body.mass)) * push
     expected = np.concatenate([displaced, np.cross(body.r_b, displaced)])
     expected += np.asarray(body.added_mass) @ np.concatenate([push, np.zeros(3)])
@@ -93,10 +94,10 @@ def water_of(disturbance, key, t, position):
 def test_wave_acceleration_is_the_rate_of_the_velocity():
     sea = waves(spreading=0.3)
     key, position = jax.random.PRNGKey(5), jnp.array([3.0, -2.0, 1.0])
-    water = jax.jit(lambda t: water_of(sea, key, t, position))
-    slope = jax.jit(jax.jacfwd(lambda t: water(t).velocity))
+    water = lambda t: water_of(sea, key, t, position)
+    both = jax.jit(lambda t: (water(t).acceleration, jax.jacfwd(lambda t: water(t).velocity)(t)))
     for t in (0.0, 7.3, 100.0):
-        np.testing.assert_allclose(water(t).acceleration, slope(t), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(*both(t), rtol=0, atol=1e-12)
 
 
 def test_waves_are_incompressible_and_free_of_rotation():
@@ -107,15 +108,19 @@ def test_waves_are_incompressible_and_free_of_rotation():
     np.testing.assert_allclose(gradient, gradient.T, rtol=0, atol=1e-12)
 
 
+@eqx.filter_jit
+def velocities(sea, keys, times):
+    return jax.vmap(lambda k: jax.vmap(lambda t: water_of(sea, k, t, jnp.zeros(3)).velocity)(times))(keys)
+
+
 @pytest.mark.parametrize("depth", [3.0, pytest.param(0.0, marks=pytest.mark.full)])
 def test_variance_of_orbital_velocity(depth):
     """Over 400 seas: the integral of omega^2 S(omega) e^(-2 k z), S scaled to (H_s / 4)^2; at the surface its H_s."""
     sea = waves(height=0.5, period=5.0, depth=depth)
     keys = jax.random.split(jax.random.PRNGKey(2), 400)
-    times = jnp.linspace(0.0, 50.0, 20)
-    velocity = jax.jit(jax.vmap(lambda k: jax.vmap(lambda t: water_of(sea, k, t, jnp.zeros(3)).velocity)(times)))(keys)
+    velocity = velocities(sea, keys, np.linspace(0.0, 50.0, 20))
     omega = np.linspace(0.4, 8.0, 20_000) * 2 * np.pi / 5
-    energy = np.array(spectrum(jnp.asarray(omega), 5.0, 3.3))
+    energy = np.array(jax.jit(spectrum)(omega, 5.0, 3.3))
     energy *= (0.5 / 4) ** 2 / np.trapezoid(energy, omega)
     expected = np.trapezoid(omega**2 * energy * np.exp(-2 * omega**2 / 9.81 * depth), omega)
     found = np.asarray(velocity).var(axis=(0, 1))
@@ -149,17 +154,27 @@ def test_wandering_current_is_its_samples_and_linear_between():
     assert process.jumps(1.2) == (0.5, 1.0)
 
 
+@jax.jit
+def sheared(position):
+    return water_of(sheared_current(), jax.random.PRNGKey(0), 0.0, position)
+
+
 @pytest.mark.parametrize(("down", "north"), [(-1.0, 0.8), (0.0, 0.8), (10.0, 0.45), (20.0, 0.1), (50.0, 0.1)])
 def test_sheared_current(down, north):
-    water = water_of(sheared_current(), jax.random.PRNGKey(0), 0.0, [0.0, 0.0, down])
+    water = sheared(np.array([0.0, 0.0, down]))
     np.testing.assert_allclose(water.velocity, [north, 0, 0], rtol=0, atol=1e-12)
 
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
-    path = eqx.filter_jit(two.realize)(jax.random.PRNGKey(0))
+
+    @jax.jit
+    def draw(key):
+        path = two.realize(key)
+        return path, two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
+
+    path, water = jax.tree.map(np.asarray, draw(jax.random.PRNGKey(0)))
     assert np.abs(path[0] - path[1]).max() > 0.01
-    water = two.at(path, jnp.asarray(3.0), at(jnp.zeros(3)), CALM).water
     np.testing.assert_allclose(water.velocity, np.array([0.6, 0.2, 0.0]) + path[0][6] + path[1][6], rtol=0, atol=1e-12)
 
 

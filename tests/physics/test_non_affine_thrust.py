@@ -39,12 +39,13 @@ def test_static_thrust_is_the_inverse_of_inflow():
     """On a grid of thrusts and speeds, both directions of each, zero included; and odd: mirrored, it is mirrored."""
     grid = np.meshgrid(np.linspace(-30, 30, 121), np.linspace(-1.5, 1.5, 61))
     thrust, speed = (axis.ravel() for axis in grid)
-    static = static_thrust_for(jnp.asarray(thrust), jnp.asarray(LOSS), jnp.asarray(speed))
-    np.testing.assert_allclose(with_inflow(static, jnp.asarray(LOSS), jnp.asarray(speed)), thrust, atol=1e-12)
-    mirrored = static_thrust_for(-jnp.asarray(thrust), jnp.asarray(LOSS), -jnp.asarray(speed))
+    inverse = jax.jit(static_thrust_for)
+    static = np.asarray(inverse(thrust, LOSS, speed))
+    np.testing.assert_allclose(jax.jit(with_inflow)(static, LOSS, speed), thrust, atol=1e-12)
+    mirrored = np.asarray(inverse(-thrust, LOSS, -speed))
     off_the_jump = np.abs(4 * thrust + (LOSS * speed) * np.abs(LOSS * speed)) > 1e-9
-    np.testing.assert_allclose(np.asarray(mirrored)[off_the_jump], -np.asarray(static)[off_the_jump], atol=1e-12)
-    np.testing.assert_allclose(static_thrust_for(jnp.asarray(thrust), jnp.asarray(LOSS), jnp.zeros(())), thrust)
+    np.testing.assert_allclose(mirrored[off_the_jump], -static[off_the_jump], atol=1e-12)
+    np.testing.assert_allclose(inverse(thrust, LOSS, np.zeros(thrust.size)), thrust)
 
 
 @pytest.mark.full
@@ -54,7 +55,7 @@ def test_inverse_jumps_once_and_not_at_zero_thrust(speed):
     c = LOSS * speed
     edge = -c * abs(c) / 4
     thrust = np.linspace(-3, 3, 600_001)
-    static = np.asarray(static_thrust_for(jnp.asarray(thrust), jnp.asarray(LOSS), jnp.asarray(speed)))
+    static = np.asarray(jax.jit(static_thrust_for)(thrust, LOSS, speed))
     steps = np.abs(np.diff(static))
     assert thrust[steps.argmax()] == pytest.approx(edge, abs=2e-5)
     assert steps.max() == pytest.approx((0.25 + (np.sqrt(2) - 1) ** 2 / 4) * c**2, rel=0.02)
@@ -64,7 +65,7 @@ def test_inverse_jumps_once_and_not_at_zero_thrust(speed):
 @pytest.mark.full
 def test_slopes_are_finite_at_rest():
     for function in (with_inflow, static_thrust_for):
-        slopes = jax.grad(lambda t, u, function=function: function(t, jnp.asarray(LOSS), u), (0, 1))(0.0, 0.0)
+        slopes = jax.jit(jax.grad(lambda t, u, of=function: of(t, jnp.asarray(LOSS), u), (0, 1)))(0.0, 0.0)
         assert np.isfinite(slopes).all()
 
 
@@ -87,30 +88,43 @@ THRUSTERS = {
 }
 
 
+QUICK = {("quadratic", None), ("lagging", None), ("T200 static", LOSS)}
+CASES = [(name, loss) for name in THRUSTERS for loss in (None, LOSS)]
+
+
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.full) if name == "axial flow" else name for name in THRUSTERS]
+    ("name", "loss"), [case if case in QUICK else pytest.param(*case, marks=pytest.mark.full) for case in CASES]
 )
-@pytest.mark.parametrize("loss", [None, LOSS])
 def test_solution_gives_the_demanded_acceleration(name, loss):
     """g(x, solve(x, a)) = a for several accelerations in motion; the affine inverse misses them."""
     plant = hybrid_vehicle(bluerov2_heavy(), THRUSTERS[name], ledger=False, inflow_loss=loss)
     dynamics = plant.model(affine=False).dynamics
-    for acceleration in jnp.asarray(np.random.default_rng(4).normal(size=(5, 6))):
-        u = input_for(dynamics, MOVING, acceleration)
-        np.testing.assert_allclose(forced_acceleration(dynamics, MOVING, u), acceleration, atol=1e-9)
-        affine = dynamics.invert(MOVING, acceleration)
-        assert np.abs(forced_acceleration(dynamics, MOVING, affine) - acceleration).max() > 0.05
+
+    def given(acceleration):
+        u, affine = input_for(dynamics, MOVING, acceleration), dynamics.invert(MOVING, acceleration)
+        return forced_acceleration(dynamics, MOVING, u), forced_acceleration(dynamics, MOVING, affine)
+
+    accelerations = np.random.default_rng(4).normal(size=(5, 6))
+    found, missing = jax.jit(jax.vmap(given))(accelerations)
+    np.testing.assert_allclose(found, accelerations, atol=1e-9)
+    assert (np.abs(missing - accelerations).max(1) > 0.05).all()
 
 
-@pytest.mark.parametrize("loss", [None, LOSS])
+@pytest.mark.parametrize("loss", [pytest.param(None, marks=pytest.mark.full), LOSS])
 def test_model_is_the_plant_in_steady_state(loss):
     """F + g(x, V) of the model = x_ddot of the plant, fidelity `static`, J_dot nu aside."""
     plant = hybrid_vehicle(bluerov2_heavy(), t200("static"), inflow_loss=loss)
     x = plant.initial_state(MOVING.position, MOVING.velocity)
-    y, u = plant.output(0.0, x), jnp.asarray([3.0, -4.0, 5.0, -6.0, 2.5, 7.0, -2.0, 0.5])
     dynamics = plant.model(affine=False).dynamics
-    found = dynamics.drift(y) + forced_acceleration(dynamics, y, u)
-    np.testing.assert_allclose(found, plant.acceleration(0.0, x, u, plant.no_load()), atol=1e-10)
+
+    @jax.jit
+    def both(x, u):
+        y = plant.output(0.0, x)
+        found = dynamics.drift(y) + forced_acceleration(dynamics, y, u)
+        return found, plant.acceleration(0.0, x, u, plant.no_load())
+
+    found, expected = both(x, np.asarray([3.0, -4.0, 5.0, -6.0, 2.5, 7.0, -2.0, 0.5]))
+    np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
 @pytest.mark.full
@@ -121,9 +135,14 @@ def test_linear_thrust_makes_both_models_one():
     found = []
     for affine in (True, False):
         law = rcaf(plant.model(affine=affine))
-        z = law.advance(law.init(MOVING, r), MOVING, r, jnp.arange(8.0), jnp.asarray(1e-3))
-        u, signals = law.command(z, MOVING, r)
-        found.append((u, z, signals, known_acceleration(law, z, MOVING, u)))
+
+        @jax.jit
+        def step(u, law=law):
+            z = law.advance(law.init(MOVING, r), MOVING, r, u, jnp.asarray(1e-3))
+            u, signals = law.command(z, MOVING, r)
+            return u, z, signals, known_acceleration(law, z, MOVING, u)
+
+        found.append(step(jnp.arange(8.0)))
     for one, other in zip(*map(jax.tree.leaves, found), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
@@ -140,20 +159,26 @@ def test_bad_options():
 def test_axial_flow_settles_at_the_thrust_of_its_steady_voltage():
     """Integrated until flow and speed rest, forwards and backwards; the thrust of a voltage is the inverse."""
     thruster = axial_flow()
-    thrust = jnp.asarray([-20.0, -6.0, -0.5, 0.2, 4.0, 11.0, 24.0])
-    volts = thruster.steady_voltage(thrust)
-    step = lambda state, _: (rk4(lambda t, x: thruster.dynamics(x, volts), jnp.zeros(()), state, 2e-3), None)
-    state, _ = jax.jit(lambda x: jax.lax.scan(step, x, None, length=30_000))(thruster.initial_state(7))
-    np.testing.assert_allclose(thruster.thrust(state, volts), thrust, rtol=1e-6)
-    np.testing.assert_allclose(thruster.steady_thrust(volts), thrust, rtol=1e-9)
-    inside = jnp.asarray([-0.8, 0.0, 0.85])
-    np.testing.assert_array_equal(thruster.steady_thrust(inside), 0.0)
+    thrust = np.asarray([-20.0, -6.0, -0.5, 0.2, 4.0, 11.0, 24.0])
+
+    @jax.jit
+    def settled(thrust):
+        volts = thruster.steady_voltage(thrust)
+        step = lambda _, x: rk4(lambda t, x: thruster.dynamics(x, volts), jnp.zeros(()), x, 2e-3)
+        state = jax.lax.fori_loop(0, 30_000, step, thruster.initial_state(7))
+        return thruster.thrust(state, volts), thruster.steady_thrust(volts)
+
+    found, steady = settled(thrust)
+    np.testing.assert_allclose(found, thrust, rtol=1e-6)
+    np.testing.assert_allclose(steady, thrust, rtol=1e-9)
+    inside = np.asarray([-0.8, 0.0, 0.85])
+    np.testing.assert_array_equal(jax.jit(lambda volts: thruster.steady_thrust(volts))(inside), 0.0)
 
 
 @pytest.mark.full
 def test_slope_of_the_steady_thrust_of_axial_flow():
     """That of differences, on both sides of the dead zone."""
-    slope = jax.vmap(jax.grad(axial_flow().steady_thrust))(jnp.asarray([-2.5, -1.0, 1.2, 3.0]))
-    at, h = np.asarray([-2.5, -1.0, 1.2, 3.0]), 1e-4
-    curve = lambda volts: np.asarray(axial_flow().steady_thrust(jnp.asarray(volts)))
+    at, h, thruster = np.asarray([-2.5, -1.0, 1.2, 3.0]), 1e-4, axial_flow()
+    curve = jax.jit(lambda volts: thruster.steady_thrust(volts))
+    slope = jax.jit(jax.vmap(jax.grad(lambda volts: thruster.steady_thrust(volts))))(at)
     np.testing.assert_allclose(slope, (curve(at + h) - curve(at - h)) / (2 * h), rtol=1e-5)

@@ -94,11 +94,13 @@ def test_every_plant_converges_at_fourth_order(name):
 def test_pendulum_published_values():
     """Wang's constants: b(0) = 1.46341 1/(kg m), slope 15.7756 1/s^2, so an unstable pole at 3.972 1/s."""
     cart_pole = inverted_pendulum().cart_pole
-    np.testing.assert_allclose(cart_pole.lever(0.0), 1.4634146, rtol=1e-7)
-    slope = jax.grad(lambda angle: cart_pole.drift(Measurement(angle, 0.0)))(0.0)
+    drift = lambda angle, rate: cart_pole.drift(Measurement(angle, rate))
+    evaluate = jax.jit(lambda angle, rate: (cart_pole.lever(angle), drift(angle, rate), jax.grad(drift)(angle, rate)))
+    lever, _, slope = evaluate(0.0, 0.0)
+    np.testing.assert_allclose(lever, 1.4634146, rtol=1e-7)
     np.testing.assert_allclose(slope, 15.7756, rtol=2e-6)
     np.testing.assert_allclose(np.sqrt(slope), 3.972, atol=5e-4)
-    np.testing.assert_allclose(cart_pole.drift(Measurement(0.3, 1.2)), _textbook_drift(0.3, 1.2), rtol=1e-13)
+    np.testing.assert_allclose(evaluate(0.3, 1.2)[1], _textbook_drift(0.3, 1.2), rtol=1e-13)
 
 
 def _textbook_drift(x1, x2, m_c=1.0, m=0.1, half=0.5, g=9.8):
@@ -123,23 +125,30 @@ def test_pendulum_and_cart_keep_their_energy_and_momentum():
     x = plant.initial_state(jnp.array([0.4]), jnp.array([0.5]))._replace(cart_speed=jnp.array([0.2]))
     end = integrate(plant, x, [0.0], 3.0, 1e-3)
     assert abs(end.rate[0] - x.rate[0]) > 0.1
-    np.testing.assert_allclose(pendulum_energy(plant, end), pendulum_energy(plant, x), rtol=1e-9)
+    energy = jax.jit(lambda x: pendulum_energy(plant, x))
+    np.testing.assert_allclose(energy(end), energy(x), rtol=1e-9)
 
 
 @pytest.mark.full
 def test_work_of_the_force_is_the_gain_of_energy():
     plant = inverted_pendulum()
+
+    @jax.jit
+    def evaluate(x, u):
+        rates = plant.dynamics(0.0, x, u, plant.no_load())
+        return jax.jvp(lambda x: pendulum_energy(plant, x), (x,), (rates,))[1], plant.effort(x, u).power[0]
+
     for seed in range(20):
-        x, u = start(plant, seed, scale=1.0), jnp.array([3.0])
-        x = x._replace(cart_speed=jnp.array([0.7]))
-        rate = jax.jvp(lambda x: pendulum_energy(plant, x), (x,), (plant.dynamics(0.0, x, u, plant.no_load()),))[1]
-        np.testing.assert_allclose(rate, plant.effort(x, u).power[0], rtol=1e-12, atol=1e-12)
+        x = start(plant, seed, scale=1.0)._replace(cart_speed=np.array([0.7]))
+        rate, power = evaluate(x, np.array([3.0]))
+        np.testing.assert_allclose(rate, power, rtol=1e-12, atol=1e-12)
 
 
 def test_pendulum_ends_where_its_pole_lies_flat():
     plant = inverted_pendulum()
-    assert plant.status(plant.initial_state(jnp.array([1.5]))) == int(Status.OK)
-    assert plant.status(plant.initial_state(jnp.array([1.57]))) == int(Status.OUT_OF_RANGE)
+    status = jax.jit(lambda position: plant.status(plant.initial_state(position)))
+    assert status(np.array([1.5])) == int(Status.OK)
+    assert status(np.array([1.57])) == int(Status.OUT_OF_RANGE)
 
 
 # -------------------------------------------------------------------------------------------------- levitation
@@ -175,25 +184,22 @@ def test_levitation_meets_the_twelve_measured_points():
     """
     rig = RIGS["balko_rosinova"]()
     millimetres, current, duty, slope = MEASURED.T
-    pull = -jax.vmap(rig.pull)(1e-3 * millimetres[:, None])[:, 0]
+    evaluate = jax.jit(lambda z, squared: (jax.vmap(rig.pull)(z), jax.vmap(rig.duty)(squared)))
+    pull, found = evaluate(1e-3 * millimetres[:, None], np.stack([current, current], 1) ** 2)
+    pull = -np.asarray(pull)[:, 0]
     held = np.sqrt(rig.gravity / pull)
     off = np.abs(held / current - 1)
     assert off.max() < 0.021 and np.median(off) < 0.005, off
-    np.testing.assert_allclose(jax.vmap(rig.duty)(jnp.stack([current, current], 1) ** 2)[:, 0], duty, atol=0.0125)
+    np.testing.assert_allclose(found[:, 0], duty, atol=0.0125)
     np.testing.assert_allclose(2 * rig.mass * pull, slope, rtol=0.039)
     np.testing.assert_allclose(2 * 0.038 * 9.81 / current**2, slope, rtol=3e-4)
     without_half = np.sqrt(rig.gravity / (2 * pull))
     assert np.abs(without_half / current - 1).min() > 0.27, "negative control: the force of the manual"
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("name", BALLS)
-def test_levitation_linearised_at_10_mm_as_published(name):
-    """d(z, v, I1)/dt: 1685, a23, -288.8 and 1271; I0 and U0; poles +-41.04 and -288.8 1/s."""
-    rig, (current, duty, by_current) = RIGS[name](), BALLS[name]
-    z = jnp.array([0.010])
-    i0 = jnp.sqrt(rig.gravity / -rig.pull(z)[0])
-    u0 = (i0 - rig.current_offset) / rig.current_gain
+@eqx.filter_jit
+def linearised(rig):
+    """I0, U0, and the rates and both Jacobians there."""
 
     def field(state, duty):
         """The printed equations with the upper coil only; pull and lag are those of the rig."""
@@ -201,9 +207,18 @@ def test_levitation_linearised_at_10_mm_as_published(name):
         ball = rig.gravity + rig.pull(z[None])[0] * i**2
         return jnp.stack([v, ball, (rig.current_gain * duty + rig.current_offset - i) / rig.lag(z[None])[0]])
 
+    z = jnp.array([0.010])
+    i0 = jnp.sqrt(rig.gravity / -rig.pull(z)[0])
+    u0 = (i0 - rig.current_offset) / rig.current_gain
     state = jnp.stack([z[0], jnp.zeros(()), i0])
-    np.testing.assert_allclose(field(state, u0), 0.0, atol=1e-12)
-    a, b = jax.jacfwd(field)(state, u0), jax.jacfwd(field, argnums=1)(state, u0)
+    return i0, u0, field(state, u0), jax.jacfwd(field)(state, u0), jax.jacfwd(field, argnums=1)(state, u0)
+
+
+@pytest.mark.parametrize("name", BALLS)
+def test_levitation_linearised_at_10_mm_as_published(name):
+    """d(z, v, I1)/dt: 1685, a23, -288.8 and 1271; I0 and U0; poles +-41.04 and -288.8 1/s."""
+    (current, duty, by_current), (i0, u0, rates, a, b) = BALLS[name], map(np.asarray, linearised(RIGS[name]()))
+    np.testing.assert_allclose(rates, 0.0, atol=1e-12)
     digits = np.array([a[1, 0], a[1, 2], a[2, 2], b[2]]) - [1685.0, by_current, -288.8, 1271.0]
     assert (np.abs(digits) <= [0.5, 0.05, 0.05, 0.5]).all(), "half of the last printed digit"
     np.testing.assert_allclose([i0, u0], [current, duty], atol=2.1e-3)
@@ -214,47 +229,58 @@ def test_levitation_plant_moves_by_the_same_equations():
     """Its input is the squared current that is asked for; the duty cycle that gives it stays within [0, 1]."""
     plant = magnetic_levitation()
     rig = plant.rig
-    x = start(plant)._replace(current=jnp.array([1.1, 0.3]))
-    demand = plant.admissible(x, jnp.array([1.5**2, -4.0]))
+
+    @jax.jit
+    def evaluate(x, asked):
+        given = plant.admissible(x, asked)
+        duty = rig.duty(given)
+        rates = plant.dynamics(0.0, x, given, plant.no_load())
+        return given, rates, duty, rig.demand(duty), plant.effort(x, given).saturated
+
+    x = start(plant)._replace(current=np.array([1.1, 0.3]))
+    demand, rates, duty, _, saturated = evaluate(x, np.array([1.5**2, -4.0]))
     np.testing.assert_allclose(demand, [2.25, 0.03884**2], rtol=1e-12)
-    rates = plant.dynamics(0.0, x, demand, plant.no_load())
     gap = 0.1 - 0.054 - 0.012
     upper, lower = (1.7521e-2 / 5.8231e-3 * np.exp(-s / 5.8231e-3) * i**2 / 2 for s, i in ((0.012, 1.1), (gap, 0.3)))
     np.testing.assert_allclose(rates.speed, 9.81 + (lower - upper) / 0.039, rtol=1e-12)
     lag = 1.4142e-4 / 4.5626e-3 * np.exp(-0.012 / 4.5626e-3)
     np.testing.assert_allclose(rates.current[0], (1.5 - 1.1) / lag, rtol=1e-12)
-    most = plant.admissible(x, jnp.array([99.0, 99.0]))
-    np.testing.assert_allclose(rig.demand(rig.duty(most)), most, rtol=1e-12)
-    assert (rig.duty(most) <= 1).all() and (rig.duty(demand) >= 0).all()
-    np.testing.assert_array_equal(plant.effort(x, most).saturated, 1.0)
-    np.testing.assert_array_equal(plant.effort(x, demand).saturated, 0.0)
+    assert (np.asarray(duty) >= 0).all()
+    np.testing.assert_array_equal(saturated, 0.0)
+    most, _, duty, back, saturated = evaluate(x, np.array([99.0, 99.0]))
+    np.testing.assert_allclose(back, most, rtol=1e-12)
+    assert (np.asarray(duty) <= 1).all()
+    np.testing.assert_array_equal(saturated, 1.0)
 
 
 def test_levitation_allocates_to_the_coil_that_pulls_the_wanted_way():
     plant = magnetic_levitation(fidelity="ideal")
-    model = plant.model()
+    dynamics = plant.model().dynamics
+    both = jax.jit(lambda y, wanted: (dynamics.invert(y, wanted), dynamics.gain(y)))
     for wanted in (-3.0, 5.0):
-        y = Measurement(jnp.array([0.012]), jnp.zeros(1))
-        u = model.dynamics.invert(y, jnp.array([wanted]))
+        u, gain = map(np.asarray, both(Measurement(np.array([0.012]), np.zeros(1)), np.array([wanted])))
         assert (u >= 0).all() and (u > 0).sum() == 1
-        np.testing.assert_allclose(model.dynamics.gain(y) @ u, wanted, rtol=1e-13)
+        np.testing.assert_allclose(gain @ u, wanted, rtol=1e-13)
 
 
 # --------------------------------------------------------------------------------------------------------- arm
 
 
-@pytest.mark.full
 def test_arm_mass_and_coriolis_matrices():
     """M symmetric positive definite, inverse right, M_dot - 2 C skew, along the motion."""
     links, rng = two_link_arm().links, np.random.default_rng(2)
+
+    @jax.jit
+    def evaluate(q, rate):
+        mass, change = jax.jvp(links.mass_matrix, (q,), (rate,))
+        return mass, change, links.inverse_mass_matrix(q), links.coriolis_matrix(q, rate)
+
     for _ in range(30):
-        q, rate = jnp.asarray(rng.uniform(-3, 3, 2)), jnp.asarray(rng.normal(size=2))
-        mass, coriolis = np.asarray(links.mass_matrix(q)), np.asarray(links.coriolis_matrix(q, rate))
+        mass, change, inverse, coriolis = map(np.asarray, evaluate(rng.uniform(-3, 3, 2), rng.normal(size=2)))
         np.testing.assert_array_equal(mass, mass.T)
         assert np.linalg.eigvalsh(mass).min() > 0
-        np.testing.assert_allclose(mass @ links.inverse_mass_matrix(q), np.eye(2), atol=1e-13)
-        change = jax.jvp(links.mass_matrix, (q,), (rate,))[1]
-        skew = np.asarray(change) - 2 * coriolis
+        np.testing.assert_allclose(mass @ inverse, np.eye(2), atol=1e-13)
+        skew = change - 2 * coriolis
         np.testing.assert_allclose(skew, -skew.T, atol=1e-14)
 
 
@@ -269,26 +295,32 @@ def test_arm_moves_by_lagrange():
     @jax.jit
     def both(q, rate):
         forces = jax.grad(lagrangian)(q, rate) - jax.jacfwd(by_rate)(q, rate) @ rate
-        return forces, jax.jacfwd(by_rate, argnums=1)(q, rate), jax.grad(energy_of_arm, argnums=1)(links, q, still)
+        mass = jax.jacfwd(by_rate, argnums=1)(q, rate)
+        weights = jax.grad(energy_of_arm, argnums=1)(links, q, still), links.weight(q)
+        return forces, mass, links.drift(Measurement(q, rate)), weights
 
     for _ in range(20):
-        q, rate = jnp.asarray(rng.uniform(-3, 3, 2)), jnp.asarray(rng.normal(size=2))
-        forces, mass, weight = both(q, rate)
-        expected = np.linalg.solve(mass, forces)
-        np.testing.assert_allclose(links.drift(Measurement(q, rate)), expected, rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(weight, links.weight(q), rtol=1e-12, atol=1e-13)
+        forces, mass, drift, weights = both(rng.uniform(-3, 3, 2), rng.normal(size=2))
+        np.testing.assert_allclose(drift, np.linalg.solve(mass, forces), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(*weights, rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.full
 def test_arm_keeps_its_energy_and_gains_the_work_of_its_torques():
     plant = two_link_arm()
     x = start(plant, 5, scale=1.0)
-    energy = lambda x: energy_of_arm(plant.links, x.position, x.velocity)
+
+    @jax.jit
+    def evaluate(x, u):
+        rates = plant.dynamics(0.0, x, u, plant.no_load())
+        energy = jax.jvp(lambda x: energy_of_arm(plant.links, x.position, x.velocity), (x,), (rates,))
+        return *energy, plant.effort(x, u).power.sum()
+
     end = integrate(plant, x, [0.0, 0.0], 5.0, 5e-4)
-    np.testing.assert_allclose(energy(end), energy(x), atol=1e-8 * abs(float(energy(x))) + 1e-8)
-    u = jnp.array([3.0, -1.0])
-    rate = jax.jvp(energy, (x,), (plant.dynamics(0.0, x, u, plant.no_load()),))[1]
-    np.testing.assert_allclose(rate, plant.effort(x, u).power.sum(), rtol=1e-12)
+    u = np.array([3.0, -1.0])
+    energy, rate, power = map(float, evaluate(x, u))
+    np.testing.assert_allclose(evaluate(end, u)[0], energy, atol=1e-8 * abs(energy) + 1e-8)
+    np.testing.assert_allclose(rate, power, rtol=1e-12)
 
 
 # ------------------------------------------------------------------------------------------------ lost directions
@@ -348,15 +380,20 @@ def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect())
     drawn, rng = loop.realize(jax.random.PRNGKey(0)), np.random.default_rng(6)
     basis = np.linalg.svd(np.asarray(UNDER))[0][:, :2]
-    for t in jnp.asarray(rng.uniform(0, 5, 10)):
-        x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
-        z = z._replace(weights=jnp.asarray(rng.normal(size=z.weights.shape)))
-        seen = drawn.decide(t, x, z)
+
+    @jax.jit
+    def residual_at(t, x, z):
+        seen, load = drawn.decide(t, x, z), drawn.load(t, x)
         sample = drawn.signals(t, x, z, seen)
-        acceleration = plant.acceleration(t, x, seen.applied, drawn.load(t, x))
+        acceleration = plant.acceleration(t, x, seen.applied, load)
         k1, k2 = loop.controller.feedback
         left = seen.r.acceleration - acceleration + k1 * sample["error"] + k2 * (seen.r.velocity - sample["velocity"])
-        residual = left - sample["estimate"] + drawn.load(t, x).acceleration + sample["robust_term"]
+        return left - sample["estimate"] + load.acceleration + sample["robust_term"]
+
+    for t in rng.uniform(0, 5, 10):
+        x, z = drawn.start(jnp.asarray(rng.normal(size=3)), jnp.asarray(rng.normal(size=3)))
+        z = z._replace(weights=jnp.asarray(rng.normal(size=z.weights.shape)))
+        residual = np.asarray(residual_at(t, x, z))
         np.testing.assert_allclose(basis.T @ residual, 0.0, atol=1e-9)
         assert np.abs(residual).max() > 1e-3, "negative control: not so across them"
 
@@ -367,10 +404,8 @@ def test_loads_act_as_they_say():
     for plant, mobility in ((ball, np.eye(1) / 0.039), (arm, None)):
         x = start(plant)
         n = len(plant.outputs)
-        push = jnp.arange(1.0, n + 1)
-        u = jnp.zeros(plant.inputs())
-        change = plant.acceleration(0.0, x, u, Load(jnp.zeros(n), push)) - plant.acceleration(
-            0.0, x, u, plant.no_load()
-        )
+        push, u = np.arange(1.0, n + 1), np.zeros(plant.inputs())
+        under = jax.jit(lambda x, u, wrench, plant=plant: plant.acceleration(0.0, x, u, Load(0 * wrench, wrench)))
+        change = np.asarray(under(x, u, push)) - under(x, u, 0 * push)
         mobility = plant.links.inverse_mass_matrix(x.position) if mobility is None else mobility
         np.testing.assert_allclose(change, -mobility @ push, rtol=1e-10, atol=1e-12)

@@ -51,11 +51,13 @@ def pairs(request):
     return jax.jit(jax.vmap(compare))(POSE, VELOCITY, VOLTS, PUSH, WRENCH, NOISE)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["position", "velocity", "acceleration"])
 def test_velocity_and_acceleration_are_time_derivatives_of_the_output(pairs, name):
     assert close(*pairs[name])
 
 
+@pytest.mark.full
 def test_prescribed_acceleration_enters_as_the_benchmark_says(pairs):
     """Added to x_ddot on every fidelity; on `ideal` and `static` it is all of d, J_dot nu included."""
     assert close(*pairs["load"])

@@ -13,7 +13,7 @@ from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
-from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, waypoints
+from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
 from undertow.scenario import factory
 from undertow.scenario.execute import execute
 
@@ -40,12 +40,18 @@ CASES = {
     ),
     "waypoints": (waypoints(SQUARE, 0.5, "along"), SQUARE_TIMES, 40),
     "recorded": (recorded(ROWS), ROWS[:, 0], 8),
+    "sine": (sine([2.0, 0.5], [0.4, 1.1], [1.0, -1.0], [0.3, 0.0]), [], 50),
 }
 # Where the acceleration jumps (s).
 JUMPS = {"lawn mower": MOWER_JOINTS, "waypoints": SQUARE_TIMES[[0, -1]], "recorded": ROWS[[0, -1], 0]}
 
 
-@pytest.fixture(scope="module", params=CASES)
+DEAR = {"lawn mower", "line", "one axis"}  # left out of the quick set, which has closed forms of them
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=pytest.mark.full) if name in DEAR else name for name in CASES]
+)
 def case(request):
     reference, joints, duration = CASES[request.param]
     return request.param, reference, np.asarray(joints, dtype=float), duration
@@ -53,20 +59,29 @@ def case(request):
 
 def at(reference, times):
     """Position, velocity and acceleration, one row per time."""
-    return [np.asarray(v) for v in _at(reference, jnp.asarray(times, dtype=float))]
+    return with_slopes(reference, times)[0]
+
+
+def with_slopes(reference, times):
+    """The same, and their derivatives by automatic differentiation."""
+    times = np.asarray(times, dtype=float)
+    parts = [_at(reference, np.resize(times[i : i + CHUNK], CHUNK)) for i in range(0, max(len(times), 1), CHUNK)]
+    return jax.tree.map(lambda *part: np.concatenate(part)[: len(times)], *parts)
+
+
+CHUNK = 1024  # as many times in every call: one program for each kind of reference
 
 
 @eqx.filter_jit
 def _at(reference, times):
-    return jax.vmap(reference.at)(times)
+    return jax.vmap(lambda t: jax.jvp(lambda t: list(reference.at(t)), (t,), (jnp.ones_like(t),)))(times)
 
 
 def test_derivatives_are_exact(case):
     """By automatic differentiation, and by differences, which owe nothing to the implementation."""
     _, reference, joints, duration = case
     times = np.concatenate([RNG.uniform(-1, duration, 200), joints - 1e-4, joints + 1e-4])
-    _, velocity, acceleration = at(reference, times)
-    slopes = jax.jit(jax.vmap(jax.jacfwd(lambda t: reference.at(t)[:2])))(times)
+    (_, velocity, acceleration), slopes = with_slopes(reference, times)
     np.testing.assert_allclose(slopes[0], velocity, rtol=0, atol=1e-12)
     np.testing.assert_allclose(slopes[1], acceleration, rtol=0, atol=1e-12)
     step = 1e-5
@@ -97,7 +112,14 @@ def test_gradients_are_finite(case):
         assert np.isfinite(leaf).all()
 
 
-@pytest.mark.parametrize("name", [name for name, (_, joints, _) in CASES.items() if len(joints)])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.full) if name in DEAR else name
+        for name, (_, joints, _) in CASES.items()
+        if len(joints)
+    ],
+)
 def test_held_before_and_after(name):
     reference, joints, duration = CASES[name]
     position, velocity, acceleration = at(reference, [-1e3, joints[0], joints[-1], duration, 1e6])
@@ -188,6 +210,15 @@ def test_lissajous_closes():
     np.testing.assert_allclose(velocity[0], [0.2, 0.2, 0, 0, 0, 0], rtol=0, atol=1e-14)
 
 
+def test_sine_in_closed_form():
+    times = np.array([0.0, 1.0, 7.3])
+    position, _, _ = at(CASES["sine"][0], times)
+    np.testing.assert_allclose(position[:, 0], 1 + 2 * np.sin(0.4 * times + 0.3), rtol=1e-14)
+    np.testing.assert_allclose(position[:, 1], -1 + 0.5 * np.sin(1.1 * times), rtol=1e-14)
+    with pytest.raises(BadInput, match="`amplitude` must be one number, or 3 of them"):
+        sine([1.0, 2.0], [1.0, 2.0, 3.0])
+
+
 def test_line_has_its_speed_in_the_middle():
     goal, start = np.array([3.0, 4.0, 1.0]), np.array([0.0, 0.0, 1.0])
     end = 5.0 / 0.5 + 4.0
@@ -199,7 +230,9 @@ def test_line_has_its_speed_in_the_middle():
     np.testing.assert_allclose(np.linalg.norm(at(line(goal, 0.5, start, 4.0), times)[2], axis=1).max(), 1.5 * 0.5 / 4)
 
 
-@pytest.mark.parametrize(("count", "north"), [(1, 10.0), (3, 10.0), (4, 0.0)])
+@pytest.mark.parametrize(
+    ("count", "north"), [(4, 0.0), *(pytest.param(count, 10.0, marks=pytest.mark.full) for count in (1, 3))]
+)
 def test_lawn_mower_covers_its_length(count, north):
     reference = lawn_mower(10.0, 2.0, count, 0.5, 4.0, 3.0)
     length = count * 10 + (count - 1) * np.pi
@@ -214,7 +247,6 @@ def test_lawn_mower_covers_its_length(count, north):
     np.testing.assert_allclose(reached, [-1.0 * (count > 2), 10.0 + (count > 1), 0], rtol=0, atol=1e-6)
 
 
-@pytest.mark.full
 def test_lawn_mower_looks_where_it_goes():
     """Exactly on the legs, nearly where an arc begins; what the acceleration jumps by."""
     reference = lawn_mower(10.0, 2.0, 3, 0.5, 4.0, heading="along")

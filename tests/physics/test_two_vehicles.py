@@ -1,5 +1,6 @@
 """Two vehicles with a link: internal forces cancel, the link gives no energy, and without it each moves alone."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,8 +10,7 @@ from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.numerics.integrators import rk4
-from undertow.numerics.linear_algebra import matvec
-from undertow.numerics.rotations import Kinematics, cross, rotation_from_quaternion
+from undertow.numerics.rotations import Kinematics, rotation_from_quaternion
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.plants.link import Link, Place
 from undertow.plants.two_vehicles import two_vehicles
@@ -31,16 +31,20 @@ def pair(thruster=None, **options):
 
 def random_places(seed):
     rng = np.random.default_rng(seed)
-    place = lambda: Place(
-        jnp.asarray(rng.normal(size=3)),
-        rotation_from_quaternion(_unit(rng.normal(size=4))),
-        jnp.asarray(rng.normal(size=6)),
-    )
+    place = lambda: Place(rng.normal(size=3), _rotation(_unit(rng.normal(size=4))), rng.normal(size=6))
     return place(), place()
 
 
+_rotation = jax.jit(rotation_from_quaternion)
+
+
 def _unit(q):
-    return jnp.asarray(q / np.linalg.norm(q))
+    return q / np.linalg.norm(q)
+
+
+@jax.jit
+def forces(link, first, second):
+    return link.forces(first, second)
 
 
 @pytest.mark.parametrize("kind", ["tether", "bar"])
@@ -48,13 +52,13 @@ def _unit(q):
 def test_internal_forces_cancel(kind, seed):
     """Forces are equal and opposite, and so are moments about any fixed point of the world."""
     first, second = random_places(seed)
-    found = Link(**POINTS, length=0.2, stiffness=70.0, damping=5.0, kind=kind).forces(first, second)
+    found = forces(Link(**POINTS, length=0.2, stiffness=70.0, damping=5.0, kind=kind), first, second)
     assert abs(float(found.tension)) > 1.0
-    about = jnp.asarray([0.4, -2.0, 3.0])
-    force, moment = jnp.zeros(3), jnp.zeros(3)
+    about = np.asarray([0.4, -2.0, 3.0])
+    force, moment = np.zeros(3), np.zeros(3)
     for body, wrench in ((first, found.first), (second, found.second)):
-        own, turn = matvec(body.rotation, wrench[:3]), matvec(body.rotation, wrench[3:])
-        force, moment = force + own, moment + turn + cross(body.position - about, own)
+        own, turn = (np.asarray(body.rotation) @ half for half in np.split(np.asarray(wrench), 2))
+        force, moment = force + own, moment + turn + np.cross(body.position - about, own)
     np.testing.assert_allclose(force, 0, atol=1e-12)
     np.testing.assert_allclose(moment, 0, atol=1e-12)
 
@@ -63,14 +67,20 @@ def test_internal_forces_cancel(kind, seed):
 def test_power_of_the_link_is_loss_and_stored_energy(kind):
     """nu . wrench of both bodies = -(d energy / dt + loss), and the loss is never negative, whatever the motion."""
     link = Link(**POINTS, length=1.5, stiffness=70.0, damping=15.0, kind=kind)
+
+    @jax.jit
+    def evaluate(first, second):
+        found = link.forces(first, second)
+        stored = jax.jvp(link.energy, (found.extension,), (found.rate,))[1]
+        return found, stored, link.loss(found)
+
     signs = set()
     for seed in range(40):
         first, second = random_places(seed)
-        found = link.forces(first, second)
-        power = float((first.nu * found.first).sum() + (second.nu * found.second).sum())
-        stored = float(jax.jvp(link.energy, (found.extension,), (found.rate,))[1])
-        assert power == pytest.approx(-(stored + float(link.loss(found))), abs=1e-9)
-        assert float(link.loss(found)) >= 0
+        found, stored, loss = jax.tree.map(np.asarray, evaluate(first, second))
+        power = first.nu @ found.first + second.nu @ found.second
+        assert power == pytest.approx(-(stored + loss), abs=1e-9)
+        assert loss >= 0
         signs.add((float(found.extension) > 0, float(found.rate) > 0))
     assert len(signs) == 4  # stretched and slack, opening and closing
 
@@ -82,7 +92,7 @@ def test_tension_of_a_tether_and_a_bar():
         Place(jnp.asarray([distance, 0, 0]), jnp.eye(3), jnp.zeros(6).at[0].set(speed)),
     )
     still = {"first_point": (0, 0, 0), "second_point": (0, 0, 0), "length": 2.0, "stiffness": 100.0, "damping": 8.0}
-    tension = lambda kind, distance, speed: float(Link(**still, kind=kind).forces(*at(distance, speed)).tension)
+    tension = lambda kind, distance, speed: float(forces(Link(**still, kind=kind), *at(distance, speed)).tension)
     assert tension("tether", 2.3, 0.5) == pytest.approx(34.0)
     assert tension("tether", 2.1, -2.0) == 0.0
     assert tension("tether", 1.9, 3.0) == 0.0
@@ -120,12 +130,20 @@ def test_energy_balance_along_a_motion(kind):
         carry = rk4(rates, k * 0.002, (x, spent), 0.002)
         return carry, energy(carry[0]) + carry[1]
 
-    start = plant.initial_state(APART, 2 * MOVING)
-    (final, spent), total = jax.jit(lambda x: jax.lax.scan(step, (x, jnp.zeros(())), jnp.arange(1500.0)))(start)
-    begun = float(energy(start))
-    assert float(spent) > 0.2 * begun
+    @jax.jit
+    def move(x):
+        (final, spent), total = jax.lax.scan(step, (x, jnp.zeros(())), jnp.arange(1500.0))
+        return energy(x), spent, total, plant.status(final)
+
+    begun, spent, total, status = map(np.asarray, move(plant.initial_state(APART, 2 * MOVING)))
+    assert spent > 0.2 * begun
     np.testing.assert_allclose(total, begun, rtol=0, atol=1e-4 * begun)
-    assert int(plant.status(final)) == int(Status.OK)
+    assert status == int(Status.OK)
+
+
+@eqx.filter_jit
+def acceleration(plant, x, u, load):
+    return plant.acceleration(0.0, x, u, load)
 
 
 def test_without_a_link_each_vehicle_moves_alone():
@@ -133,12 +151,12 @@ def test_without_a_link_each_vehicle_moves_alone():
     u = jnp.arange(float(plant.inputs())) / 3 - 1
     load = Load(jnp.arange(12.0) / 10, jnp.arange(12.0)[::-1] / 7)
     x = plant.initial_state(APART, MOVING)
-    found = plant.acceleration(0.0, x, u, load)
+    found = acceleration(plant, x, u, load)
     for i, hull in enumerate((bluerov2_heavy(), bluerov2())):
         alone, own = hybrid_vehicle(hull, linear_voltage(), ledger=False), slice(6 * i, 6 * i + 6)
         state = alone.initial_state(APART[own], MOVING[own])
         v = u[:8] if i == 0 else u[8:]
-        expected = alone.acceleration(0.0, state, v, Load(load.acceleration[own], load.wrench[own]))
+        expected = acceleration(alone, state, v, Load(load.acceleration[own], load.wrench[own]))
         np.testing.assert_allclose(found[own], expected, atol=1e-12)
 
 
@@ -148,20 +166,23 @@ def test_model_has_a_block_for_each_vehicle_and_no_link():
     u = jnp.linspace(-2, 2, pair().inputs())
     for kind in ("none", "tether"):
         plant = pair(link=kind, length=4.5)
-        x = plant.initial_state(APART, MOVING)
-        y, model = plant.output(0.0, x), plant.model()
-        gain = np.asarray(model.dynamics.gain(y))
+        x, dynamics = plant.initial_state(APART, MOVING), plant.model().dynamics
+
+        @jax.jit
+        def evaluate(x, plant=plant, dynamics=dynamics):
+            y, found = plant.output(0.0, x), plant.link_forces(x)
+            bodies = [(plant.first, x.first, found.first), (plant.second, x.second, found.second)]
+            pulled = [
+                Kinematics(rotation_from_quaternion(state.attitude)).to_world(one.body.accelerate(wrench))
+                for one, state, wrench in bodies
+            ]
+            known = dynamics.drift(y) + dynamics.gain(y) @ u
+            return dynamics.gain(y), known + jnp.concatenate(pulled), found.tension
+
+        gain, expected, tension = map(np.asarray, evaluate(x))
         assert not gain[:6, 8:].any() and not gain[6:, :8].any()
-        known = model.dynamics.drift(y) + gain @ u
-        found = plant.link_forces(x)
-        bodies = [(plant.first, x.first, found.first), (plant.second, x.second, found.second)]
-        pulled = [
-            Kinematics(rotation_from_quaternion(state.attitude)).to_world(one.body.accelerate(wrench))
-            for one, state, wrench in bodies
-        ]
-        expected = known + jnp.concatenate(pulled)
-        np.testing.assert_allclose(plant.acceleration(0.0, x, u, plant.no_load()), expected, atol=1e-10)
-        assert (float(found.tension) > 10) == (kind == "tether")
+        np.testing.assert_allclose(acceleration(plant, x, u, plant.no_load()), expected, atol=1e-10)
+        assert (tension > 10) == (kind == "tether")
 
 
 def test_bad_options():
