@@ -110,6 +110,13 @@ def test_the_demand_of_one_is_full_thrust_of_all_thrusters_of_an_axis():
     gain = np.abs(np.asarray(plant.model().in_body_axes().dynamics.acceleration_per_thrust))
     np.testing.assert_allclose(most, full * gain.sum(1), rtol=1e-6)
     np.testing.assert_allclose(law.limit, [0.1, 0.1, 0.1, 0.3, 0.3, 0.3] * most)
+    assert not law.actuation.feedforward
+    # Where nothing limits the inputs, a demand of one is that of this vehicle at 16 V.
+    endless = hybrid_vehicle(bluerov2_heavy(), t200(supply=np.inf)).model()
+    usual = cascade(endless, preset="px4", sampling_time=DT, saturation=(0.2, 0.5))
+    np.testing.assert_allclose(np.asarray(usual.inner) / [0.2, 0.2, 0.2, 1.5, 2.0, 2.0], most, rtol=0.01)
+    np.testing.assert_allclose(usual.limit / law.limit, np.repeat([2.0, 5 / 3], 3), rtol=0.01)
+    np.testing.assert_allclose(law.outer, [5, 5, 5, 4 / 1.5, 2, 2])
 
 
 @pytest.mark.full
