@@ -94,7 +94,7 @@ def test_default_gains_are_those_of_the_rule_of_preset_robust(make):
 @pytest.mark.parametrize("kind", ["adrc", "indi"])
 def test_a_linear_law_does_not_wind_up(kind):
     """The estimate of a constant load is the same at the limits: it uses what was applied."""
-    push = {"kind": "sinusoid", "amplitude": 0.0, "frequency": 1.0, "offset": 0.7}
+    push = {"kind": "sinusoid", "amplitude": [0.0] * 6, "frequency": [1.0] * 6, "offset": [0.7] * 6}
     law = {"kind": kind, "bandwidth": 30.0, "feedback": [16.0, 8.0]}
     limited, free = (run(law, goal=2.0, duration=4.0, limit=limit, load=push)["estimate"] for limit in (2.0, None))
     np.testing.assert_allclose(limited, free, atol=1e-9)

@@ -1,5 +1,6 @@
 """Inertia from the response to a probing oscillation: closed forms, its standard error, and a vehicle with a wrong model."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -32,6 +33,7 @@ def part(axes=2, **options):
     return InertiaIdentification(amplitude=jnp.full(axes, 0.1), frequency=jnp.linspace(5.0, 6.0, axes), **options)
 
 
+@eqx.filter_jit
 def identified(one, inertia, drag, noise):
     """State after a vehicle whose motion is that of the probing target, with `noise` in the applied acceleration."""
 
@@ -42,7 +44,7 @@ def identified(one, inertia, drag, noise):
         nominal = inertia * acceleration + drag * middle + extra
         return one.advance(state, ERROR, rate, nominal, 1.0, DT), None
 
-    return jax.jit(lambda state, noise: jax.lax.scan(step, state, noise)[0])(one.init(len(inertia)), noise)
+    return jax.lax.scan(step, one.init(len(inertia)), noise)[0]
 
 
 @pytest.mark.parametrize("inertia", [(2.0, 0.6), (1.0, 1.4)])

@@ -26,9 +26,13 @@ OBSERVER = Estimator(gaussian_sets(1), bandwidth=8.0, leakage=0.0)
 
 def collected(alone, explained):
     """Evidence of a sequence of modelling errors of one axis."""
+    return _collected(jnp.stack([alone, explained], 1)[:, :, None])
+
+
+@jax.jit
+def _collected(series):
     step = lambda found, both: (evidence.gathered(found, both[0], both[1], DT, JUDGING), None)
-    series = jnp.stack([alone, explained], 1)[:, :, None]
-    return jax.jit(lambda found: jax.lax.scan(step, found, series)[0])(evidence.none(1))
+    return jax.lax.scan(step, evidence.none(1), series)[0]
 
 
 def motion(seconds):

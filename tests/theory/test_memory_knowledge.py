@@ -1,5 +1,6 @@
 """What was learnt has names, survives a file, and enters the bound of the estimation error."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -33,12 +34,26 @@ def test_every_entry_of_the_regressor_has_its_name(regressor):
     axes, part = model.coordinates.axes, memory(6, regressor=regressor, speeds=0.5)
     names = regressor_names(axes, 5, regressor, body=True)
     assert len(names) == len(set(names)) == part.size(6, True)
-    y = model.coordinates.measurement(jnp.zeros(6), jnp.zeros(6))
+    roll, pitch = 0.4, -0.3
     velocity, acceleration = jnp.asarray([0.25, -0.1, 0.0, 0.0, 0.3, 0.0]), jnp.asarray([0.0, 0.0, 0.7, 0.0, 0.0, 0.0])
-    phi = part.regressors(y, velocity, TrackingError(jnp.zeros(6), jnp.zeros(6), acceleration), True)
-    found = dict(zip(names, np.asarray(phi), strict=True))
-    u, v, w, _, q, r = axes
-    expected = {"1": 1.0, f"acceleration of {w}": 0.7, f"{u} {v}": -0.1, f"{q} {w}": 0.0, f"{q} {u}": 0.3}
+
+    @jax.jit
+    def phi_of(attitude, turn):
+        y = model.coordinates.measurement(jnp.concatenate([jnp.zeros(3), attitude]), jnp.zeros(6))
+        off = TrackingError(jnp.concatenate([jnp.zeros(3), turn]), jnp.zeros(6), acceleration)
+        return part.regressors(y, velocity, off, True)
+
+    turn = np.array([0.1, -0.2, 0.05])
+    found = dict(zip(names, np.asarray(phi_of(jnp.asarray([roll, pitch, 0.9]), jnp.asarray(turn))), strict=True))
+    u, v, w, p, q, r = axes
+    down = np.array([-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)])
+    gravity = down + np.cross(down, turn) - [0.0, 0.0, 1.0]
+    expected = {f"gravity along {axis}": part for axis, part in zip((u, v, w), gravity, strict=True)}
+    # Shares of 0.5 of v and q, and of others nothing: products are u v, v w, w u; p v, q w, r u; p w, q u, r v.
+    share = dict(zip(axes, np.asarray(velocity) / 0.5, strict=True))
+    pairs = (u, v), (v, w), (w, u), (p, v), (q, w), (r, u), (p, w), (q, u), (r, v)
+    expected |= {f"{one} {other}": share[one] * share[other] for one, other in pairs}
+    expected |= {"1": 1.0, f"acceleration of {w}": 0.7}
     if regressor != "rules":
         expected |= {u: 0.5, f"{u} |{u}|": 0.25, v: -0.2, f"{v} |{v}|": -0.04, r: 0.0}
     for name, value in expected.items():

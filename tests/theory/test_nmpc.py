@@ -1,5 +1,7 @@
 """Model predictive control: the regulator without limits, the exact optimum with them, a nonlinear problem, bad options."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -52,6 +54,19 @@ def condensed(h, steps, w):
 LINEAR = lambda t, state: (jnp.zeros(1), -jnp.eye(1))
 
 
+@functools.partial(jax.jit, static_argnums=0)
+def once(motion, limits, start, forces):
+    return improved(motion, limits, start, forces)
+
+
+again_and_again = jax.jit(
+    lambda motion, limits, start, forces, rounds: jax.lax.fori_loop(
+        0, rounds, lambda _, forces: improved(motion, limits, start, forces).forces, forces
+    ),
+    static_argnums=0,
+)
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(("w", "h"), [(2.0, 0.1), (8.0, 0.02), (0.3, 0.2)])
 def test_the_end_is_that_of_the_discrete_riccati_equation(w, h):
@@ -70,7 +85,7 @@ def test_without_limits_one_step_gives_the_regulator():
     start = jnp.array([0.7, -0.4])
     gain = regulator(horizon())[1][0]
     for steps in (2, 10):
-        found = improved(LINEAR, horizon(), start, jnp.zeros((steps, 1)))
+        found = once(LINEAR, horizon(), start, jnp.zeros((steps, 1)))
         np.testing.assert_allclose(found.forces[0, 0], gain @ start, rtol=1e-7)
         np.testing.assert_allclose(found.gain[0], gain, rtol=1e-7)
 
@@ -82,10 +97,7 @@ def test_with_limits_it_ends_at_the_exact_optimum(start):
     h, steps, limit, w = 0.1, 15, 1.5, 2.0
     of_start, of_force = condensed(h, steps, w)
     exact = lsq_linear(of_force, -of_start @ np.array(start), bounds=(-limit, limit), tol=1e-14).x
-    forces = jnp.zeros((steps, 1))
-    again = jax.jit(lambda forces: improved(LINEAR, horizon(limit), jnp.array(start), forces).forces)
-    for _ in range(12):
-        forces = again(forces)
+    forces = again_and_again(LINEAR, horizon(limit), jnp.array(start), jnp.zeros((steps, 1)), 12)
     assert (np.abs(exact) > limit * (1 - 1e-6)).any()  # limits do bind
     np.testing.assert_allclose(forces[:, 0], exact, atol=1e-5)
 
@@ -101,34 +113,35 @@ def bent(t, state):
 
 
 def converged(limit, rounds):
-    forces, start = jnp.zeros((8, 1)), jnp.array([1.2, 0.3])
-    again = jax.jit(lambda forces: improved(bent, horizon(limit, (1.5,)), start, forces).forces)
-    for _ in range(rounds):
-        forces = again(forces)
-    return forces[:, 0]
+    start = jnp.array([1.2, 0.3])
+    return again_and_again(bent, horizon(limit, (1.5,)), start, jnp.zeros((8, 1)), rounds)[:, 0]
 
 
 def test_a_nonlinear_problem_ends_where_ipopt_does():
     np.testing.assert_allclose(converged(4.0, 5), IPOPT, atol=2e-7)
 
 
+@jax.jit
+@jax.value_and_grad
+def with_slope(forces, end):
+    """Cost of the forces of the nonlinear problem, and its gradient."""
+    h, w, s, total = 0.1, 1.5, jnp.array([1.2, 0.3]), 0.0
+    for k in range(8):
+        free, per_force = bent(k * h, s)
+        bend = (free + per_force @ forces[k : k + 1])[0]
+        total += h / 2 * (w**4 * s[0] ** 2 + 2 * w**2 * s[1] ** 2 + bend**2)
+        s = jnp.stack([s[0] + h * s[1] + h**2 / 2 * bend, s[1] + h * bend])
+    return total + s @ end @ s / 2
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("limit", [3.0, 3.5, 10.0])
 def test_a_nonlinear_problem_ends_at_a_minimum_that_another_method_finds(limit):
     """L-BFGS-B, for limits that bind in several steps, in some and in none."""
-    h, w, end = 0.1, 1.5, regulator(horizon(limit, (1.5,)))[0][0]
-
-    def cost(forces):
-        s, total = jnp.array([1.2, 0.3]), 0.0
-        for k in range(8):
-            free, per_force = bent(k * h, s)
-            bend = (free + per_force @ forces[k : k + 1])[0]
-            total += h / 2 * (w**4 * s[0] ** 2 + 2 * w**2 * s[1] ** 2 + bend**2)
-            s = jnp.stack([s[0] + h * s[1] + h**2 / 2 * bend, s[1] + h * bend])
-        return total + s @ end @ s / 2
-
     bounds = [(-limit, limit)] * 8
-    exact = minimize(jax.jit(jax.value_and_grad(cost)), np.zeros(8), jac=True, bounds=bounds, tol=1e-14)
+    end = regulator(horizon(limit, (1.5,)))[0][0]
+    cost = lambda forces: with_slope(forces, end)[0]
+    exact = minimize(with_slope, np.zeros(8), (end,), jac=True, bounds=bounds, tol=1e-14)
     found = converged(limit, 10)
     assert float(cost(found)) <= exact.fun * (1 + 1e-9)
     np.testing.assert_allclose(found, exact.x, atol=1e-3)

@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from undertow.controllers import rcaf
-from undertow.controllers.composite_law import RCAFState
+from undertow.controllers.composite_law import RCAFState, projected_rate
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.controllers.robust import evidence
 from undertow.controllers.robust.estimator import EstimatorState
@@ -20,6 +20,7 @@ from undertow.controllers.robust.inertia import InertiaIdentification, InertiaSt
 from undertow.controllers.robust.memory import MemoryState, Observed, memory
 from undertow.controllers.robust.robust_law import RobustState
 from undertow.core.contracts import Measurement, Target, TrackingError
+from undertow.estimation.fuzzy_system import FuzzySystem, gaussian_sets
 from undertow.plants import double_integrator, linear_plant
 
 DT = 0.02
@@ -152,6 +153,23 @@ def test_rafc_with_the_state_as_input_and_discontinuous_terms(paper):
     same((signals["estimate"], signals["robust_term"], u), (d_hat, u_r, np.linalg.solve(G, desired)))
     bend = -POLE * eps + DRIFT + desired + d_hat - OMEGA * np.sign(eps)
     same(rate, (PREDICTED.predicted_velocity, bend, -GAMMA * S[:, None] * xi))
+
+
+def test_weights_at_their_bound_do_not_leave_and_return():
+    """Whatever the speed; also a single weight inside."""
+    value, rate = np.array([1.0, 1.0, -1.0, -1.0, 0.9, 0.0]), np.array([0.1, -0.1, -0.1, 3.0, 5.0, -2.0])
+    np.testing.assert_array_equal(projected_rate(value, rate, 1.0), [0.0, -0.1, 0.0, 3.0, 5.0, -2.0])
+
+
+def test_many_even_sets_and_uneven_ones_are_gaussians():
+    """41 sets follow from every 12th one of them; where all weigh nothing, the nearest one counts."""
+    x = np.array([-1.3, -0.91, 0.0, 0.024, 0.5, 1.0, 2.0])
+    many, few = gaussian_sets(41, (1.0,)), FuzzySystem([[-1.0, 0.2, 1.0]], [[0.5, 0.3, 0.7]])
+    assert many.evenly_spaced
+    np.testing.assert_allclose(many.basis(x[:, None]), basis_of(x, np.linspace(-1, 1, 41), 0.05), rtol=1e-9, atol=1e-14)
+    same(few.basis(x[:, None]), basis_of(x, np.array([-1.0, 0.2, 1.0]), np.array([0.5, 0.3, 0.7])))
+    far = many.basis(np.array([[80.0], [-80.0]]))
+    np.testing.assert_allclose((far[0, -1], far[1, 0]), 1.0)
 
 
 # The robust law, without limits: the filter of jumps waits for nothing, and the target is not moved.

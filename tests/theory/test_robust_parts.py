@@ -25,19 +25,25 @@ from undertow.vehicles import bluerov2_heavy
 RNG = np.random.default_rng(4)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("damping", [0.3, 1.0, 2.5])
-@pytest.mark.parametrize("dt", [1e-4, 1e-2, 1.0])
-def test_estimator_poles_are_those_of_continuous_time(damping, dt):
-    """One rule: eps and d_til obey a matrix, and its eigenvalues are exp(p T)."""
-    estimator = Estimator(gaussian_sets(1), bandwidth=20.0, damping=damping, bound=jnp.inf)
+@eqx.filter_jit
+def estimator_matrix(estimator, dt):
+    """Jacobian of one step on the rate and the weight of one axis with one rule."""
 
     def step(state):
         start = estimator.init(jnp.zeros(1))._replace(rates=state[:1], weights=state[1:, None])
         after = estimator.advance(start, estimator.estimate(start, jnp.zeros(1)), jnp.zeros(1), jnp.zeros(1), dt)
         return jnp.concatenate([after.rates, after.weights[:, 0]])
 
-    matrix = np.asarray(jax.jacfwd(step)(jnp.zeros(2)))
+    return jax.jacfwd(step)(jnp.zeros(2))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("damping", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize("dt", [1e-4, 1e-2, 1.0])
+def test_estimator_poles_are_those_of_continuous_time(damping, dt):
+    """One rule: eps and d_til obey a matrix, and its eigenvalues are exp(p T)."""
+    estimator = Estimator(gaussian_sets(1), bandwidth=20.0, damping=damping, bound=jnp.inf)
+    matrix = np.asarray(estimator_matrix(estimator, jnp.asarray(dt)))
     poles = np.roots([1.0, 2 * damping * 20.0, 400.0])
     found = np.sort_complex(np.linalg.eigvals(matrix))
     # Two equal poles are known to the root of what each is known to.
@@ -296,45 +302,53 @@ def body():
     return hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
-def test_rates_and_their_derivative(body, t):
-    eta, rate, bend = motion(t)
+@pytest.fixture(scope="module")
+def ways(body):
+    """What the coordinates say on the way, and derivatives along it: one program for all times."""
     coordinates = body.coordinates
-    rates = lambda t: coordinates.velocity(measurement_of_outputs(*motion(t)[:2]))
-    np.testing.assert_allclose(
-        coordinates.acceleration(measurement_of_outputs(eta, rate), bend), jax.jacfwd(rates)(t), atol=1e-10
-    )
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
-def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(body, t):
-    """Both move: the target half as fast, along the same way."""
-    target = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
     seen = lambda t: measurement_of_outputs(*motion(t)[:2])
+    goal = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
+    wanted = lambda t: coordinates.tracking_error(seen(t), goal(t)).rate + coordinates.velocity(seen(t))
 
-    def velocity(t):
-        return body.coordinates.tracking_error(seen(t), target(t)).rate + body.coordinates.velocity(seen(t))
+    def told(t):
+        eta, rate, bend = motion(t)
+        y = measurement_of_outputs(eta, rate)
+        return {
+            "acceleration": coordinates.acceleration(y, bend),
+            "slope": jax.jacfwd(lambda t: coordinates.velocity(seen(t)))(t),
+            "wanted": coordinates.tracking_error(y, goal(t)).acceleration,
+            "wanted slope": jax.jacfwd(wanted)(t),
+            "on target": coordinates.tracking_error(y, Target(eta, rate, bend)),
+        }
 
-    acceleration = body.coordinates.tracking_error(seen(t), target(t)).acceleration
-    np.testing.assert_allclose(acceleration, jax.jacfwd(velocity)(t), atol=1e-9)
+    times = 0.1, 0.7, 1.9
+    found = jax.jit(jax.vmap(told))(jnp.asarray(times))
+    return {t: jax.tree.map(lambda leaf, place=place: np.asarray(leaf)[place], found) for place, t in enumerate(times)}
 
 
-def test_on_target_nothing_is_wanted_but_its_own_motion(body):
-    eta, rate, bend = motion(0.7)
-    y, r = measurement_of_outputs(eta, rate), Target(eta, rate, bend)
-    error, rate, acceleration = body.coordinates.tracking_error(y, r)
+@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
+def test_rates_and_their_derivative(ways, t):
+    np.testing.assert_allclose(ways[t]["acceleration"], ways[t]["slope"], atol=1e-10)
+
+
+@pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
+def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(ways, t):
+    """Both move: the target half as fast, along the same way."""
+    np.testing.assert_allclose(ways[t]["wanted"], ways[t]["wanted slope"], atol=1e-9)
+
+
+def test_on_target_nothing_is_wanted_but_its_own_motion(ways):
+    error, rate, acceleration = ways[0.7]["on target"]
     np.testing.assert_allclose(error, 0, atol=1e-15)
     np.testing.assert_allclose(rate, 0, atol=1e-12)
-    np.testing.assert_allclose(acceleration, body.coordinates.acceleration(y, bend), atol=1e-11)
+    np.testing.assert_allclose(acceleration, ways[0.7]["acceleration"], atol=1e-11)
 
 
 def test_attitude_errors_go_the_short_way(body):
     """I32: full turns do not matter, and 200 degrees to the right are 160 to the left."""
     y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
     target = lambda yaw: Target(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6), jnp.zeros(6))
-    error = lambda yaw: body.coordinates.tracking_error(y, target(yaw)).error
+    error = jax.jit(lambda yaw: body.coordinates.tracking_error(y, target(yaw)).error)
     for yaw in RNG.uniform(-3, 3, 20):
         once, more = error(yaw), error(yaw + 2 * np.pi)
         np.testing.assert_allclose(once, more, atol=1e-12)
