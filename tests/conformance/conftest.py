@@ -1,59 +1,7 @@
-"""Every part of the catalogue, made once: what a part requires is found by the name of the argument."""
+"""Every part of the catalogue for a test: one by one, or all at once."""
 
-import functools
-import inspect
-from pathlib import Path
-
-import numpy as np
 import pytest
-
-from undertow.controllers.pid import pid
-from undertow.core import catalogue
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.scenario.factory import presets_of
-from undertow.sensors import compass, depth, dvl, imu, position_fix
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
-
-
-@functools.cache
-def required(argument):
-    """A value for an argument without a default, whichever part asks for it."""
-    thruster = paper_table3()
-    rows = np.column_stack([np.linspace(0.0, 2.0, 5), np.random.default_rng(0).normal(size=(5, 6))])
-    return {
-        "vehicle": odin,
-        "thruster": lambda: thruster,
-        "model": lambda: hybrid_vehicle(odin(), thruster).model(),
-        "law": lambda: pid(hybrid_vehicle(odin(), thruster).model()),
-        "plant": lambda: hybrid_vehicle(odin(), thruster),
-        "position": lambda: np.linspace(-0.5, 0.5, 6),
-        "samples": lambda: rows,
-        "commands": lambda: np.column_stack([rows, rows[:, 1:3]]),  # for eight thrusters
-        "sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()],
-        "points": lambda: rows[:, 1:4],
-        "function": lambda: f"{Path(__file__).with_name('proportional_policy.py')}:act",
-    }[argument]()
-
-
-@functools.cache
-def make(kind, name):
-    """Part `name` of a kind, or `name:preset`, with its defaults."""
-    name, _, preset = name.partition(":")
-    part = catalogue.names(kind)[name]
-    if preset:
-        part = presets_of(part)[preset]
-    empty = inspect.Parameter.empty
-    needed = [p.name for p in inspect.signature(part).parameters.values() if p.default is empty]
-    return part(**{argument: required(argument) for argument in needed})
-
-
-def variants(kind, name):
-    """The part, or each of its presets."""
-    return [f"{name}:{preset}" for preset in presets_of(catalogue.names(kind)[name])] or [name]
-
-
-ALL = [(kind, which) for kind in catalogue.KINDS for name in catalogue.names(kind) for which in variants(kind, name)]
+from catalogue_parts import ALL, make, required
 
 
 def pytest_generate_tests(metafunc):
@@ -62,8 +10,6 @@ def pytest_generate_tests(metafunc):
     if "part" in metafunc.fixturenames:
         marked = [pytest.param(pair, marks=pytest.mark.slow) if pair in heavy else pair for pair in ALL]
         metafunc.parametrize("part", marked, ids=["/".join(pair) for pair in ALL], indirect=True)
-    if "part_name" in metafunc.fixturenames:
-        metafunc.parametrize("part_name", ALL, ids=["/".join(pair) for pair in ALL])
 
 
 @pytest.fixture
@@ -73,12 +19,18 @@ def part(request):
 
 
 @pytest.fixture
-def made_anew():
-    """Makes a part, and everything that it is made from, once more."""
+def all_parts():
+    """Every part by kind and name."""
+    return {pair: make(*pair) for pair in ALL}
 
-    def made(part_name):
+
+@pytest.fixture
+def all_made_anew():
+    """Makes every part, and everything that they are made from, once more."""
+
+    def made():
         make.cache_clear()
         required.cache_clear()
-        return make(*part_name)
+        return {pair: make(*pair) for pair in ALL}
 
     return made

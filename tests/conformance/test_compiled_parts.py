@@ -11,6 +11,8 @@ from use_of_parts import NUMBERS, USES, numbers
 
 from undertow.core import catalogue
 
+pytestmark = pytest.mark.full
+
 
 def inputs(rows):
     return jnp.asarray(np.random.default_rng(8).uniform(-1, 1, (rows, NUMBERS)))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import pytest
 
 from undertow.core.arrays import in_present_precision
 from undertow.core.runtime import in_precision
@@ -18,25 +19,29 @@ def bits(part):
     return [np.asarray(leaf) for leaf in jax.tree.leaves(part) if isinstance(leaf, jax.Array)]
 
 
-def test_the_callers_setting_does_not_matter(part_name, made_anew):
-    with jax.enable_x64(True):
-        wanted = bits(made_anew(part_name))
+@pytest.mark.full
+def test_the_callers_setting_does_not_matter(all_made_anew):
+    """Every part, and everything that it is made from, made once under each setting."""
     with jax.enable_x64(False):
-        found = bits(made_anew(part_name))
+        found = {name: bits(part) for name, part in all_made_anew().items()}
         assert not jax.config.jax_enable_x64
-    assert [leaf.dtype for leaf in found] == [leaf.dtype for leaf in wanted]
-    for one, other in zip(found, wanted, strict=True):
-        np.testing.assert_array_equal(one, other)
+    with jax.enable_x64(True):
+        wanted = {name: bits(part) for name, part in all_made_anew().items()}
+    for name, leaves in wanted.items():
+        assert [leaf.dtype for leaf in found[name]] == [leaf.dtype for leaf in leaves], name
+        for one, other in zip(found[name], leaves, strict=True):
+            np.testing.assert_array_equal(one, other, err_msg=str(name))
 
 
-def test_a_run_converts_its_parts(part):
+@pytest.mark.full
+def test_a_run_converts_its_parts(all_parts):
     """To single precision, and back to nothing but what it can hold."""
-    _, whole = part
-    with in_precision("float32"):
-        single = in_present_precision(whole)
-    assert all(leaf.dtype != np.float64 for leaf in bits(single))
-    for one, other in zip(bits(single), bits(whole), strict=True):
-        np.testing.assert_array_equal(one, other.astype(one.dtype))
+    for name, whole in all_parts.items():
+        with in_precision("float32"):
+            single = in_present_precision(whole)
+        assert all(leaf.dtype != np.float64 for leaf in bits(single)), name
+        for one, other in zip(bits(single), bits(whole), strict=True):
+            np.testing.assert_array_equal(one, other.astype(one.dtype), err_msg=str(name))
 
 
 def test_neither_does_it_for_parts_that_are_made_step_by_step():

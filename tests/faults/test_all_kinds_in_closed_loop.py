@@ -10,6 +10,8 @@ from undertow.faults.kinds import list_kinds
 from undertow.loop import simd_batch
 from undertow.scenario.build import build
 
+pytestmark = pytest.mark.full
+
 ONSET, DURATION, DT = 0.5, 1.2, 0.01
 NEVER = 1e9
 

@@ -74,6 +74,7 @@ def test_errors(entry, says):
     assert says in str(error.value), str(error.value)
 
 
+@pytest.mark.full
 def test_error_names_the_line(tmp_path, capsys):
     path = tmp_path / "s.yaml"
     path.write_text(
@@ -110,6 +111,7 @@ def test_names_of_targets(written, target, number):
     assert (entry["target"], entry.get("number")) == (target, number)
 
 
+@pytest.mark.full
 def test_several_sensors_of_a_kind():
     """Without a number a fault is one of each of them."""
     twice = {"navigation": {"kind": "kalman", "sensors": ["imu", "depth", "depth"]}}
@@ -134,6 +136,7 @@ def test_resolved_entries_make_the_same_loop():
     assert all(map(np.array_equal, one, other)) and len(one) == len(other)
 
 
+@pytest.mark.full
 def test_no_faults_leave_the_loop_as_it_is():
     plain, empty = build(BASE), build(BASE | {"faults": []})
     assert plain.closed_loop.faults is None and empty.closed_loop.faults is None
@@ -141,6 +144,7 @@ def test_no_faults_leave_the_loop_as_it_is():
     assert "active_faults" not in plain.closed_loop.signals()
 
 
+@pytest.mark.full
 def test_advice_on_a_fault_that_nobody_would_notice():
     """The report of the propellers, where the nominal model leaves it unused."""
     entry = {"target": "propeller_speed", "mode": "off"}
@@ -149,6 +153,7 @@ def test_advice_on_a_fault_that_nobody_would_notice():
     assert not any("has no effect" in one for one in says(speed_sensor=True))
 
 
+@pytest.mark.full
 def test_without_faults_is_the_loop_without_them():
     several = [OFF, {"target": "dvl", "mode": "off"}, {"target": "computation", "mode": "hang"}]
     clean, unfaulted = build(BASE | KALMAN).closed_loop, built(*several, **KALMAN).without_faults().closed_loop
@@ -166,6 +171,7 @@ def test_announced_faults_are_in_the_health_of_the_measurement():
         assert y.health.tolist() == [first, 1, 1, 1, 1, 1, 1, 1]
 
 
+@pytest.mark.full
 def test_own_mode_of_a_user(tmp_path, capsys):
     path = tmp_path / "my_fault.py"
     path.write_text(OWN)
@@ -228,6 +234,7 @@ def careless():
 '''
 
 
+@pytest.mark.full
 def test_list_is_machine_readable(capsys):
     assert run(["list", "faults", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
@@ -263,6 +270,7 @@ KEY = some.sampled_from(
 )
 
 
+@pytest.mark.full
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(some.dictionaries(KEY, VALUE, max_size=8))
 def test_any_entry_is_used_or_refused(entry):

@@ -44,12 +44,14 @@ def with_mixed(precision="float64", simulate=sampled.simulate, seed=0):
     return signals_of(outcome)
 
 
+@pytest.mark.full
 def test_both_compilers_agree():
     xla, simd = with_mixed(), with_mixed(simulate=simd_batch.simulate)
     for name in ("position", "input", "acting_input", "active_faults"):
         np.testing.assert_allclose(simd[name], xla[name], rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.full
 def test_single_precision():
     """The same run up to the first random number, which depends on the precision; the same faults at the same steps."""
     single, double = with_mixed("float32"), with_mixed()
@@ -61,6 +63,7 @@ def test_single_precision():
     )
 
 
+@pytest.mark.full
 def test_faults_begin_and_end_on_their_steps():
     """At a step boundary, in both precisions: a fault is present from the step of its onset to that before its end."""
     for precision in ("float64", "float32"):
@@ -70,6 +73,7 @@ def test_faults_begin_and_end_on_their_steps():
         assert np.array_equal(active, sum((step >= first) & (step < stop) for first, stop in intervals))
 
 
+@pytest.mark.full
 def test_only_the_failed_thruster_gets_another_input():
     signals = with_mixed()
     applied, acting, step = signals["input"], signals["acting_input"], np.arange(101)
@@ -81,6 +85,7 @@ def test_only_the_failed_thruster_gets_another_input():
     assert dark.any() and not dark.all()
 
 
+@pytest.mark.full
 def test_a_controller_that_overruns_holds_its_input():
     applied = with_mixed()["input"][80:95]
     held = (np.diff(applied, axis=0) == 0).all(axis=1)
@@ -106,6 +111,7 @@ def test_a_random_thruster_with_random_onset_and_severity():
     assert loop.faults.jumps(10.0) == ()
 
 
+@pytest.mark.full
 def test_from_python_with_names_and_objects():
     plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.linear_voltage())
     law = ut.controllers.pid(plant.model())
@@ -120,6 +126,7 @@ def test_from_python_with_names_and_objects():
         run([{"target": "depth", "mode": "reversed"}])
 
 
+@pytest.mark.full
 def test_a_pendulum_has_inputs_and_outputs():
     scenario = {
         "plant": "inverted_pendulum",

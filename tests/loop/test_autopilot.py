@@ -45,7 +45,14 @@ def parts(values):
     return (position[:3], velocity, position[3:]) if len(position) == 6 else (position, velocity)
 
 
-@pytest.mark.parametrize("scenario", [HEAVY, PENDULUM, HEAVY | {"controller": {"kind": "pid", "frequency": 2.0}}])
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        pytest.param(HEAVY, marks=pytest.mark.full),
+        PENDULUM,
+        pytest.param(HEAVY | {"controller": {"kind": "pid", "frequency": 2.0}}, marks=pytest.mark.full),
+    ],
+)
 def test_every_bit_is_that_of_a_simulation(scenario):
     record = ut.simulate_scenario(scenario).dataset
     names = ("measured_position", "measured_velocity", "input", "commanded_input")
@@ -58,6 +65,7 @@ def test_every_bit_is_that_of_a_simulation(scenario):
     np.testing.assert_array_equal(found, expected[:-1])
 
 
+@pytest.mark.full
 def test_propeller_speeds_are_measured():
     """Without them the law holds the speeds of the start: another command from the second step on."""
     with_speeds, without = ut.Autopilot(SHAFT), ut.Autopilot(SHAFT)
@@ -68,6 +76,7 @@ def test_propeller_speeds_are_measured():
     assert np.isfinite(first).all() and np.isfinite(second).all() and np.abs(first - second).max() > 0.1
 
 
+@pytest.mark.full
 def test_formats_describe_one_motion(heavy):
     """Euler angles or quaternion, velocity in body axes, world axes or as rates of the angles."""
     position, angles, nu = [1.0, -2.0, 3.0], np.array([0.3, -0.4, 1.2]), np.array([0.5, 0.1, -0.2, 0.3, -0.1, 0.2])
@@ -113,6 +122,7 @@ def test_a_quaternion_that_was_integrated_is_taken_as_it_is():
         np.testing.assert_allclose(np.linalg.norm(found), 1.0, rtol=1e-10)
 
 
+@pytest.mark.full
 def test_outputs_are_one_command(heavy):
     """Thrust in newtons is that of the thruster's steady curve; pulses and the wrench follow from volts and thrust."""
     at = (np.zeros(3), np.zeros(6), np.zeros(3))
@@ -129,6 +139,7 @@ def test_outputs_are_one_command(heavy):
     np.testing.assert_allclose(wrench, layout @ newtons, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.full
 def test_a_saved_state_goes_on_bit_for_bit(heavy):
     chance = np.random.default_rng(0)
     motions = [(chance.normal(size=3), 0.1 * chance.normal(size=6), 0.1 * chance.normal(size=3)) for _ in range(20)]
@@ -143,6 +154,7 @@ def test_a_saved_state_goes_on_bit_for_bit(heavy):
     assert other.counts == heavy.counts and other.signals().keys() == heavy.declared_signals().keys()
 
 
+@pytest.mark.full
 def test_damaged_and_foreign_states_change_nothing(heavy):
     heavy.start(np.zeros(3), np.zeros(6), np.zeros(3))
     state, chance = heavy.save(), np.random.default_rng(1)
@@ -160,6 +172,7 @@ def test_damaged_and_foreign_states_change_nothing(heavy):
     assert heavy.save() == state
 
 
+@pytest.mark.full
 def test_control_starts_without_a_jump(heavy):
     """The output is first the one that was applied, and the law's after some time constants."""
     at = (np.zeros(3), np.zeros(6), np.zeros(3))
@@ -174,6 +187,7 @@ def test_control_starts_without_a_jump(heavy):
     np.testing.assert_allclose(last, heavy.signals()["command"], atol=1e-3)
 
 
+@pytest.mark.full
 def test_missing_readings_are_replaced(heavy):
     """The law goes on with what its model expects, also where nothing at all is measured."""
     at = (np.zeros(3), np.zeros(6), np.zeros(3))
@@ -192,6 +206,7 @@ def test_late_missed_and_repeated_steps():
     assert clock.time == pytest.approx(0.01 + 0.01 + 0.012 + 0.015 + 0.05 + 10.0)
 
 
+@pytest.mark.full
 def test_a_repeated_step_changes_nothing(heavy):
     at = (np.ones(3), np.zeros(6), np.zeros(3))
     heavy.start(np.zeros(3), np.zeros(6), np.zeros(3))
@@ -201,6 +216,7 @@ def test_a_repeated_step_changes_nothing(heavy):
     np.testing.assert_array_equal(heavy.signals()["weights"], weights)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "change, said",
     [
@@ -223,6 +239,7 @@ def test_what_is_given_wrongly(heavy, change, said):
     assert heavy.save() == state
 
 
+@pytest.mark.full
 def test_what_an_autopilot_cannot_be_made_of():
     cases = [
         ({"attitude": "degrees"}, "`attitude` must be one of euler, quaternion"),
@@ -241,6 +258,7 @@ def test_what_an_autopilot_cannot_be_made_of():
         pendulum.start([0.0], [0.0], propellers=[1.0])
 
 
+@pytest.mark.full
 def test_the_reference_begins_where_the_vehicle_is_found():
     """With an open start: at rest at 5 m there is nothing to correct yet, at another start likewise."""
     reference = {"kind": "setpoint", "position": [0, 0, 0, 0, 0, 0], "settling": 100}
@@ -254,6 +272,7 @@ def test_the_reference_begins_where_the_vehicle_is_found():
         assert np.abs(later).max() < 10.0  # a step of 5 m saturates at 16 V
 
 
+@pytest.mark.full
 def test_a_start_that_is_none_holds_nothing_of_an_earlier_one(heavy):
     """A quaternion of no length is refused, and the controller goes on; another start forgets the old command."""
     autopilot = ut.Autopilot(HEAVY, attitude="quaternion")
@@ -272,6 +291,7 @@ def test_a_start_that_is_none_holds_nothing_of_an_earlier_one(heavy):
     np.testing.assert_array_equal(after, fresh.step(np.zeros(3), np.zeros(6), upright, target=[0.0] * 6))
 
 
+@pytest.mark.full
 def test_a_target_may_be_a_tuple_of_numbers_and_not_ragged(heavy):
     heavy.start(np.zeros(3), np.zeros(6), np.zeros(3))
     flat = heavy.step(np.zeros(3), np.zeros(6), np.zeros(3), target=(1, 0, 0, 0, 0, 0))

@@ -73,8 +73,8 @@ def run(law, sensor, simulate=sampled.simulate, duration=6.0, load=None):
     ("law", "back_end"),
     [
         ("robust", "simd"),
-        ("pid", "xla"),
-        ("paper", "simd"),
+        pytest.param("pid", "xla", marks=pytest.mark.full),
+        pytest.param("paper", "simd", marks=pytest.mark.full),
         pytest.param("robust", "xla", marks=pytest.mark.slow),
         pytest.param("pid", "simd", marks=pytest.mark.slow),
         pytest.param("paper", "xla", marks=pytest.mark.slow),
@@ -114,6 +114,7 @@ def test_one_bad_number_changes_nothing_to_speak_of(entry, value):
     np.testing.assert_allclose(hit.signals["position"][:, other], sound.signals["position"][:, other], rtol=1e-12)
 
 
+@pytest.mark.full
 def test_the_very_first_reading():
     """The law knows where it was put: a start in the dark is that of a law that sees."""
     sound, dark = (run("robust", Faulty(np.ones(4), NAN, 0.0, end), load=none(), duration=1.0) for end in (0.0, DT))
@@ -224,6 +225,7 @@ class Mute(AbstractController):
         return z
 
 
+@pytest.mark.full
 def test_behind_a_dead_zone():
     """The dead zone of a thruster made 0 V of it, and the run ended as ok."""
     thruster = paper_table3(fidelity="static", dead_zone=1.0)
@@ -241,6 +243,7 @@ class Flooded(Depth):
         return jnp.where(motion.position[2:3] > 0.5, jnp.nan, motion.position[2:3])
 
 
+@pytest.mark.full
 def test_navigation_leaves_out_readings_that_are_none():
     """As if they were lost: the estimate goes on, each is counted, and the depth is known again afterwards."""
     quiet = [imu(angle_noise=0, rate_noise=0, force_noise=0), dvl(noise=0, resolution=0, delay=0), compass(noise=0)]

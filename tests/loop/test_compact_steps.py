@@ -27,6 +27,7 @@ def test_a_step_to_the_last_bit_and_to_the_sign_of_zero():
         assert np.asarray(each).tobytes() == np.asarray(other).tobytes()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("runs", [1.0, np.inf], ids=["few", "many"])
 def test_a_single_run_has_the_bits_of_a_batch(runs):
     """ODIN with eight full motor models for 0.2 s."""

@@ -42,6 +42,7 @@ def pair(link="none"):
     return two_vehicles(bluerov2_heavy(), t200(), second_vehicle=bluerov2(), link=link, length=3.5)
 
 
+@pytest.mark.full
 def test_without_a_link_each_run_is_that_of_the_vehicle_alone():
     """Position, input and estimate of both vehicles, which share nothing, to rounding."""
     plant = pair()
@@ -55,6 +56,7 @@ def test_without_a_link_each_run_is_that_of_the_vehicle_alone():
             np.testing.assert_allclose(found.signals[name][:, part], there, atol=1e-9 * np.abs(there).max() + 1e-12)
 
 
+@pytest.mark.full
 def test_the_papers_law_is_decentralised_by_itself():
     """Axis by axis, with a model of blocks: one law for 12 axes = a law for each vehicle."""
     plant = pair("tether")
@@ -65,6 +67,7 @@ def test_the_papers_law_is_decentralised_by_itself():
     assert several.signals["tension"].max() > 1
 
 
+@pytest.mark.full
 def test_laws_see_only_their_own_vehicle():
     """The command of one does not depend on measurement, reference or applied input of the other."""
     plant = pair("tether")
@@ -100,6 +103,7 @@ def test_batch_compiler_runs_it_alike():
         np.testing.assert_allclose(found.signals[name], there, atol=1e-7 * np.abs(there).max())
 
 
+@pytest.mark.full
 def test_signals_and_metrics_of_all_axes():
     """Those over axes are joined, numbers become one; an rms is over the axes of both vehicles."""
     plant = pair("tether")
@@ -149,6 +153,7 @@ def scenario(**changes):
     } | changes
 
 
+@pytest.mark.full
 def test_scenario_gives_each_law_its_options_and_its_noise():
     noise = np.repeat([0.001, 0.05], 6).tolist()
     built = build(from_data(scenario(navigation={"kind": "white_noise", "velocity": noise})))
@@ -162,6 +167,7 @@ def test_scenario_gives_each_law_its_options_and_its_noise():
     assert built.resolved["controller"]["law"]["sampling_time"] == 0.01
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("law", "says"),
     [

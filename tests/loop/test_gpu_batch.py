@@ -35,7 +35,9 @@ def several(name, steps, runs, every=0):
 @pytest.mark.parametrize(
     "name, steps, runs, every",
     [
-        ("inverted_pendulum", 40, 133, 10),  # two blocks, the second with threads that have no run
+        pytest.param(
+            "inverted_pendulum", 40, 133, 10, marks=pytest.mark.full
+        ),  # two blocks, the second with threads that have no run
         ("inverted_pendulum", 40, 5, 0),
         pytest.param("w1", 20, 33, 5, marks=pytest.mark.slow),
         pytest.param("bluerov2_heavy", 20, 3, 5, marks=pytest.mark.slow),  # loops, branches and random numbers
@@ -50,7 +52,9 @@ def test_threads_give_the_bits_of_vectors(gpu, name, steps, runs, every):
     assert not gpu.buffers
 
 
-@pytest.mark.parametrize("generation", [pytest.param(80, marks=pytest.mark.slow), 90])
+@pytest.mark.parametrize(
+    "generation", [pytest.param(80, marks=pytest.mark.slow), pytest.param(90, marks=pytest.mark.full)]
+)
 def test_nothing_is_approximate(monkeypatch, generation):
     written = []
     monkeypatch.setattr(Driver, "load", lambda self, assembly, name: written.append(assembly))

@@ -141,6 +141,7 @@ def state_angles(state):
 EXACT = dict.fromkeys(("position_deviation", "velocity_deviation", "tilt_deviation", "heading_deviation"), 1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "sensors, motion",
     [(ALL, swinging), (ALL[:3], level)],
@@ -162,6 +163,7 @@ def test_errors_are_as_large_as_the_filter_says(sensors, motion):
     assert (last[observed] < 0.2 * 5e-3).all() and (last[FORCE_BIAS] < 0.4 * 0.05).all()
 
 
+@pytest.mark.full
 def test_late_readings_count_as_much_as_their_age_says():
     """Fixes and velocities that come a second late, while the body swings: as consistent as fresh ones."""
     keys = jax.random.split(jax.random.PRNGKey(5), 40)
@@ -187,6 +189,7 @@ def test_an_outlier_is_rejected_and_a_lasting_jump_is_believed_in_the_end():
     assert count < 20 and float(fixed.position[0]) > 50.0
 
 
+@pytest.mark.full
 def test_nothing_that_a_sensor_says_makes_the_estimate_undefined():
     """A sensor that has gone mad, for minutes: numbers of any size, of any age."""
     own, rng = kalman(ALL).filter, np.random.default_rng(0)
@@ -232,6 +235,7 @@ class RawIMU(IMU):
         return IMU.reading(self, motion).at[:2].set(jnp.nan)
 
 
+@pytest.mark.full
 def test_tilt_is_observed_without_a_reading_of_it():
     """Accelerometers tell it where velocities or positions are measured, as well as the filter says."""
     keys = jax.random.split(jax.random.PRNGKey(6), 40)
@@ -252,6 +256,7 @@ class Altimeter(AbstractSensor):
         return ((self.bottom - motion.position[2:]) / motion.rotation[2, 2])[:1]
 
 
+@pytest.mark.full
 def test_a_sensor_of_a_user_needs_no_more_than_its_reading():
     sensors = [imu(), dvl(), compass(), position_fix(), Altimeter(Sampling(0.2, noise=0.02), bottom=20.0)]
     found, _ = followed(kalman(sensors), swinging, 2000, 0.01, jax.random.split(jax.random.PRNGKey(0), 4))
@@ -291,6 +296,7 @@ def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
         assert f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest" in said[0]
 
 
+@pytest.mark.full
 def test_the_drift_that_is_predicted_is_that_of_the_filter():
     """Without fixes and compass: the deviations after a minute are those of a filter that ran for a minute."""
     sensors = [imu(), dvl(resolution=0.0, delay=0.0), depth(resolution=0.0)]
@@ -329,7 +335,7 @@ def test_an_imu_is_needed():
 @pytest.mark.parametrize(
     "precision, duration",
     [
-        ("float32", 30),
+        pytest.param("float32", 30, marks=pytest.mark.full),
         pytest.param("float64", 2000, marks=pytest.mark.slow),
         pytest.param("float32", 2000, marks=pytest.mark.slow),
     ],

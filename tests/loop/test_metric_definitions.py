@@ -37,6 +37,7 @@ def settling(reference, duration=20.0, position=None, load=None, stop=np.inf):
     return found.get("settling_time"), found.get("settling_time_axes"), outcome
 
 
+@pytest.mark.full
 def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
     """By the recorded error itself."""
     whole, axes, outcome = settling(setpoint([1.0, -3.0]), position=np.array([0.5, 0.0]))
@@ -46,6 +47,7 @@ def test_a_step_settles_when_the_error_stays_within_2_percent_of_it():
     assert whole == max(axes) and 1.0 < whole < 15.0
 
 
+@pytest.mark.full
 def test_a_transition_settles_after_its_end():
     """Not before the target rests, however well it is followed; 2 % of the way, not of an error that was none at first."""
     whole, _, outcome = settling(setpoint([1.0, 2.0], settling=5.0))
@@ -54,11 +56,13 @@ def test_a_transition_settles_after_its_end():
     assert whole == pytest.approx(max(5.0, late), abs=2 * DT)
 
 
+@pytest.mark.full
 def test_a_moving_target_has_no_settling_time():
     whole, axes, _ = settling(sine(amplitude=[1.0, 1.0]))
     assert whole is None and axes is None
 
 
+@pytest.mark.full
 def test_until_a_window_ends():
     """What comes after the window does not count: a load that unsettles it later.
 
@@ -69,6 +73,7 @@ def test_until_a_window_ends():
     assert stopped(14.0) == settling(setpoint([1.0, 1.0]))[0] == pytest.approx(11.91, abs=DT)
 
 
+@pytest.mark.full
 def test_never_and_no_way_to_go():
     whole, axes, _ = settling(setpoint([1.0, 0.0]), load=sinusoid(30.0, 1.0))
     assert whole == axes[0] == np.inf, "the load keeps it out of the band for ever"
@@ -76,6 +81,7 @@ def test_never_and_no_way_to_go():
     assert settling(setpoint([0.0, 0.0]))[0] is None
 
 
+@pytest.mark.full
 def test_many_runs_at_once_have_the_same_times():
     import jax
 
@@ -127,6 +133,7 @@ def test_the_table_of_a_run_says_newtons(tmp_path, capsys):
     assert metrics["steady"]["rules"] == metrics["whole"]["rules"] == 3
 
 
+@pytest.mark.full
 def test_from_python_too():
     plant = ut.plants.inverted_pendulum()
     law = rcaf(plant.model(), preset="robust", sampling_time=DT)
@@ -136,6 +143,7 @@ def test_from_python_too():
     assert found.metrics["steady"]["rules"] == found.metrics["whole"]["rules"] == 5, "those of the preset"
 
 
+@pytest.mark.full
 def test_metres_and_radians_never_make_one_number():
     """Every metric of the outputs, of a law that has all signals, against NumPy: those in m, those in rad, and each."""
     rng, steps, gathered = np.random.default_rng(3), 40, Metrics(units=("m", "rad", "m"))
@@ -165,6 +173,7 @@ def test_metres_and_radians_never_make_one_number():
     np.testing.assert_array_equal(peaks, np.abs(series["weights"]).max((0, 2)))
 
 
+@pytest.mark.full
 def test_energy_is_that_of_the_ledger_where_there_is_one():
     """Between two times, in a made-up run whose power at the samples says something else."""
     gathered, times = Metrics(0.1, 0.3), np.arange(5) / 10
@@ -183,6 +192,7 @@ def test_energy_is_that_of_the_ledger_where_there_is_one():
     assert energy(power=power, energy_source=7.0 + times**3) == pytest.approx(0.3**3 - 0.1**3)
 
 
+@pytest.mark.full
 def test_units_of_metrics_of_the_outputs():
     arm, law = two_link_arm(), lambda plant: rcaf(plant.model(), preset="robust", sampling_time=DT)
     loop = ClosedLoop(arm, law(arm), setpoint(np.zeros(2)), none(), perfect())

@@ -15,6 +15,8 @@ from undertow.loop.stepped import put
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.full
+
 SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "pid", "frequency": 2.0},

@@ -66,6 +66,7 @@ SCENARIO = {
 PRECISIONS = ("float64", "float32")
 
 
+@pytest.mark.full
 def test_importing_changes_nothing():
     """Neither the package, nor any public name, nor any module by itself."""
     done = subprocess.run([sys.executable, "-c", PROCESS + EVERYTHING], capture_output=True, text=True)
@@ -132,7 +133,7 @@ def alone():
 @pytest.mark.parametrize(
     ("double", "ways"),
     [
-        (False, ("xla", "campaign")),
+        pytest.param(False, ("xla", "campaign"), marks=pytest.mark.full),
         pytest.param(False, ("parts", "scenario"), marks=pytest.mark.slow),
         pytest.param(True, tuple(WAYS), marks=pytest.mark.slow),
     ],
@@ -155,12 +156,14 @@ def test_precisions_interleaved_in_threads(alone, double, ways):
     assert jax.config.jax_enable_x64 is before
 
 
+@pytest.mark.full
 def test_the_two_precisions_differ(alone):
     for way in WAYS:
         assert not np.array_equal(alone[way, "float64"][0], alone[way, "float32"][0]), way
     assert alone["parts", "float32"][0].dtype == np.float32
 
 
+@pytest.mark.full
 def test_parts_and_scenario_agree(alone):
     """The same loop given in two ways: bit for bit, in either precision."""
     for precision in PRECISIONS:

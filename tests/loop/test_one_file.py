@@ -116,6 +116,7 @@ def written(folder, **changes):
     return path
 
 
+@pytest.mark.full
 def test_a_metric_of_ones_own_in_a_run(folder, capsys):
     assert command(["simulate", str(written(folder)), "--out", str(folder / "out"), "--no-prediction"]) == 0
     with xr.open_dataset(folder / "out" / "run.nc") as run:
@@ -127,6 +128,7 @@ def test_a_metric_of_ones_own_in_a_run(folder, capsys):
     assert row.replace("│", " ").split()[-1] == "m"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.slow)])
 def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
     """A column like every other, and a criterion of success: each trial is what its run is."""
@@ -159,6 +161,7 @@ def test_a_signal_of_ones_own(folder):
     np.testing.assert_allclose(found["series:surface"][0], run["surface"], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.full
 def test_a_certificate_of_ones_own(folder, capsys):
     """Registered in the law's own file: in the dataset, metrics.json, on the terminal and as a figure."""
     (folder / "certified.py").write_text(CERTIFIED)

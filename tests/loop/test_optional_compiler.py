@@ -85,6 +85,7 @@ def compare_runs(folder, code, said, hidden):
         np.testing.assert_allclose(found["position"], wanted["position"], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.full
 def test_simulate(folder, done):
     compare_runs(folder, *done["simulate"], "simdjit")
 
@@ -102,6 +103,7 @@ def execute_file(folder):
     return executed.dataset
 
 
+@pytest.mark.full
 def test_campaign(done):
     code, said = done["campaign"]
     assert code == 0, said
@@ -115,6 +117,7 @@ def test_analyze(tmp_path):
     assert code == 0, said
 
 
+@pytest.mark.full
 def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
     """The other figures stand, and the reason."""
     monkeypatch.setattr(simd_batch, "unavailable", lambda: "there is no compiler")
@@ -132,16 +135,19 @@ def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
     assert not [key for key in found if key.startswith(("single_ns", "batch", "gpu", "w2"))]
 
 
+@pytest.mark.full
 def test_check_and_list(done):
     assert done["check"][0] == done["list"][0] == 0
 
 
+@pytest.mark.full
 def test_nothing_is_exported(folder, done):
     code, said = done["export"]
     assert code == 2 and not (folder / "code").exists()
     assert "Nothing can be exported: the batch compiler cannot be imported" in " ".join(said.split())
 
 
+@pytest.mark.full
 def test_two_modules_know_the_compiler():
     """What runs and what is exported, and of the compiler only its public face."""
     import ast

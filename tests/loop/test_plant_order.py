@@ -143,6 +143,7 @@ def test_a_jump_at_a_tick_is_met_exactly():
     assert np.abs(np.asarray(inside.signals["position"])[:, 0] - smeared).max() > 1e-4
 
 
+@pytest.mark.full
 def test_declared_jumps_are_met_by_the_continuous_loop():
     """A pulse of 0.1 ms after a long calm: only an integrator that was told of it sees it."""
     slow = {"adaptation": 0.0, "robust_gain": 0.0, "pole": 1.0, "compensation_gain": 0.0}

@@ -83,6 +83,7 @@ def test_by_xla_too():
     assert content("float32", "xla") != double == content("float64", "xla")
 
 
+@pytest.mark.full
 def test_a_campaign_across_precisions():
     """Each trial as in a campaign of its precision alone; tasks of one precision only do not decide about the columns."""
     campaign = {"scenario": SCENARIO, "trials": 3, "chunk": 2, "seed": 7}

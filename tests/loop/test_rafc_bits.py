@@ -2,6 +2,7 @@
 
 import jax
 import numpy as np
+import pytest
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractContinuousController, Model
@@ -12,6 +13,8 @@ from undertow.navigation.white_noise import white_noise
 from undertow.numerics.linear_algebra import matvec
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
+
+pytestmark = pytest.mark.full
 
 
 class PlainRAFC(AbstractContinuousController):

@@ -77,7 +77,10 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     "simulate",
     [pytest.param(sampled.simulate, id="xla", marks=pytest.mark.slow), pytest.param(simd_batch.simulate, id="simd")],
 )
-@pytest.mark.parametrize(("duration", "dt"), [(6e3, 1.0), (1e7, 2e3), (5e-4, 1e-7)])
+@pytest.mark.parametrize(
+    ("duration", "dt"),
+    [pytest.param(6e3, 1.0, marks=pytest.mark.full), (1e7, 2e3), pytest.param(5e-4, 1e-7, marks=pytest.mark.full)],
+)
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""
     errors = noise_of_a_run(duration, dt, simulate)
@@ -90,6 +93,7 @@ def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
         assert abs((part[1:] * part[:-1]).mean()) < 4 * DEVIATION**2 / np.sqrt(m)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_instruments_are_heard_and_noisy_at_any_time(precision):
     """After 1e7 s at 10 s, and in double precision at a tenth of a microsecond."""

@@ -33,7 +33,10 @@ def on_odin():
     return ClosedLoop(plant, rcaf(plant.model(), sets=3), goal, load, perfect())
 
 
-@pytest.fixture(scope="module", params=[on_axes, pytest.param(on_odin, marks=pytest.mark.slow)])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(on_axes, marks=pytest.mark.full), pytest.param(on_odin, marks=pytest.mark.slow)],
+)
 def loop(request):
     return request.param()
 

@@ -50,6 +50,7 @@ def test_figures_of_both_compilers_agree():
         np.testing.assert_allclose(own.signals[name], series, rtol=1e-9, atol=1e-11, err_msg=name)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("value", "status"), [(1e12, Status.DIVERGED), (float("nan"), Status.NOT_FINITE)])
 def test_a_failed_run_ends_at_the_same_instant_for_the_same_reason(value, status):
     own, wanted = (by(under(Breaks(jnp.asarray(value))), **HOW) for by in (simd_batch.integrate, continuous.simulate))
@@ -69,6 +70,7 @@ def test_arguments_are_those_of_the_other_compiler():
         assert sentences[0] == sentences[1]
 
 
+@pytest.mark.full
 def test_a_scenario_is_run_by_the_backend_that_it_names():
     """`backend: xla` gives the same figures to rounding, and neither run had to change its backend."""
     scenario = {

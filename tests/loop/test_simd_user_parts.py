@@ -8,6 +8,8 @@ import pytest
 
 from undertow.scenario.execute import execute
 
+pytestmark = pytest.mark.full
+
 FILE = Path(__file__).with_name("user_parts.py")
 
 PARTS = {

@@ -23,6 +23,7 @@ from undertow.scenario.reading import dump
 KNOWN = {"position_rms": Metric("m", ""), "attitude_rms": Metric("rad", "")}
 
 
+@pytest.mark.full
 def test_metres_and_radians_are_never_one_number():
     """Outputs in m and rad of one plant: each group is the rms of its own axes, and there is none of all."""
     units = ("m", "rad", "m", "rad")
@@ -43,6 +44,7 @@ def test_metres_and_radians_are_never_one_number():
     assert "tracking_rms" not in found
 
 
+@pytest.mark.full
 def test_orientation_is_the_angle_of_the_rotation_between_attitude_and_target():
     """Against SciPy, sample by sample, with pitches beyond 90 degrees; a target that is written in other angles is the same."""
     plant = DoubleIntegrator(np.inf, outputs=("roll", "pitch", "yaw"), output_units=("rad",) * 3)
@@ -101,6 +103,7 @@ SCENARIO = {
 }
 
 
+@pytest.mark.full
 def test_completed_is_not_success():
     """The same loop with a limit above and below its error; the default where nothing is said."""
     found = execute(SCENARIO)
@@ -112,6 +115,7 @@ def test_completed_is_not_success():
     assert execute(SCENARIO | {"success": {}}).success is None
 
 
+@pytest.mark.full
 def test_success_of_trials():
     """Of the two amplitudes one is within; a trial that fails is not, and without a criterion none is judged."""
     error = execute(SCENARIO | {"steady": {"every_step": True}}).steady["position_rms"]

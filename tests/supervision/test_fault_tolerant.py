@@ -48,6 +48,7 @@ def found():
     return batch(loops(fault_tolerant(LAW, DT), losses()), signals).signals
 
 
+@pytest.mark.full
 def test_the_batch_compiler_takes_it_and_without_a_fault_the_run_has_the_bits_of_the_law_alone(found):
     alone = batch(loops(LAW, losses()[:2]), ("input", "position")).signals
     np.testing.assert_array_equal(found["input"][0], alone["input"][0])
@@ -55,6 +56,7 @@ def test_the_batch_compiler_takes_it_and_without_a_fault_the_run_has_the_bits_of
     assert not found["lost_thrusters"][0].any() and not found["lost_axes"][0].any()
 
 
+@pytest.mark.full
 def test_a_thruster_that_works_and_fails_is_found_within_half_a_second_and_no_other_ever(found):
     lost, start = found["lost_thrusters"][1:] > 0, round(ONSET / DT)
     failing = np.tile(np.eye(8, dtype=bool), (2, 1))
@@ -65,6 +67,7 @@ def test_a_thruster_that_works_and_fails_is_found_within_half_a_second_and_no_ot
     assert lost[:, -1].any(-1)[np.tile(working, 2)].all() and (times[np.tile(working, 2)] <= 0.5).all()
 
 
+@pytest.mark.full
 def test_a_lost_thruster_gets_no_command_and_seven_of_eight_control_every_axis(found):
     lost = found["lost_thrusters"] > 0
     assert lost.any() and (found["input"][lost] == 0.0).all() and not found["lost_axes"].any()

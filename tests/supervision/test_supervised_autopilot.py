@@ -6,6 +6,8 @@ import pytest
 import undertow as ut
 from undertow.supervision.supervised_controller import state_in
 
+pytestmark = pytest.mark.full
+
 SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": "pid",

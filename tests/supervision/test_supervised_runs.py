@@ -47,7 +47,9 @@ def _outcome(scenario, duration=3.0):
         return simd_batch.simulate(built.closed_loop, duration=duration, dt=built.scenario.loop.dt, record_every=1)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(
+    "name", [*(pytest.param(name, marks=pytest.mark.full) for name in ("robust", "pid", "paper")), "pendulum"]
+)
 def test_where_nothing_is_wrong_a_run_has_the_same_bits(name):
     alone, watched = _outcome(SCENARIOS[name]), _outcome(SCENARIOS[name] | {"supervisor": True})
     for signal in set(alone.signals) - {"commanded_input"}:
@@ -90,6 +92,7 @@ def _step(parts, x, z):
     return new, supervised.advance(z, y, r, applied, jnp.asarray(T)), u
 
 
+@pytest.mark.full
 def test_a_thousand_transfers_make_no_jump():
     run, chance = Controlled(), np.random.default_rng(0)
     most = float(run.supervised.slew) * 32.0 * T
@@ -111,6 +114,7 @@ def test_a_thousand_transfers_make_no_jump():
     assert {(State.READY, False), (State.READY, True), (State.ACTIVE, True), (State.ACTIVE, False)} <= seen
 
 
+@pytest.mark.full
 def test_stopped_is_for_good():
     run = Controlled()
     for _ in range(5):

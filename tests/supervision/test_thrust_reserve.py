@@ -7,6 +7,8 @@ import undertow as ut
 from undertow.analysis.thrust_reserve import attainable_wrench, controlled_axes, reference_reserve
 from undertow.core.errors import BadInput
 
+pytestmark = pytest.mark.full
+
 LOW, HIGH = -40.0, 50.0  # N
 ODIN = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.t200())
 HEAVE, ROLL, PITCH, YAW = 2, 3, 4, 5
