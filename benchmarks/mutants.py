@@ -1,13 +1,13 @@
 """Do the tests notice a wrong program? Mutants of what computes, drawn at random, and the tests that kill them.
 
 A mutant is the project with one operator, number, comparison or condition of one file changed (operators of Cosmic Ray,
-`pip install cosmic-ray`). Every site of a change in the rooms below is as likely as any other. Each mutant is tested in
-a copy of the project by itself; a mutant that no test notices has survived.
+`pip install cosmic-ray`). Every site of a change in the rooms below is as likely as any other. Mutants are tested one
+by one in a copy of the project; a mutant that no test notices has survived.
 
     python benchmarks/mutants.py --out mutants.csv                    # 100 mutants, the quick set
     python benchmarks/mutants.py --list                               # draw and print them only
-    python benchmarks/mutants.py --only 3,17 --tests "-m full -n 2"   # further tests for some of them
-    python benchmarks/mutants.py --together 3,17 --tests "-m full -n 2"  # all of these in one copy, which saves time
+    python benchmarks/mutants.py --only 3,17 --tests "-m full -n auto"             # further tests for some of them
+    python benchmarks/mutants.py --only 3,17 --tests "-m full -n auto" --together  # all in one copy, which saves time
 
 Where many survivors stand together in one copy, a full set that passes has missed all of them.
 """
@@ -16,6 +16,7 @@ import argparse
 import ast
 import csv
 import itertools
+import os
 import random
 import re
 import shutil
@@ -109,27 +110,36 @@ def draw(count: int, seed: int) -> list[Mutant]:
     return list(itertools.islice(filter(is_python, drawn), count))
 
 
-def project_with(mutants: list[Mutant], folder: Path) -> Path:
-    """A copy of the tracked files with these changes."""
-    copy = folder / "project"
-    files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    for name in files:
-        if (ROOT / name).is_file():
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, copy / name)
-    for mutant in mutants:
-        path = copy / mutant.path
-        path.write_text(mutant.code(path.read_text()))
-    return copy
+class Copy:
+    """A copy of the tracked files with caches of its own, in which mutants stand one after the other."""
 
+    def __init__(self, folder: Path, tests: str):
+        self.project, self.caches, self.tests = folder / "project", folder / "caches", tests
+        command = ["git", "ls-files"]
+        for name in subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
+            (self.project / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, self.project / name)
 
-def failures(mutants: list[Mutant], tests: str) -> list[str]:
-    """Tests that fail with these changes; one sentence where the tests did not come to an end."""
-    with tempfile.TemporaryDirectory() as folder:
-        copy = project_with(mutants, Path(folder))
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests.split()]
+    def failures(self, mutants: list[Mutant]) -> list[str]:
+        """Tests that fail with these changes; one sentence where the tests did not come to an end."""
+        paths = {self.project / mutant.path for mutant in mutants}
+        originals = {path: path.read_text() for path in paths}
+        for mutant in mutants:
+            path = self.project / mutant.path
+            path.write_text(mutant.code(path.read_text()))
         try:
-            ended = subprocess.run(command, cwd=copy, capture_output=True, text=True, timeout=SECONDS)
+            return self._failures()
+        finally:
+            for path, original in originals.items():
+                path.write_text(original)
+
+    def _failures(self) -> list[str]:
+        environment = os.environ | {"UNDERTOW_CACHE": str(self.caches), "PYTHONPATH": str(self.project)}
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *self.tests.split()]
+        try:
+            ended = subprocess.run(
+                command, cwd=self.project, env=environment, capture_output=True, text=True, timeout=SECONDS
+            )
         except subprocess.TimeoutExpired:
             return [f"no end within {SECONDS} s"]
         found = FAILED.findall(ended.stdout)
@@ -143,24 +153,26 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=38)
     parser.add_argument("--tests", default="-x", help="arguments of pytest")
     parser.add_argument("--only", help="numbers of mutants, with commas")
-    parser.add_argument("--together", help="numbers of mutants that stand in one copy")
-    parser.add_argument("--list", action="store_true")
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--together", action="store_true", help="all of them in one copy")
+    parser.add_argument("--list", action="store_true", help="draw and print them only")
+    parser.add_argument("--out", type=Path, help="a table as CSV")
     options = parser.parse_args()
     mutants = draw(options.count, options.seed)
-    chosen = options.together or options.only
-    numbers = [int(number) for number in chosen.split(",")] if chosen else range(len(mutants))
-    if options.together:
-        for test in failures([mutants[number] for number in numbers], options.tests):
-            print(test)
-        return
-    rows = []
-    for number in numbers:
-        mutant = mutants[number]
-        killers = [] if options.list else failures([mutant], options.tests)
-        verdict = "" if options.list else ("killed" if killers else "survived")
-        rows.append([number, f"{mutant.path}:{mutant.line}", mutant.change(), verdict, " ".join(killers[:1])])
-        print(*rows[-1], sep=" | ", flush=True)
+    numbers = [int(number) for number in options.only.split(",")] if options.only else list(range(len(mutants)))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Copy(Path(folder), options.tests)
+        if options.together:
+            print(*copy.failures([mutants[number] for number in numbers]), sep="\n")
+            return
+        if not options.list and (broken := copy.failures([])):
+            sys.exit(f"Without a mutant these tests fail: {' '.join(broken)}")
+        rows = []
+        for number in numbers:
+            mutant = mutants[number]
+            killers = [] if options.list else copy.failures([mutant])
+            verdict = "" if options.list else "killed" if killers else "survived"
+            rows.append([number, f"{mutant.path}:{mutant.line}", mutant.change(), verdict, " ".join(killers[:1])])
+            print(*rows[-1], sep=" | ", flush=True)
     if options.out:
         with options.out.open("w", newline="") as file:
             csv.writer(file).writerows([["number", "where", "change", "verdict", "first test that fails"], *rows])

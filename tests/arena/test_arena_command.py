@@ -27,6 +27,7 @@ def errors(text: str) -> dict[tuple[str, str, str], float]:
     return {(row["law"], row["task"], row["vehicle"]): float(row["error"]) for row in rows}
 
 
+@pytest.mark.full
 def test_two_laws_enter_one_after_the_other(folder, capsys):
     """The numbers of the first stay when the second enters, and a scenario of the folder repeats a trial."""
     assert run(["arena", "pid", *SMALL]) == 0
@@ -49,6 +50,7 @@ def test_two_laws_enter_one_after_the_other(folder, capsys):
     assert scenario.data["reference"]["position"][4] == 2.0 and scenario.data["controller"] == {"kind": "pid"}
 
 
+@pytest.mark.full
 def test_a_law_of_a_file_and_one_that_is_refused(folder, capsys):
     """A file enters by its name; where a law does not accept a vehicle, the task counts as lost."""
     assert run(["init", "--own-controller"]) == 0
@@ -87,6 +89,7 @@ def test_mistakes(folder, capsys, arguments, says):
     assert not Path("out").exists()
 
 
+@pytest.mark.full
 def test_damage_and_other_versions(folder, capsys, monkeypatch):
     """An entry that cannot be read, is of another version, or of another law of the same name."""
     monkeypatch.setattr(command, "_trials", lambda *given: None)
@@ -112,6 +115,7 @@ def test_damage_and_other_versions(folder, capsys, monkeypatch):
     assert file.read_text() == good
 
 
+@pytest.mark.full
 def test_a_store_that_is_damaged(folder, capsys):
     """The law is named, both when it continues and when another one enters beside it."""
     few = ["--trials", "1", "--tasks", "payload", "--vehicles", "odin", "--out", "out"]
@@ -129,6 +133,7 @@ def test_every_law_of_the_default_list_is_known():
     assert [one.name for one in laws(list(command.EVERY))] == list(command.EVERY)
 
 
+@pytest.mark.full
 def test_a_law_that_no_vehicle_accepts_is_an_error():
     """With the reason, and nothing that could be taken for a result."""
     (law,) = laws(["pid"])

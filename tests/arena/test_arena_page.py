@@ -68,6 +68,7 @@ def test_rank_is_by_error():
     assert [one.score.name for one in ranked([bad, good])] == ["good", "bad"]
 
 
+@pytest.mark.full
 def test_figures_show_the_numbers(board):
     texts = {text.get_text() for text in tasks_figure(board).axes[0].texts}
     assert texts == {"0.20", "10"}
@@ -78,6 +79,7 @@ def test_figures_show_the_numbers(board):
         assert crosses == [parameter.levels[0], parameter.levels[3]]  # where pid, and where robust is lost first
 
 
+@pytest.mark.full
 def test_page(board, tmp_path):
     page, failed = write_board(board, tmp_path)
     text = page.read_text()

@@ -27,6 +27,7 @@ def test_twelve_tasks_on_four_vehicles():
     assert len({tuple(sorted(scenario_keys(*cell))) for cell in CELLS}) == 1  # variants of one campaign
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("task", TASKS)
 def test_every_task_builds(task):
     for vehicle in TASKS[task].vehicles:
@@ -35,6 +36,7 @@ def test_every_task_builds(task):
         assert set(built.scenario.success) == {"position_rms", "orientation_rms"}
 
 
+@pytest.mark.full
 def test_the_model_does_not_know_what_a_task_hides():
     """Low supply, another parameter set and the errors of parameters are of the plant alone."""
     low = build(from_data(scenario_keys("low_battery", "bluerov2_heavy") | {"controller": "pid"})).resolved

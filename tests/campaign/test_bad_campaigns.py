@@ -15,6 +15,7 @@ from undertow.core.disk import alone
 from undertow.scenario.reading import dump
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "changes, said",
     [
@@ -147,9 +148,10 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
         (["campaign", "campaign.yaml", "out"], r"`DIR` must follow the word `status`, but is out. .*`--out out`"),
         (["campaign", "status", "out", "--resume"], r"`--resume` must be left out with `status`"),
         (["campaign", "campaign.yaml", "--resume", "--overwrite"], r"`--resume` must be without --overwrite"),
-        (
+        pytest.param(
             ["check", "campaign.yaml", "--option", "seed=1"],
             r"`--option` must be left out for a campaign, but is seed=1",
+            marks=pytest.mark.full,
         ),
         (
             ["campaign", "campaign.yaml", "--out", "/proc/out"],
@@ -200,6 +202,7 @@ def test_what_a_cluster_lacks_is_told_before_anything_is_built(
     )
 
 
+@pytest.mark.full
 def test_a_damaged_store_is_told_and_mended(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=8, chunk=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
@@ -230,6 +233,7 @@ def test_a_mass_without_its_weight_is_told(campaign_file, tmp_path, capsys):
     assert re.search(f"Advice: {said}", capsys.readouterr().err)
 
 
+@pytest.mark.full
 def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
     path, out = campaign_file(trials=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
@@ -243,6 +247,7 @@ def test_an_earlier_campaign_is_not_touched(campaign_file, tmp_path, capsys):
     assert contents(out) == before
 
 
+@pytest.mark.full
 def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp_path, capsys):
     """As another process would find it: the store is locked."""
     path, out = campaign_file(trials=4), tmp_path / "out"
@@ -254,6 +259,7 @@ def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp
     assert contents(out) == before
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "content",
     ["", *(pytest.param(one, marks=pytest.mark.slow) for one in ("[]", '{"zarr_format": 3, "node_type": "array"}'))],
@@ -273,6 +279,7 @@ def test_a_store_without_its_first_file_is_told(campaign_file, tmp_path, capsys,
     assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 0
 
 
+@pytest.mark.full
 def test_the_status_of_what_was_stopped_at_once(campaign_file, tmp_path, capsys):
     """No row is written yet, or not even what the campaign is."""
     path, out = campaign_file(trials=4), tmp_path / "out"
@@ -291,6 +298,7 @@ def stopped(function, work):
     raise KeyboardInterrupt
 
 
+@pytest.mark.full
 def test_trials_that_will_be_refused_are_told_before(campaign_file, tmp_path, capsys):
     vary = {"controller.frequency": {"uniform": [-1.0, 2.0]}}
     assert run(["campaign", str(campaign_file(trials=12, vary=vary, seed=5)), "--out", str(tmp_path / "out")]) == 1
@@ -299,6 +307,7 @@ def test_trials_that_will_be_refused_are_told_before(campaign_file, tmp_path, ca
     assert re.search(r"100% 12 of 12 trials, [\d.]+ per second, 0 failed, [2-6] invalid\n", said.out)
 
 
+@pytest.mark.full
 def test_a_share_that_so_few_trials_cannot_show_is_told(campaign_file, tmp_path, capsys):
     """The interval of n out of n starts at 0.025^(1/n): 0.9 needs 36 trials, and they are enough."""
     required = {"position_rms": {"below": 1e6, "share": 0.9}}

@@ -11,7 +11,7 @@ from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import validate, whole
 from undertow.campaign.task import INVALID, run_trials, site
 from undertow.campaign.trials import Trials, trials
-from undertow.loop import simd_batch
+from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -31,6 +31,7 @@ def columns(data, rows):
     return run_trials(text_of(data), "", rows)
 
 
+@pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.full)], indirect=True)
 def test_rows_are_runs(campaign, backend):
     found = columns(campaign(), range(3))
     for trial in range(3):
@@ -43,6 +44,17 @@ def test_rows_are_runs(campaign, backend):
         assert found["vary:disturbance.amplitude"][trial] == float(built.closed_loop.disturbance.amplitude)
 
 
+@pytest.mark.parametrize("runs", [1, 4, 9])
+def test_pieces_of_a_batch_are_in_order(runs):
+    """Four at once; the last piece is filled up, and what fills it is left out."""
+    program = vmap_batch._batched(lambda x: {"double": 2 * x, "sum": x.sum()}, np.zeros(3), 4)
+    x = np.arange(3.0 * runs).reshape(runs, 3)
+    found = program(x)
+    np.testing.assert_array_equal(found["double"], 2 * x)
+    np.testing.assert_array_equal(found["sum"], x.sum(1))
+
+
+@pytest.mark.full
 def test_no_bit_depends_on_how_trials_are_cut_into_tasks(campaign, backend):
     """Tasks of 1, 7 and 20 trials, backwards; fewer and more than there are lanes."""
     two = campaign(cross={"controller": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "preset": "robust"}]})
@@ -70,6 +82,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     assert len(emulated.launches) == 4 and not emulated.buffers
 
 
+@pytest.mark.full
 def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
     """The same trials with everything that probes share built in, and with nothing built in."""
     found = columns(campaign(), range(9))
@@ -81,6 +94,7 @@ def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
         np.testing.assert_array_equal(general[name], expected, err_msg=name)
 
 
+@pytest.mark.full
 def test_a_trial_unlike_all_probes(campaign):
     """A choice that no probe drew is flown all the same, and like the run itself."""
     rare = campaign(vary={"plant.limit": {"choice": [20.0] * 19 + [0.1]}}, design="random")
@@ -96,6 +110,7 @@ def test_a_trial_unlike_all_probes(campaign):
     )
 
 
+@pytest.mark.full
 def test_a_run_that_fails_costs_no_other(campaign, backend):
     """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
     unlimited = lambda *frequencies: campaign(
@@ -108,18 +123,21 @@ def test_a_run_that_fails_costs_no_other(campaign, backend):
     np.testing.assert_array_equal(bad["position_rms"][::2], good["position_rms"][::2])
 
 
+@pytest.mark.full
 def test_a_trial_that_cannot_be_built_is_a_row(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), range(4))
     assert found["status"].tolist() == [0, INVALID, 0, INVALID]
     assert np.isnan(found["position_rms"]).tolist() == [False, True, False, True]
 
 
+@pytest.mark.full
 def test_a_task_in_which_no_trial_can_be_built(campaign):
     found = columns(campaign(cross={"controller.frequency": [2.0, -1.0]}, trials=2), [1, 3])
     assert found["status"].tolist() == [INVALID, INVALID]
     assert np.isnan(found["position_rms"]).all() and np.isnan(found["ended"]).all()
 
 
+@pytest.mark.full
 def test_series_are_those_of_the_runs(campaign):
     found = columns(campaign(series={"signals": ["position"], "every": 0.5}), range(2))
     built = build(made(campaign()).data(1))
@@ -128,6 +146,7 @@ def test_series_are_those_of_the_runs(campaign):
     np.testing.assert_allclose(found["series:position"][1], run.signals["position"], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.full
 def test_single_precision(campaign):
     """Without noise, which is drawn differently."""
     scenario = campaign()["scenario"] | {"navigation": "perfect"}

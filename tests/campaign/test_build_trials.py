@@ -147,6 +147,8 @@ import jax.numpy as jnp
 import numpy as np
 from undertow.disturbances.sinusoid import sinusoid
 
+pytestmark = pytest.mark.full
+
 def by_numpy(amplitude=1.0):
     return sinusoid(amplitude=float(np.sqrt(amplitude)))
 

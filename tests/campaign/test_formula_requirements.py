@@ -39,6 +39,7 @@ def campaign(tmp_path, monkeypatch):
     return path
 
 
+@pytest.mark.full
 def test_robustness_is_that_of_single_runs(campaign, tmp_path):
     assert run(["campaign", "c.yaml", "--out", "out"]) == 0
     rows = xr.open_zarr(tmp_path / "out" / "trials.zarr", consolidated=False).load()
@@ -54,6 +55,7 @@ def test_robustness_is_that_of_single_runs(campaign, tmp_path):
     assert "within 4 s always abs(error)" in page
 
 
+@pytest.mark.full
 def test_another_formula_is_another_campaign(campaign, capsys):
     assert run(["campaign", "c.yaml", "--out", "out"]) == 0
     campaign.write_text(CAMPAIGN.replace("below: 0.4", "below: 0.5"))
@@ -63,6 +65,7 @@ def test_another_formula_is_another_campaign(campaign, capsys):
     assert "`requirements.settles` was" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_series_beside_formulas(campaign, tmp_path):
     campaign.write_text(CAMPAIGN + "series: {signals: [position], every: 0.1}\n")
     assert run(["campaign", "c.yaml", "--out", "out"]) == 0

@@ -21,6 +21,8 @@ from undertow.campaign.prepare import prepare
 from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 
+pytestmark = pytest.mark.full
+
 
 def killed(path, out, kills, longest):
     """Start the campaign, kill it after a while, and so on; then let it finish. Kills that came before the end."""

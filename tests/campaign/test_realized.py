@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from undertow.campaign.build_trials import build_trial
 from undertow.campaign.prepare import prepare
@@ -10,6 +11,8 @@ from undertow.campaign.realized import realized_scalars
 from undertow.cli.main import run
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.part_cache import PartCache
+
+pytestmark = pytest.mark.full
 
 PUSH = """
 import jax

@@ -13,6 +13,8 @@ from undertow.campaign.run_campaign import STORE
 from undertow.campaign.task import site
 from undertow.cli.main import run
 
+pytestmark = pytest.mark.full
+
 CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
 
 

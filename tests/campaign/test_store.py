@@ -71,6 +71,7 @@ def small(campaign_file, flown, tmp_path):
     return campaign_file(), whole
 
 
+@pytest.mark.full
 def test_two_lines_of_xarray_open_it(small, tmp_path):
     results = xr.open_zarr(tmp_path / "whole" / STORE, consolidated=False)
     assert results["position_rms"].sizes == {"sample": 40}
@@ -85,6 +86,7 @@ def test_two_lines_of_xarray_open_it(small, tmp_path):
     assert np.corrcoef(amplitude, results["position_rms"])[0, 1] > 0.99
 
 
+@pytest.mark.full
 def test_order_and_threads_do_not_matter(small, tmp_path):
     path, whole = small
     assert ran(path, tmp_path / "backwards", backwards) == whole
@@ -113,7 +115,7 @@ def stop_after(count):
     return executor
 
 
-@pytest.mark.parametrize("count", [0, 1, 2])
+@pytest.mark.parametrize("count", [*(pytest.param(one, marks=pytest.mark.full) for one in (0, 2)), 1])
 def test_an_interrupted_campaign_ends_where_it_would_have(small, tmp_path, count):
     path, whole = small
     with pytest.raises(KeyboardInterrupt):
@@ -121,6 +123,7 @@ def test_an_interrupted_campaign_ends_where_it_would_have(small, tmp_path, count
     assert ran(path, tmp_path / "cut") == whole
 
 
+@pytest.mark.full
 def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
     path, whole = small
     torn = tmp_path / "whole" / STORE / "position_rms" / "c" / "1"
@@ -130,6 +133,7 @@ def test_a_chunk_that_was_torn_is_flown_again(small, tmp_path):
     assert counted == [24, 40]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["position_rms", "status"])  # zeros, too
 def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
     path, whole = small
@@ -139,6 +143,7 @@ def test_a_chunk_that_is_gone_is_flown_again(small, tmp_path, name):
     assert counted == [32, 40]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("harm", ["column", "its metadata", "flags", "coordinate"])
 def test_what_is_missing_of_a_store_is_made_again(flown, tmp_path, harm):
     path, out, whole = flown(series={"signals": ["position"], "every": 0.5})
@@ -150,6 +155,7 @@ def test_what_is_missing_of_a_store_is_made_again(flown, tmp_path, harm):
     assert ran(path, tmp_path / "out") == whole
 
 
+@pytest.mark.full
 def test_a_task_of_which_nothing_can_be_flown_is_done_once(campaign_file, tmp_path):
     """With series, too: their shape is that of the others."""
     vary = {"controller.frequency": {"choice": [-1.0, 2.0]}}
@@ -164,6 +170,7 @@ def test_a_task_of_which_nothing_can_be_flown_is_done_once(campaign_file, tmp_pa
     assert (np.isnan(rows["series:position"].values).all(axis=(1, 2)) == invalid).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("at", [0, 3, 11, 30])
 def test_a_full_disk_loses_nothing(small, tmp_path, monkeypatch, at):
     """Writing fails at some array of some task; what was done before stays, and the rest is flown later."""
@@ -198,14 +205,22 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
             {"vary": {"disturbance.amplitude": {"uniform": [0.5, 3.0]}}},
             "`vary.disturbance.amplitude.uniform[1]` was 2, is 3",
         ),
-        ({}, {"series": {}}, "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}"),
+        pytest.param(
+            {},
+            {"series": {}},
+            "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}",
+            marks=pytest.mark.full,
+        ),
         ({}, {"trials": 80, "requirements": {}, "design": "latin"}, "`design` was random, is latin"),
         ({}, {"trials": 39}, "`trials` was 40, is 39"),
-        ({"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41"),
-        (
+        pytest.param(
+            {"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41", marks=pytest.mark.full
+        ),
+        pytest.param(
             {"cross": {"controller.frequency": [1.0, 2.0]}},
             {"cross": {"controller.frequency": [2.0, 1.0]}},
             "`order of cross.controller.frequency` was 1.0, 2.0, is 2.0, 1.0",
+            marks=pytest.mark.full,
         ),
     ],
 )
@@ -218,6 +233,7 @@ def test_what_differs_is_named(campaign_file, tmp_path, before, now, said):
         other.check_same({**one.attributes, "campaign": one.asked}, tmp_path)
 
 
+@pytest.mark.full
 def test_spelling_makes_no_other_campaign(campaign, campaign_file, small, tmp_path):
     """Neither 2 for 2.0 nor the order of the scenario's keys."""
     scenario = campaign()["scenario"]
@@ -229,6 +245,7 @@ def test_spelling_makes_no_other_campaign(campaign, campaign_file, small, tmp_pa
 GROWING = {"cross": {"controller.frequency": [2.0, 3.0]}, "series": {"signals": ["position"], "every": 0.5}}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("design", "changes", "before"),  # also where not even the first few samples are there
     [
@@ -247,6 +264,7 @@ def test_further_trials_are_flown_beside_those_that_are_there(campaign_file, tmp
     assert grown == ran(asked(after), tmp_path / "at once")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "kind, name, at",
     [
@@ -280,6 +298,7 @@ def test_a_growth_that_is_cut_short_loses_nothing(campaign_file, flown, tmp_path
     assert ran(more, out) == at_once
 
 
+@pytest.mark.full
 def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file):
     path, whole = small
     with pytest.raises(KeyboardInterrupt):
@@ -287,6 +306,7 @@ def test_the_size_of_tasks_may_change_on_the_way(small, tmp_path, campaign_file)
     assert ran(campaign_file("other", chunk=5), tmp_path / "cut") == whole
 
 
+@pytest.mark.full
 def test_two_do_not_write_at_once(small, tmp_path):
     path, _ = small
 
@@ -298,11 +318,13 @@ def test_two_do_not_write_at_once(small, tmp_path):
     ran(path, tmp_path / "two", during)
 
 
+@pytest.mark.full
 def test_a_row_is_less_than_a_kilobyte(campaign_file, tmp_path):
     whole = ran(campaign_file(trials=500, chunk=250), tmp_path / "large")
     assert sum(map(len, whole.values())) / 500 < 300
 
 
+@pytest.mark.full
 def test_what_a_killed_process_left_is_cleared_away(small, tmp_path):
     path, whole = small
     ran(path, tmp_path / "again")
@@ -311,6 +333,7 @@ def test_what_a_killed_process_left_is_cleared_away(small, tmp_path):
     assert ran(path, tmp_path / "again") == whole
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("content", [b"", b"\xff\x00junk"])
 def test_a_torn_flag_is_no_flag(small, tmp_path, content):
     """As a power cut leaves it: the task is done again, the status of the campaign can be told all the while."""
@@ -333,6 +356,7 @@ EDITS = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("key", EDITS)
 def test_metadata_that_were_edited_are_told(small, tmp_path, key):
     """With others the same chunks are other numbers. Nothing is read, and nothing flown, until they are put back."""

@@ -74,6 +74,7 @@ def note(part, law, source=None):
     return tuning_note(part, law(double_integrator(1).model()), DT, Path(), source)
 
 
+@pytest.mark.full
 def test_how_gains_came_about():
     by_rule = note({"kind": "pid"}, pid)
     assert by_rule.tuned and by_rule.sentence == "gains from the rule of `controllers/bandwidths.py`"
@@ -89,6 +90,7 @@ def test_how_gains_came_about():
     assert not paper.tuned and "Table 1" in paper.sentence
 
 
+@pytest.mark.full
 def test_tuned_gains_are_those_of_the_file_beside(tmp_path):
     """Changed by hand since, they are not."""
     costs = {"given": {"held_out_cost": 3.0}, "tuned": {"held_out_cost": 1.5, "options": {"frequency": [2.5]}}}

@@ -19,6 +19,8 @@ from undertow.cli.main import run
 from undertow.comparison.prepare import prepare_comparison
 from undertow.scenario.reading import dump
 
+pytestmark = pytest.mark.full
+
 WILD = {"kind": "pid", "frequency": 500.0}
 
 

@@ -7,6 +7,8 @@ import xarray as xr
 from undertow.comparison.findings import find
 from undertow.report.figures.comparison import alike, comparison_plots
 
+pytestmark = pytest.mark.full
+
 NAMES, TRIALS, TIME = ["a", "b"], 6, np.linspace(0.0, 20.0, 101)
 
 

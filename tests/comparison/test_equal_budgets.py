@@ -30,6 +30,7 @@ def tuned(scenario):
     return found, *equal_budgets(found, text, BUDGET, Path("kept"), said.append)
 
 
+@pytest.mark.full
 def test_budgets_are_equal_and_no_law_gets_worse(tuned, monkeypatch):
     before, after, found = tuned
     pid, adrc, fixed = found.laws
@@ -53,6 +54,7 @@ def test_budgets_are_equal_and_no_law_gets_worse(tuned, monkeypatch):
         equal_budgets(before, read(Path("axis.yaml")), BUDGET + 1, Path("kept"))
 
 
+@pytest.mark.full
 def test_resumed_command_leaves_the_same_bytes(scenario, monkeypatch, capsys):
     """Stopped in the search of the second law: its evaluations are kept, and the first law is not tuned again."""
     path, costs, asked = scenario(), Evaluation.costs, []
@@ -96,6 +98,7 @@ def test_from_python_tuned_gains_lower_the_error(scenario):
     assert (errors[1] < 0.5 * errors[0]).all()
 
 
+@pytest.mark.full
 def test_trials_are_held_out():
     """Sets that were not trained on, with the scenario's own vehicle as the nominal model; waves of other heights."""
     data = {
@@ -122,6 +125,7 @@ def test_trials_are_held_out():
     assert untouched == base and same == found
 
 
+@pytest.mark.full
 def test_parameters_hold_for_the_scenarios_own_controller(scenario, capsys):
     """Its function is traced with arrays; one that is not made for that says so."""
     Path("mine.py").write_text("from undertow.controllers import pid\n\n" + OPTIONAL.format("frequency"))

@@ -14,6 +14,8 @@ from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import Bounds
 
+pytestmark = pytest.mark.full
+
 DT, K_P, K_D = 0.05, 1.0, 1.0
 PLANT = {
     "plant": {"kind": "double_integrator", "axes": 1},

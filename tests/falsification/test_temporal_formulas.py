@@ -103,6 +103,7 @@ TEXTS = (
 )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("text", TEXTS)
 def test_smooth_robustness_is_near_the_exact_one(text):
     exact = robustness(text)[0]
@@ -111,6 +112,7 @@ def test_smooth_robustness_is_near_the_exact_one(text):
         assert abs(float(robustness(text, smooth(sharpness))[0]) - exact) < 4 * np.log(SIZE) / sharpness
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("text", TEXTS[:2])
 def test_gradient_of_the_smooth_robustness(text):
     """Against central differences of the same."""

@@ -63,6 +63,7 @@ def commanded():
     return evaluate
 
 
+@pytest.mark.full
 def test_both_quaternions_of_an_attitude_get_the_same_voltages(commanded):
     """Through the plant's output and the law's command, at all attitudes."""
     nu = 0.3 * RNG.normal(size=(STARTS, 6))

@@ -30,7 +30,7 @@ def by_least_squares(d, f, c, low, high):
     return lsq_linear(a, b, (low, high), method="bvls", tol=1e-14, max_iter=1000).x
 
 
-@pytest.mark.parametrize("n", [1, 2, 5, 9, 12])
+@pytest.mark.parametrize("n", [5, *(pytest.param(n, marks=pytest.mark.full) for n in (1, 2, 9, 12))])
 @pytest.mark.parametrize("tightness", [0.1, 1.0, 10.0])
 def test_agrees_with_bounded_least_squares(n, tightness):
     for _ in range(40):
@@ -39,7 +39,7 @@ def test_agrees_with_bounded_least_squares(n, tightness):
 
 
 @pytest.mark.parametrize("weight", [1.0, 1e6])
-@pytest.mark.parametrize("n", [8, 32])
+@pytest.mark.parametrize("n", [8, pytest.param(32, marks=pytest.mark.full)])
 def test_allocations_of_many_thrusters(n, weight):
     """As thruster_allocation.py poses them: little weight on each of many variables, much on few combinations."""
     for _ in range(10):
@@ -52,6 +52,7 @@ def test_allocations_of_many_thrusters(n, weight):
         np.testing.assert_allclose(solve(*given), by_least_squares(*given), rtol=1e-7, atol=1e-8)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [1_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_optimality_of_many(count):
     """Inside: no slope. At a bound: the slope points outwards. That is all there is for a convex function."""
@@ -82,6 +83,7 @@ def test_a_variable_may_be_held():
     assert float(found[2]) == 0.7
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivatives_are_those_of_small_changes(mode):
     """Away from a change of the active set, which random problems do not meet."""

@@ -8,6 +8,7 @@ from jaxtyping import TypeCheckError
 from undertow.numerics.linear_algebra import matvec
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("vector", [jnp.ones(2), jnp.ones(()), np.ones(3), jnp.ones((1, 3))])
 def test_another_shape_or_kind_of_array_than_annotated_is_an_error(vector):
     np.testing.assert_array_equal(matvec(jnp.ones((2, 3)), jnp.ones(3)), [3.0, 3.0])

@@ -76,6 +76,7 @@ def test_textbook_rk4_smears_the_same_jump_by_a_sixth_of_a_step():
     np.testing.assert_allclose(end, 1.0 + 0.1 / 6, rtol=0, atol=1e-14)
 
 
+@pytest.mark.full
 def test_suite_u1_keeps_rk4_at_fourth_order_across_all_of_its_jumps():
     """I33 on a plant: 15 s of steps, square wave, pulse and chirp on six axes; jumps at 2, 4, 6, 8, 10, 12, 14 s."""
     plant, suite = double_integrator(axes=6), u1()

@@ -146,6 +146,7 @@ def test_at_full_rank_a_partial_inverse_is_the_whole_one(name):
     np.testing.assert_array_equal(found, jax.vmap(pseudo_inverse)(SHAPES[name]))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name, rank", [("tall", 4), ("rank 3", 3)])
 def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
     """Exactly, whatever is asked for in the others, and with the smallest input that does it."""
@@ -158,6 +159,7 @@ def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
         np.testing.assert_allclose(inverse[:, served], np.linalg.pinv(gain[served]), rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.full
 def test_bluerov2_is_not_asked_to_pitch():
     """Its horizontal thrusters lie below its centre: G+ would have it surge for the sake of pitch."""
     model = hybrid_vehicle(bluerov2(), t200()).model().in_body_axes().dynamics

@@ -8,6 +8,8 @@ from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, scenario
 from undertow.scenario.execute import execute
 
+pytestmark = pytest.mark.full
+
 # Benchmark definitions, section 4: tracking, estimation, uncertainty and robust rms on fidelity `ideal`, suite U1.
 REFERENCE = {
     "rcafc": {"tracking_rms": 1.6e-4, "estimation_rms": 0.201, "uncertainty_rms": 3.224, "robust_rms": 0.144},

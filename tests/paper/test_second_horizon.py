@@ -19,6 +19,8 @@ from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 
+pytestmark = pytest.mark.full
+
 WINDOWS = ((10.0, 20.0), (100.0, 200.0))
 
 

@@ -14,6 +14,8 @@ from textbook import jacobian
 
 import undertow as ut
 
+pytestmark = pytest.mark.full
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "kth_bluerov2.py"
 LAYOUT = np.asarray(ut.vehicles.bluerov2_heavy().thruster_matrix())
 

@@ -58,6 +58,7 @@ def test_state_rates():
     close(rates(X), PEER["xdot(no thruster lag)"])
 
 
+@pytest.mark.full
 def test_five_seconds():
     """Same method and step, so the same digits; |pitch| passes no singularity on the way."""
 

@@ -19,6 +19,8 @@ from undertow.thrusters import paper_table3
 from undertow.vehicles import bluerov2, bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov
 from undertow.vehicles.body import rigid_body_mass
 
+pytestmark = pytest.mark.full
+
 VEHICLES = [odin, bluerov2, bluerov2_heavy, rexrov, npsauv2, remus100, lauv]
 FLIP = np.diag([1.0, -1, -1])
 

@@ -10,6 +10,8 @@ from undertow.core.status import Status
 from undertow.interop.mujoco_engine import Submerged
 from undertow.vehicles import bluerov2_heavy, odin, rexrov
 
+pytestmark = pytest.mark.full
+
 
 def nothing(body):
     return lambda t: np.zeros(body.model.nu)

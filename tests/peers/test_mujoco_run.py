@@ -14,6 +14,8 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.integrators import rk4
 
+pytestmark = pytest.mark.full
+
 FLOW = [0.2, -0.1, 0.0]
 
 

@@ -17,6 +17,8 @@ from undertow.navigation import perfect
 from undertow.plants import linear_plant, two_link_arm
 from undertow.references import setpoint
 
+pytestmark = pytest.mark.full
+
 PEER = json.loads((Path(__file__).parent / "data" / "rival_laws.json").read_text())
 
 

@@ -79,6 +79,7 @@ class Unknown(AbstractParametricDynamics):
         return self.known.accelerated_by(y, force)
 
 
+@pytest.mark.full
 def test_two_link_arm_of_slotine_and_li():
     """Largest errors in each of three seconds, 3.25 and 1.29 deg in the first, for parameters of zero at the start."""
     time = np.arange(3001) / 1000
@@ -142,6 +143,7 @@ def unknown_mass(reference, mass=0.0):
     return found.y[2], found.y[0] - table(time)[:, 0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("moving", "final"), [(False, 1.315), (True, 1.996)])
 def test_unknown_mass_of_slotine_and_li(moving, final):
     """Errors vanish, and the estimate finds 2 kg only where the reference is persistent.
@@ -201,6 +203,7 @@ def test_tuning_functions_of_krstic_kanellakopoulos_and_kokotovic(seed):
     np.testing.assert_allclose(float(found.learning), c**3 * learning, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_load_found_by_adaptive_backstepping():
     """Two steps, c = gamma = 1, a load of 1: e_ddot = -2 e - 2 e_dot + d_hat - d and d_hat_dot = -(e_dot + e)."""
     law = adaptive_backstepping(

@@ -21,6 +21,8 @@ from undertow.references import setpoint
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 
+pytestmark = pytest.mark.full
+
 AUTHORITY = np.array([6.85, 6.60, 5.98, 119.2, 94.9, 61.4])  # m/s^2, rad/s^2 per demand of 1, BlueROV2 Heavy at 16 V
 RATE = 400.0  # Hz, of ArduSub
 VEHICLE = hybrid_vehicle(bluerov2_heavy(), t200("ideal", supply=16.0, dead_zone=0.0))

@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from undertow.controllers import pid
@@ -41,6 +42,7 @@ def arm_under_proportional_and_derivative_torques(t, state):
 GOAL = np.radians([60.0, 90.0])
 
 
+@pytest.mark.full
 def test_position_of_an_arm_by_proportional_and_derivative_control():
     """From rest at zero, for one second: with unit masses as its model the law gives these torques."""
     plant, dt = two_link_arm(gravity=0.0), 1e-3
@@ -53,6 +55,7 @@ def test_position_of_an_arm_by_proportional_and_derivative_control():
     np.testing.assert_allclose(found[-1], GOAL, atol=1e-3)
 
 
+@pytest.mark.full
 def test_regulator_of_the_double_integrator():
     """Q = I and R = 1 give K = (1, sqrt(3)), the Riccati equation solved by hand. Without the integral here."""
     integral, error, rate, given = gains(1.0, 1e-9, 1.0)

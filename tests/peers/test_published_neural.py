@@ -11,6 +11,8 @@ from undertow.navigation import perfect
 from undertow.plants import double_integrator, two_link_arm
 from undertow.references import sine
 
+pytestmark = pytest.mark.full
+
 # Point masses of 0.8 and 2.3 kg on links of 1 m, K_v = 20, Lambda = 5: also in the public code that teaches this law
 M1, M2, GRAVITY = 0.8, 2.3, 9.8
 K_V, LAMBDA, KAPPA, NEURONS = 20.0, 5.0, 0.1, 10

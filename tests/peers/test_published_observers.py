@@ -16,6 +16,8 @@ from undertow.navigation import perfect
 from undertow.plants import double_integrator, linear_plant, two_link_arm
 from undertow.references import setpoint, sine
 
+pytestmark = pytest.mark.full
+
 
 def run(plant, law, reference, duration, dt, load=None, **start):
     loop = ClosedLoop(plant, law, reference, load or none(), perfect())

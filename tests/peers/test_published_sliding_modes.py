@@ -12,6 +12,8 @@ from undertow.navigation import perfect
 from undertow.plants import double_integrator
 from undertow.references import setpoint
 
+pytestmark = pytest.mark.full
+
 # k_1 = 1.5 L^(1/2), k_2 = 1.1 L: Levant's, and the usual ones since
 FIRST, SECOND = 1.5, 1.1
 

@@ -79,10 +79,12 @@ def test_rotation_and_euler_rate_matrices():
     close(j[3:, :3], 0.0)
 
 
+@pytest.mark.full
 def test_cross_flow_coefficient():
     close(cross_flow_coefficient(0.19, 0.19), golden("Hoerner("))
 
 
+@pytest.mark.full
 def test_cross_flow_drag():
     """PVS adds 21 rectangles of width L/20, so its hull sticks out by half a strip at bow and stern; undertow's
     trapezoidal rule has exactly L. The two half strips are added here before comparing.
@@ -98,6 +100,7 @@ def test_cross_flow_drag():
     close(ours + half_ends, golden("crossFlowDrag("))
 
 
+@pytest.mark.full
 def test_cross_flow_drag_tends_to_its_integral():
     """Pure sway: force rho/2 draft Cd L |v| v exactly; sway with yaw: second order in the number of strips."""
     coefficient = 0.5 * SEAWATER * 0.19 * float(cross_flow_coefficient(0.19, 0.19))

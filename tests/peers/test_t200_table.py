@@ -43,7 +43,7 @@ def misfit(thruster, name):
 # Bars of the T200: 2.5 N, 0.8 A, 15 rad/s. Those of the T500 are its own fit, rounded up.
 @pytest.mark.parametrize(
     ("part", "name", "rows", "bars"),
-    [(t200, "t200", 1206, (15.0, 0.8, 2.5)), (t500, "t500", 402, (6.0, 1.0, 2.5))],
+    [(t200, "t200", 1206, (15.0, 0.8, 2.5)), pytest.param(t500, "t500", 402, (6.0, 1.0, 2.5), marks=pytest.mark.full)],
     ids=["t200", "t500"],
 )
 def test_whole_table_with_one_set_of_constants(part, name, rows, bars):

@@ -61,6 +61,7 @@ def test_what_turns_the_motor(name, kind):
         jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-13), found, expected)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_voltage_that_is_not_a_number_does_not_become_zero_volts(kind):
     """Neither by XLA nor in the batch compiler."""
@@ -95,6 +96,7 @@ def test_slope_and_precision(kind):
     np.testing.assert_allclose(found, TURNS[kind], rtol=0, atol=2e-7)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["ideal", "static", "linear", "quadratic"])
 def test_without_a_zone_no_thruster_loses_its_slope_at_zero_volts(name, kind):
@@ -122,6 +124,7 @@ def test_voltage_for_a_thrust(name):
         np.testing.assert_array_equal(found[lost], 0.0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ["shaft", "electromechanical", "t200"])
 def test_drive_of_a_motor(name, kind):
@@ -173,6 +176,7 @@ def test_energy_is_accounted_for(kind):
     assert np.abs(found["energy_integration_error"]).max() < 1e-3 * found["energy_source"][-1]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("make", [t200, t500], ids=["t200", "t500"])
 def test_a_law_that_knows_the_zone_loses_nothing_to_it(make):
     """Small forces: `subtract` gives them all, as its inverse adds the zone; `pass` none below its own."""

@@ -6,6 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from textbook import kinetic_energy, potential_energy
 
 from undertow.core.contracts import Load
@@ -66,12 +67,14 @@ def numbers(plant, steps, strength):
     return [float(value) for value in balance(plant, jnp.asarray(float(steps)), jnp.asarray(strength))]
 
 
+@pytest.mark.full
 def test_energy_balances_over_twenty_seconds():
     defect, throughput, _, _ = numbers(ODIN, 20_000, 1.0)
     assert throughput > 1000
     assert abs(defect) <= 1e-6
 
 
+@pytest.mark.full
 def test_error_of_the_balance_is_of_order_four():
     """Halving dt divides the defect by sixteen."""
     defects = np.abs([numbers(ODIN, n, 1.0)[0] for n in (800, 1600, 3200)])
@@ -79,6 +82,7 @@ def test_error_of_the_balance_is_of_order_four():
     assert ((slopes >= 3.8) & (slopes <= 4.2)).all(), (defects, slopes)
 
 
+@pytest.mark.full
 def test_energy_never_rises_without_thrust():
     _, _, lost, rise = numbers(ODIN, 20_000, 0.0)
     assert lost > 10
@@ -104,6 +108,7 @@ def test_power_of_the_loads_is_the_rate_of_energy():
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.full
 def test_upright_is_where_potential_energy_is_least():
     """ODIN's centre of gravity hangs 5 cm below its centre of buoyancy: 61.3 N m/rad of righting moment."""
     body = ODIN.body

@@ -52,6 +52,7 @@ def distance(found, expected):
     return max(np.abs(a - b).max() / np.abs(b).max() for a, b in zip(found, expected, strict=True))
 
 
+@pytest.mark.full
 def test_without_inductance_the_winding_follows_the_shaft():
     """electromechanical -> shaft at first order in L, in thrust and current, in the middle of a transient."""
     times = dict(duration=0.1, dt=5e-5)
@@ -64,6 +65,7 @@ def test_without_inductance_the_winding_follows_the_shaft():
     np.testing.assert_allclose(np.array(gaps[:-1]) / gaps[1:], 2.0, atol=0.15)
 
 
+@pytest.mark.full
 def test_without_rotor_inertia_the_shaft_follows_the_voltage():
     """shaft -> static at first order in J, while the voltage moves."""
     static = fidelity("static")

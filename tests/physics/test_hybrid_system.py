@@ -94,6 +94,7 @@ def accelerations(pose, velocity, speed, current, volts, wrench):
     return jnp.stack([plant, direct, lagrangian, *forms])
 
 
+@pytest.mark.full
 def test_all_forms_of_the_system_give_one_acceleration():
     found = np.asarray(jax.jit(jax.vmap(accelerations))(POSE, VELOCITY, SPEED, CURRENT, VOLTS, WRENCH))
     for i in range(1, 6):
@@ -124,7 +125,19 @@ def test_gain_matrix_is_what_the_paper_says_it_is():
 
 @pytest.mark.parametrize(
     ("numbers", "rank"),
-    [(range(1, 9), 6), ((1, 2, 3, 4), 3), ((5, 6, 7, 8), 3), ((1, 2, 3, 5, 6), 5), ((1,), 1), (range(2, 9), 6)],
+    [
+        ((1, 2, 3, 4), 3),
+        *(
+            pytest.param(numbers, rank, marks=pytest.mark.full)
+            for numbers, rank in (
+                (range(1, 9), 6),
+                ((5, 6, 7, 8), 3),
+                ((1, 2, 3, 5, 6), 5),
+                ((1,), 1),
+                (range(2, 9), 6),
+            )
+        ),
+    ],
 )
 def test_rank_of_gain_is_the_rank_of_the_thruster_matrix(numbers, rank):
     """Wherever |pitch| < 1.5: geometry decides once and for all."""
@@ -138,6 +151,7 @@ def test_rank_of_gain_is_the_rank_of_the_thruster_matrix(numbers, rank):
     assert plant.rank() == rank
 
 
+@pytest.mark.full
 def test_inverse_of_the_model_is_the_pseudo_inverse_of_its_gain():
     """Also below rank 6, where the closed form does not hold."""
     for numbers in (tuple(range(1, 9)), (1, 2, 3, 4)):

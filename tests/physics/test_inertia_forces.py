@@ -47,6 +47,7 @@ def skew_defects(mass, eta, nu):
     return defect(coriolis - mass @ inverse @ j_rate), defect(coriolis)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mass", [MASS, np.tile(ODIN, (COUNT, 1, 1))], ids=["random", "odin"])
 def test_rate_of_mass_matrix_less_twice_coriolis_is_skew_but_not_as_printed(mass):
     """Negative control: J^-T C J^-1 alone, as in the paper, leaves 2 M_J_dot."""
@@ -56,6 +57,7 @@ def test_rate_of_mass_matrix_less_twice_coriolis_is_skew_but_not_as_printed(mass
     np.testing.assert_allclose(printed, 2.0, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_coriolis_forces_do_no_work():
     def work(mass, nu):
         c = coriolis_matrix(mass, nu)
@@ -78,11 +80,13 @@ def test_coriolis_of_a_body_does_no_work_and_is_the_matrix_times_nu():
     assert float(difference.max()) <= 1e-14
 
 
+@pytest.mark.full
 def test_coriolis_matrix_is_skew():
     matrices = np.asarray(each(coriolis_matrix)(MASS, NU))
     np.testing.assert_array_equal(matrices, -matrices.swapaxes(1, 2))
 
 
+@pytest.mark.full
 def test_coriolis_forces_are_those_of_a_free_body():
     """Kirchhoff: with M nu_dot = -C nu, linear and angular momentum stay constant in the world."""
 
@@ -102,6 +106,7 @@ def test_coriolis_forces_are_those_of_a_free_body():
     assert float(each(momentum_rates)(MASS, ETA, NU).max()) <= 1e-11
 
 
+@pytest.mark.full
 def test_kinetic_energy_does_not_depend_on_the_reference_point():
     """1/2 nu . M nu seen from a point r away: H(r) nu and H^-T M H^-1."""
     body = odin().body()

@@ -85,6 +85,7 @@ def test_factor_scales_its_term_of_the_equation_of_motion(name):
     np.testing.assert_allclose(body_rate(PLANT, load), expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.full
 def test_factors_are_drawn_from_their_ranges():
     drawn = jax.vmap(parameter_error(mass=(0.9, 1.1), damping=(0.5, 2.0)).realize)(
         jax.random.split(jax.random.PRNGKey(1), 2000)

@@ -8,6 +8,8 @@ import pytest
 
 from undertow.core import catalogue
 
+pytestmark = pytest.mark.full
+
 RNG = np.random.default_rng(5)
 NU = RNG.normal(size=(200, 6))
 DOWN = RNG.normal(size=(200, 3))

@@ -46,6 +46,7 @@ def fly(disturbance, velocity):
     return np.concatenate([y.position, y.velocity])
 
 
+@pytest.mark.full
 def test_galileo():
     """In a constant current everything happens as in still water, carried along."""
     flow = np.array([0.7, -0.4, 0.2])
@@ -55,6 +56,7 @@ def test_galileo():
     np.testing.assert_allclose(carried - shift, still, rtol=0, atol=1e-10)
 
 
+@pytest.mark.full
 def test_still_water_is_no_water():
     np.testing.assert_allclose(fly(current(np.zeros(3)), RATES), fly(Together(()), RATES), rtol=0, atol=1e-12)
 
@@ -105,7 +107,7 @@ def test_waves_are_incompressible_and_free_of_rotation():
     np.testing.assert_allclose(gradient, gradient.T, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("depth", [0.0, 3.0])
+@pytest.mark.parametrize("depth", [3.0, pytest.param(0.0, marks=pytest.mark.full)])
 def test_variance_of_orbital_velocity(depth):
     """Over 400 seas: the integral of omega^2 S(omega) e^(-2 k z), S scaled to (H_s / 4)^2; at the surface its H_s."""
     sea = waves(height=0.5, period=5.0, depth=depth)
@@ -121,6 +123,7 @@ def test_variance_of_orbital_velocity(depth):
     assert found[1] < 1e-20  # all run north
 
 
+@pytest.mark.full
 def test_wandering_current_has_its_variance_and_correlation():
     process = gauss_markov_current(mean=(0.3, 0.0, 0.0), deviation=(0.1, 0.2, 0.0), correlation_time=10.0, step=0.5)
     paths = np.asarray(jax.jit(jax.vmap(process.realize))(jax.random.split(jax.random.PRNGKey(3), 500)))

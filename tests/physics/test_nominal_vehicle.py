@@ -14,6 +14,7 @@ def heavy(parameters):
     return ut.HybridVehicle(ut.vehicles.bluerov2_heavy(parameters), ut.thrusters.t200())
 
 
+@pytest.mark.full
 def test_model_of_another_parameter_set():
     given = heavy("ng2024").model(vehicle=ut.vehicles.bluerov2_heavy("vonbenzon2022"), rate_term=True)
     own = heavy("vonbenzon2022").model(rate_term=True)
@@ -29,6 +30,7 @@ def test_vehicle_with_other_thrusters_is_refused():
         heavy("ng2024").model(vehicle=ut.vehicles.bluerov2())
 
 
+@pytest.mark.full
 def test_in_a_scenario():
     run = ut.simulate_scenario(
         {

@@ -47,6 +47,7 @@ def test_static_thrust_is_the_inverse_of_inflow():
     np.testing.assert_allclose(static_thrust_for(jnp.asarray(thrust), jnp.asarray(LOSS), jnp.zeros(())), thrust)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("speed", [0.8, -0.8])
 def test_inverse_jumps_once_and_not_at_zero_thrust(speed):
     """By 0.29 c^2 at -c|c|/4, c = lambda u; elsewhere no two neighbours of a fine grid differ by more than it allows."""
@@ -60,6 +61,7 @@ def test_inverse_jumps_once_and_not_at_zero_thrust(speed):
     assert np.sort(steps)[-2] < 0.02 and abs(edge) > 0.3
 
 
+@pytest.mark.full
 def test_slopes_are_finite_at_rest():
     for function in (with_inflow, static_thrust_for):
         slopes = jax.grad(lambda t, u, function=function: function(t, jnp.asarray(LOSS), u), (0, 1))(0.0, 0.0)
@@ -85,7 +87,9 @@ THRUSTERS = {
 }
 
 
-@pytest.mark.parametrize("name", THRUSTERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.full) if name == "axial flow" else name for name in THRUSTERS]
+)
 @pytest.mark.parametrize("loss", [None, LOSS])
 def test_solution_gives_the_demanded_acceleration(name, loss):
     """g(x, solve(x, a)) = a for several accelerations in motion; the affine inverse misses them."""
@@ -109,6 +113,7 @@ def test_model_is_the_plant_in_steady_state(loss):
     np.testing.assert_allclose(found, plant.acceleration(0.0, x, u, plant.no_load()), atol=1e-10)
 
 
+@pytest.mark.full
 def test_linear_thrust_makes_both_models_one():
     """With T = c V and no inflow the paper's law has the same command and adaptation, by G and by the solution."""
     plant = hybrid_vehicle(bluerov2_heavy(), linear_voltage(), ledger=False)
@@ -131,6 +136,7 @@ def test_bad_options():
         hybrid_vehicle(bluerov2_heavy(), t200(), inflow_loss=-1.0)
 
 
+@pytest.mark.full
 def test_axial_flow_settles_at_the_thrust_of_its_steady_voltage():
     """Integrated until flow and speed rest, forwards and backwards; the thrust of a voltage is the inverse."""
     thruster = axial_flow()
@@ -144,6 +150,7 @@ def test_axial_flow_settles_at_the_thrust_of_its_steady_voltage():
     np.testing.assert_array_equal(thruster.steady_thrust(inside), 0.0)
 
 
+@pytest.mark.full
 def test_slope_of_the_steady_thrust_of_axial_flow():
     """That of differences, on both sides of the dead zone."""
     slope = jax.vmap(jax.grad(axial_flow().steady_thrust))(jnp.asarray([-2.5, -1.0, 1.2, 3.0]))

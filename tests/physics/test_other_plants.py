@@ -76,6 +76,7 @@ def test_a_model_told_the_truth_gives_the_acceleration(name):
         np.testing.assert_allclose(reached, push, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_converges_at_fourth_order(name):
     plant = PLANTS[name]
@@ -125,6 +126,7 @@ def test_pendulum_and_cart_keep_their_energy_and_momentum():
     np.testing.assert_allclose(pendulum_energy(plant, end), pendulum_energy(plant, x), rtol=1e-9)
 
 
+@pytest.mark.full
 def test_work_of_the_force_is_the_gain_of_energy():
     plant = inverted_pendulum()
     for seed in range(20):
@@ -184,6 +186,7 @@ def test_levitation_meets_the_twelve_measured_points():
     assert np.abs(without_half / current - 1).min() > 0.27, "negative control: the force of the manual"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", BALLS)
 def test_levitation_linearised_at_10_mm_as_published(name):
     """d(z, v, I1)/dt: 1685, a23, -288.8 and 1271; I0 and U0; poles +-41.04 and -288.8 1/s."""
@@ -240,6 +243,7 @@ def test_levitation_allocates_to_the_coil_that_pulls_the_wanted_way():
 # --------------------------------------------------------------------------------------------------------- arm
 
 
+@pytest.mark.full
 def test_arm_mass_and_coriolis_matrices():
     """M symmetric positive definite, inverse right, M_dot - 2 C skew, along the motion."""
     links, rng = two_link_arm().links, np.random.default_rng(2)
@@ -275,6 +279,7 @@ def test_arm_moves_by_lagrange():
         np.testing.assert_allclose(weight, links.weight(q), rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.full
 def test_arm_keeps_its_energy_and_gains_the_work_of_its_torques():
     plant = two_link_arm()
     x = start(plant, 5, scale=1.0)
@@ -316,6 +321,7 @@ def test_lost_directions_are_announced_and_none_where_there_are_none():
     assert linear_plant().advice() == ()
 
 
+@pytest.mark.full
 def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     """I29: (x1 + x2, x3) obey the error equation to 1e-9; x1 - x2 is the uncontrolled plant to 1e-9."""
     springs, brakes = -np.eye(3), -0.5 * np.eye(3)
@@ -335,6 +341,7 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     assert np.abs((np.asarray(samples["position"]) - free) @ np.array([1.0, 1.0, 0.0])).max() > 0.1, "negative control"
 
 
+@pytest.mark.full
 def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     """Q^T (e_ddot + K^T E - d_hat + d + u_r) = 0 to 1e-9, with Q an orthonormal basis of the range of G."""
     plant = linear_plant(UNDER, -np.eye(3), -0.5 * np.eye(3))

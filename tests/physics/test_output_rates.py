@@ -84,6 +84,7 @@ def moments(t):
     )
 
 
+@pytest.mark.full
 def test_euler_and_quaternion_plants_agree_for_twenty_seconds():
     """I9; the Euler plant is Eqs. (1), (2) written out here."""
     plant = hybrid_vehicle(odin(), paper_table3("shaft"))
@@ -114,6 +115,7 @@ def test_euler_and_quaternion_plants_agree_for_twenty_seconds():
     np.testing.assert_allclose(x.nu, nu, rtol=0, atol=1e-8)
 
 
+@pytest.mark.full
 def test_quaternion_plant_passes_the_vertical():
     """Pitched over and over by a steady moment: pitch goes through 90 deg with everything finite."""
     plant = hybrid_vehicle(odin(), paper_table3("shaft"))

@@ -95,6 +95,7 @@ QUICK = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "fidelity", "kind"),
     [case if case in QUICK else pytest.param(*case, marks=pytest.mark.slow) for case in CASES],
@@ -121,6 +122,7 @@ def test_ledger_closes_in_both_loops(name, fidelity, kind):
         )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("fidelity", "method", "source"),
     [
@@ -179,6 +181,7 @@ def test_books_are_kept_wherever_there_is_a_motor():
             hybrid_vehicle(odin(), without, ledger=True)
 
 
+@pytest.mark.full
 def test_every_run_says_how_far_its_books_close():
     """By default and in both windows; not where there are none."""
     for plant in (ut.HybridVehicle(odin(), paper_table3("static")), double_integrator(8)):
@@ -189,6 +192,7 @@ def test_every_run_says_how_far_its_books_close():
             assert share is None if len(plant.outputs) == 8 else 0 <= share <= 1e-8
 
 
+@pytest.mark.full
 def test_books_change_nothing_else():
     """The same motion with and without, to rounding."""
     ends = []
@@ -266,7 +270,9 @@ def tight(plant, x, applied, slack):
     return float(np.abs(applied).max()) >= bus * (1 - slack) or power >= most * (1 - 2 * slack)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize(
+    "fidelity", [name if name == "static" else pytest.param(name, marks=pytest.mark.full) for name in FIDELITIES]
+)
 def test_voltages_stay_within_what_the_battery_gives_and_reach_it(fidelity):
     """Asked for far too much: never above the bus under that load, as high as it goes, smaller ones untouched."""
     plant = hybrid_vehicle(odin(), t200(fidelity, supply=30.0), battery=battery(resistance=0.1))
@@ -332,12 +338,14 @@ def test_speed_controllers_need_a_bus_voltage():
 # ------------------------------------------------------------------------------------------------------- gradients
 
 
+@pytest.mark.full
 def test_gradients_of_the_battery_are_finite_at_its_limit():
     for power in (0.0, 16.8**2 / 0.2, 5000.0):
         for of in (CELLS.bus_voltage, CELLS.current, CELLS.loss):
             assert np.isfinite(jax.grad(of, argnums=(0, 1))(0.0, power)).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "fidelity",
     [

@@ -87,6 +87,7 @@ def test_joints_are_smooth(case):
     assert (jumps[said] > 1e-3).all()
 
 
+@pytest.mark.full
 def test_gradients_are_finite(case):
     """With respect to every parameter: inside, at every joint and long after, headings included."""
     _, reference, joints, duration = case
@@ -124,6 +125,7 @@ def test_settling_takes_its_time():
     np.testing.assert_allclose(np.abs(acceleration).max(0), 10 / np.sqrt(3) * np.abs(goal - start) / 16, rtol=1e-6)
 
 
+@pytest.mark.full
 def test_settling_starts_where_the_plant_does_unless_told():
     """A cart and a vehicle that start away from zero are not sent to zero and back; a step and a given start stay."""
     goal, begun = np.array([3.0, -1.0]), np.array([5.0, 2.0])
@@ -150,6 +152,7 @@ def test_settling_starts_where_the_plant_does_unless_told():
         np.testing.assert_array_equal(found.signals["reference"][0], begun)
 
 
+@pytest.mark.full
 def test_settling_may_be_traced_and_zero():
     """As an unknown it is zero without harm: the step, and finite gradients."""
     values = lambda settling, t: setpoint(jnp.array([-2.0, 1.0]), settling, jnp.ones(2)).at(t)
@@ -211,6 +214,7 @@ def test_lawn_mower_covers_its_length(count, north):
     np.testing.assert_allclose(reached, [-1.0 * (count > 2), 10.0 + (count > 1), 0], rtol=0, atol=1e-6)
 
 
+@pytest.mark.full
 def test_lawn_mower_looks_where_it_goes():
     """Exactly on the legs, nearly where an arc begins; what the acceleration jumps by."""
     reference = lawn_mower(10.0, 2.0, 3, 0.5, 4.0, heading="along")

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from undertow.controllers import rcaf
 from undertow.core.contracts import Load
@@ -16,6 +17,8 @@ from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.thrusters import paper_table3
 from undertow.vehicles import odin
+
+pytestmark = pytest.mark.full
 
 POSE = jnp.array([1.0, -2.0, 3.0, 0.2, -0.3, 0.5])
 VELOCITY = jnp.array([0.3, -0.2, 0.1, 0.1, 0.2, -0.1])

@@ -84,6 +84,7 @@ def test_thrust_and_speed_are_inverse(name):
     np.testing.assert_allclose(MOTORS[name].speed_at(MOTORS[name].thrust(speed)), speed, rtol=1e-13)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_gradients_are_finite_at_rest(fidelity):
     """Where the square root of Eq. (11) has none."""
@@ -182,6 +183,7 @@ DYNAMIC = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sign", [1, -1], ids=["forward", "reverse"])
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("euler", 1)])
 @pytest.mark.parametrize("name", DYNAMIC)
@@ -210,6 +212,7 @@ def test_first_order_step_response():
         np.testing.assert_allclose(found, np.array([-12.0, 16.0]) * (1 - rest), rtol=1e-9)
 
 
+@pytest.mark.full
 def test_first_order_tends_to_the_static_models():
     """At first order in tau, linear and quadratic, while the voltage moves."""
     volts = lambda t: jnp.array([6.0, 12.0]) * (1 + 0.5 * jnp.sin(5 * t))

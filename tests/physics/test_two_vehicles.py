@@ -90,6 +90,7 @@ def test_tension_of_a_tether_and_a_bar():
     assert tension("none", 2.3, 0.5) == 0.0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["tether", "bar"])
 def test_energy_balance_along_a_motion(kind):
     """Without thrust: kinetic energy and energy of the link fall by the loss of drag and link; weight and buoyancy work.
@@ -141,6 +142,7 @@ def test_without_a_link_each_vehicle_moves_alone():
         np.testing.assert_allclose(found[own], expected, atol=1e-12)
 
 
+@pytest.mark.full
 def test_model_has_a_block_for_each_vehicle_and_no_link():
     """F + G u is x_ddot of the plant without a link; with one, the rest is M^-1 of its wrench on each vehicle."""
     u = jnp.linspace(-2, 2, pair().inputs())

@@ -112,6 +112,7 @@ def test_inertia_is_that_of_some_body(name, variant):
     np.testing.assert_array_equal(matrix, matrix.T)
 
 
+@pytest.mark.full
 @every_hull
 def test_damping_takes_energy(name, variant):
     """nu . D(nu) nu at 20 000 velocities of all sizes and proportions, off-diagonal entries included."""

@@ -2,6 +2,7 @@
 
 import pytest
 
+from undertow.realtime import control_loop
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
@@ -12,6 +13,12 @@ HEAVY = {
     "disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]},
     "loop": {"duration": 1.0, "dt": 0.01, "record": 0.01},
 }
+
+
+@pytest.fixture(autouse=True)
+def garbage_stays(monkeypatch):
+    """A loop collects garbage before it begins: a second, where as many modules are loaded as here."""
+    monkeypatch.setattr(control_loop.gc, "collect", lambda: 0)
 
 
 @pytest.fixture(scope="session")

@@ -79,6 +79,7 @@ def test_a_sequence_ends_at_its_largest_number_and_never_begins_again():
     assert [received.take(of.pack(UPRIGHT, 0, 0)) is not None for _ in range(5)] == [True, True, False, False, False]
 
 
+@pytest.mark.full
 def test_20000_mutated_datagrams_are_refused_or_sound():
     """Bytes changed, cut, joined, with and without a right checksum: no exception, and only sound numbers pass."""
     chance, passed = np.random.default_rng(2), 0

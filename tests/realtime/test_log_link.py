@@ -10,6 +10,8 @@ from undertow.realtime.control_loop import RealTimeLoop, Reason
 from undertow.realtime.log_link import LogLink
 from undertow.realtime.loop_clock import SimulatedClock
 
+pytestmark = pytest.mark.full
+
 
 def replayed(autopilot, path):
     link = LogLink(path, autopilot.plant)

@@ -19,6 +19,8 @@ from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.full
+
 AT_REST = np.concatenate([np.zeros(3), [1, 0, 0, 0], np.zeros(6 + 8)])
 SAFE = 0.125
 

@@ -18,6 +18,8 @@ from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
 
+pytestmark = pytest.mark.full
+
 NOISY = {"kind": "white_noise", "position": 0.001, "velocity": 0.01}
 PENDULUM = {
     "plant": "inverted_pendulum",

@@ -26,6 +26,8 @@ from undertow.reproduction.setup import equal_gain_ratio
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
 
+pytestmark = pytest.mark.full
+
 FOLDER = Path(study.__file__).parent
 MODEL = double_integrator(1).model()
 

@@ -49,6 +49,7 @@ def rcaf(**options):
     return {"kind": "rcaf", **options}
 
 
+@pytest.mark.full
 def test_adrc_and_indi_of_one_bandwidth_are_one_law():
     """d_hat = H (x_ddot - F - G u) either way; the two programs differ in the last digits only."""
     observer, inversion = run({"kind": "adrc", **SAME}), run({"kind": "indi", **SAME})
@@ -58,6 +59,7 @@ def test_adrc_and_indi_of_one_bandwidth_are_one_law():
     assert float(jnp.abs(observer["error"] - table_1).max()) < 0.03 * float(jnp.abs(table_1).max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["adrc", "indi"])
 def test_a_linear_law_removes_a_constant_load(kind):
     """At rest d_hat = -(what disturbs), so that the error is zero, whatever the gains."""
@@ -72,6 +74,7 @@ def test_a_linear_law_removes_a_constant_load(kind):
     np.testing.assert_allclose(found["error"][-1], 0.0, atol=1e-4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("make", [adrc, indi])
 def test_default_gains_are_those_of_the_rule_of_preset_robust(make):
     """Bandwidth, feedback, actuator loop and filter of jumps of a vehicle with lagged thrusters and noisy velocity."""
@@ -87,6 +90,7 @@ def test_default_gains_are_those_of_the_rule_of_preset_robust(make):
         make(model, feedback=(1.0, 2.0), tracking=1.0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["adrc", "indi"])
 def test_a_linear_law_does_not_wind_up(kind):
     """The estimate of a constant load is the same at the limits: it uses what was applied."""
@@ -96,6 +100,7 @@ def test_a_linear_law_does_not_wind_up(kind):
     np.testing.assert_allclose(limited, free, atol=1e-9)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["adrc", "indi"])
 @pytest.mark.parametrize(
     ("key", "value"), [("bandwidth", 0.0), ("damping", -1.0), ("feedback", [-1.0, 2.0]), ("bandwidth", [1.0, 2.0])]
@@ -105,6 +110,7 @@ def test_gains_that_no_linear_law_can_have(kind, key, value):
         build(AXES | {"controller": {"kind": kind, key: value}})
 
 
+@pytest.mark.full
 def test_identification_fed_with_the_command_differs_only_where_limits_bind():
     plain, commanded = run(rcaf()), run(rcaf(identification_input="commanded"))
     np.testing.assert_array_equal(commanded["error"], plain["error"])
@@ -113,12 +119,14 @@ def test_identification_fed_with_the_command_differs_only_where_limits_bind():
     assert float(wound_up["weights_peak"].max()) > 10 * float(applied["weights_peak"].max())
 
 
+@pytest.mark.full
 def test_a_modification_of_nothing_is_the_law_itself():
     assert build(AXES | {"controller": rcaf(leakage=0.0)}).closed_loop.controller.modification is None
     small = run(rcaf(leakage=1e-300))
     np.testing.assert_array_equal(small["weights"], run(rcaf())["weights"])
 
 
+@pytest.mark.full
 def test_leakage_is_a_decay_of_the_weights():
     """Without an error theta_dot = -gamma kappa theta; one step of Euler's method multiplies by 1 - dt gamma kappa."""
     law = paper(double_integrator(2).model(), leakage=0.01, e_modification=0.5, sets=3)
@@ -133,6 +141,7 @@ def test_leakage_is_a_decay_of_the_weights():
     np.testing.assert_allclose(both, z.weights * (1 - 1e-3 * 100 * (0.01 + 0.5 * 0.2)) + learnt, rtol=1e-12)
 
 
+@pytest.mark.full
 def test_nothing_is_learnt_inside_the_dead_zone():
     assert not run(rcaf(dead_zone=1e3))["weights"].any()
     inside, outside = run(rcaf(dead_zone=1e-12))["weights"][-1], run(rcaf())["weights"][-1]
@@ -141,13 +150,19 @@ def test_nothing_is_learnt_inside_the_dead_zone():
 
 def readings(sensor, steps=12, dt=1e-3):
     """What a sensor makes of velocity 0.1, 0.2, ... and position 1, 2, ... on two axes."""
-    path, told, measure = sensor.realize(jax.random.PRNGKey(3)), [], eqx.filter_jit(sensor.measure)
-    truth = lambda k: Measurement(jnp.full(2, 1.0 + k), jnp.full(2, 0.1 * (1 + k)))
-    state = sensor.init(path, truth(0))
-    for k in range(steps):
-        y, state = measure(path, state, jnp.asarray(k * dt), truth(k))
-        told.append((float(y.position[0]), float(y.velocity[0])))
-    return np.array(told)
+    found = _readings(sensor, jnp.arange(steps, dtype=float), jnp.asarray(dt))
+    return np.stack([found.position[:, 0], found.velocity[:, 0]], 1)
+
+
+@eqx.filter_jit
+def _readings(sensor, steps, dt):
+    path, both = sensor.realize(jax.random.PRNGKey(3)), jnp.ones(2)
+
+    def step(state, k):
+        y, after = sensor.measure(path, state, k * dt, Measurement((1 + k) * both, 0.1 * (1 + k) * both))
+        return after, Measurement(y.position, y.velocity)
+
+    return jax.lax.scan(step, sensor.init(path, Measurement(both, 0.1 * both)), steps)[1]
 
 
 def test_a_sensor_with_nothing_wrong_gives_the_truth():
@@ -190,6 +205,7 @@ def test_as_many_thrusters_fail_as_are_asked_for(number):
     assert number == 0 or (each < 1).any(0).all(), "all thrusters have their turn"
 
 
+@pytest.mark.full
 def test_given_thrusters_fail_when_they_are_meant_to():
     """One thruster of ODIN off is the vehicle without it."""
     odin = {"kind": "hybrid_vehicle", "vehicle": "odin"}

@@ -17,6 +17,8 @@ from undertow.reproduction.robust_variant.conclusions import conclusions
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import validate
 
+pytestmark = pytest.mark.full
+
 FOLDER = Path(verdicts.__file__).parent
 ABLATIONS_OF_THE_PAPER = verdicts.ABLATIONS
 

@@ -12,6 +12,8 @@ from undertow.core.errors import BadInput
 from undertow.reproduction import side_by_side as module
 from undertow.reproduction.side_by_side import Tasks, side_by_side
 
+pytestmark = pytest.mark.full
+
 
 def both(pool, function, *arguments):
     """Results of a function from two tasks at the same time: each process computes one."""

@@ -18,6 +18,8 @@ from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import read
 
+pytestmark = pytest.mark.full
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 W1 = workload.workload(workload.W1)

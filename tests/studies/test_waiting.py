@@ -10,6 +10,8 @@ from undertow.cli.main import run
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
+pytestmark = pytest.mark.full
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

@@ -12,6 +12,8 @@ import pytest
 from undertow.bench import workload
 from undertow.core.errors import BadInput
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[2]
 NO_COMPILER = (
     "There is no C++ compiler `{}`. Install g++ or clang++, or name another one in the environment variable CXX"

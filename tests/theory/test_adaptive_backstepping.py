@@ -51,6 +51,7 @@ def through_a_lag(request):
     return dt * np.arange(60_000), np.asarray(found), dt
 
 
+@pytest.mark.full
 def test_errors_follow_their_linear_equation_whatever_the_lag(through_a_lag):
     time, found, _ = through_a_lag
     matrix = np.array([[-C, 1, 0, 0], [-(C**2), -C, 1, -1], [0, -(C**2), -INNER, -2 * C], [0, GAMMA, 2 * GAMMA / C, 0]])
@@ -59,6 +60,7 @@ def test_errors_follow_their_linear_equation_whatever_the_lag(through_a_lag):
         np.testing.assert_allclose(found[k], expected, atol=2e-3)
 
 
+@pytest.mark.full
 def test_lyapunov_function_falls_as_in_the_theorem(through_a_lag):
     _, found, dt = through_a_lag
     z1, z2, z3, away = found.T
@@ -69,6 +71,7 @@ def test_lyapunov_function_falls_as_in_the_theorem(through_a_lag):
     assert abs(away[-1]) < 0.02 * LOAD
 
 
+@pytest.mark.full
 def test_without_lag_it_is_a_pid():
     plant = double_integrator(1)
     law = adaptive_backstepping(plant.model(), rate=C, adaptation=GAMMA, reference_frequency=0.0)
@@ -79,6 +82,7 @@ def test_without_lag_it_is_a_pid():
     np.testing.assert_allclose(ours.signals["error"], theirs.signals["error"], atol=2e-4)
 
 
+@pytest.mark.full
 def test_estimate_waits_at_limits_and_stays_within_its_bound():
     plant = double_integrator(1, limit=1.5)
     options = {"sampling_time": 1e-2, "rate": 1.0, "reference_frequency": 0.0}

@@ -17,6 +17,8 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 DT = 2.5e-4  # s
 MARGINS = {
     "rcafc": ({}, 4.75e-3),

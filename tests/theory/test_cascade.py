@@ -27,6 +27,7 @@ def run(plant, law, goal, disturbance=None, duration=4.0, simulate=sampled.simul
     return simulate(loop, duration=duration, dt=DT, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_without_limits_it_is_a_pid():
     """k_p = k p + k_i, k_i p and k; from a start without error, where both integrals begin with the same."""
     plant, load = two_link_arm(), sinusoid(2.0, 3.0, offset=[1.0, -0.5])
@@ -48,6 +49,7 @@ def test_its_own_gains_have_the_poles_of_pid():
     np.testing.assert_allclose(found, [1.0, *(float(g) for g in (like.derivative, like.proportional, like.integral))])
 
 
+@pytest.mark.full
 def test_a_far_goal_is_approached_at_the_limit_of_the_rate():
     plant = double_integrator(1)
     law = cascade(
@@ -60,6 +62,7 @@ def test_a_far_goal_is_approached_at_the_limit_of_the_rate():
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-4)
 
 
+@pytest.mark.full
 def test_the_derivative_is_the_slope_of_the_error_of_the_rate():
     """For an error of the rate that falls by s per second the derivative settles at -k_d s, whatever the filter."""
     law = cascade(
@@ -109,6 +112,7 @@ def test_the_demand_of_one_is_full_thrust_of_all_thrusters_of_an_axis():
     np.testing.assert_allclose(law.limit, [0.1, 0.1, 0.1, 0.3, 0.3, 0.3] * most)
 
 
+@pytest.mark.full
 def test_nothing_removes_a_constant_load_with_the_gains_of_px4():
     """UUV_GAIN_Z_P = 1: the error is the load over the authority."""
     plant = hybrid_vehicle(bluerov2_heavy(), t200("ideal", supply=16.0, dead_zone=0.0))
@@ -122,6 +126,7 @@ def test_nothing_removes_a_constant_load_with_the_gains_of_px4():
     np.testing.assert_allclose(abs(float(found.signals["error"][-1, 2])), abs(load + weight) / 8.0, rtol=1e-3)
 
 
+@pytest.mark.full
 def test_limits_do_not_wind_up():
     plant = double_integrator(1, limit=1.5)
     law = cascade(plant.model(), sampling_time=DT, outer=0.7, inner=4.0, integral=1.0, reference_frequency=0.0)

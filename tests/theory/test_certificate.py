@@ -19,6 +19,8 @@ from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.linear_plant import linear_plant
 
+pytestmark = pytest.mark.full
+
 CONSTANTS = np.array([3.0, -20.0, 45.0, 0.5])
 RISE = 1e-10  # of V(0)
 FAST = {"preset": "robust", "sets": 1}

@@ -10,6 +10,8 @@ from undertow.analysis import small_signal
 from undertow.disturbances.table import table
 from undertow.loop import continuous
 
+pytestmark = pytest.mark.full
+
 RATE = 20.0  # m/s^3
 END = 12.0
 

@@ -22,6 +22,7 @@ def run(plant, law, goal, disturbance=None, duration=4.0, simulate=sampled.simul
     return simulate(loop, duration=duration, dt=DT, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_error_of_the_estimate_decays_exactly():
     """Chen et al. (2000), Eq. (13): e_dot = -l e for a constant load, at the sampling times e = d exp(-l k T)."""
     plant, load = double_integrator(2), np.array([1.5, -0.4])
@@ -32,6 +33,7 @@ def test_error_of_the_estimate_decays_exactly():
     np.testing.assert_allclose(found.signals["error"][-1, 1], 0.0, atol=1e-2)
 
 
+@pytest.mark.full
 def test_error_at_a_frequency_is_that_of_a_first_order_observer():
     """|e| / |d| = sqrt(w^2 / (w^2 + l^2)) in continuous time; T w = 0.01 here, so that the delay of T shows little."""
     w, pole = 1.0, 4.0
@@ -43,6 +45,7 @@ def test_error_at_a_frequency_is_that_of_a_first_order_observer():
     assert np.abs(error).max() == pytest.approx(w / np.hypot(w, pole), rel=0.03)
 
 
+@pytest.mark.full
 def test_a_constant_load_leaves_no_error():
     plant = two_link_arm()
     law = disturbance_observer(plant.model(), sampling_time=DT)
@@ -50,6 +53,7 @@ def test_a_constant_load_leaves_no_error():
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
+@pytest.mark.full
 def test_limits_do_not_wind_up():
     """The observer knows what was applied, so that its estimate is the same with and without limits."""
     push = sinusoid(0.0, 1.0, offset=-1.0)
@@ -90,6 +94,7 @@ def test_gains_that_no_observer_can_have(key, value):
         disturbance_observer(double_integrator(6).model(), **{key: value})
 
 
+@pytest.mark.full
 def test_jumps_pass_the_filter_only_where_there_is_one():
     plant = double_integrator(1)
     law = disturbance_observer(plant.model(), sampling_time=DT, bandwidth=4.0, tracking=3.0, reference_frequency=0.0)

@@ -18,6 +18,8 @@ from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 DT = 1e-3
 # Noise (m/s), distance of the sets, and as printed: c_dot (1/s^2) measured, time of divergence (s).
 TABLE = [

@@ -12,6 +12,8 @@ from undertow.core.contracts import AbstractController, Model
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 
+pytestmark = pytest.mark.full
+
 COMPOSITE_ONLY = {"weight": ((1e-15, 0.0), (0.0, 1e-15))}
 PROBES = {"amplitude": np.array([1.0, 0.5]), "frequency": np.array([3.0, 40.0]), "offset": np.array([0.7, -1.0])}
 CASES = {

@@ -22,6 +22,8 @@ from undertow.references import lissajous
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 
+pytestmark = pytest.mark.full
+
 DT = 0.01
 ERROR = 1.0  # rad: large enough not to limit the oscillation
 

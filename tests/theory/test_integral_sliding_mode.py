@@ -18,6 +18,7 @@ def run(plant, law, goal, disturbance=None, duration=20.0, dt=1e-2, **start):
     return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_nominal_response_from_the_first_instant_under_a_load():
     """|s| <= phi, and |e - e_nominal| <= phi times the integral of |g| = 2 / (w exp(1)), g of p / (p + w)^2."""
     plant, w, phi, start = double_integrator(1), 2.0, 0.02, -1.0
@@ -34,6 +35,7 @@ def test_nominal_response_from_the_first_instant_under_a_load():
     assert np.abs(slow.signals["error"][:, 0] - nominal).max() > 5 * apart
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("limit", [np.inf, 1.5])
 def test_surface_under_a_constant_load_has_a_closed_form(limit):
     """s = -(d / c) (1 - exp(-c t)), c = M / phi, also while the input is at its limit: no windup."""
@@ -49,6 +51,7 @@ def test_surface_under_a_constant_load_has_a_closed_form(limit):
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
+@pytest.mark.full
 def test_inside_the_layer_it_is_a_pid():
     """(p + c) (p^2 + 2 zeta w p + w^2), from an error of zero."""
     plant, w, zeta, c = double_integrator(1), 2.0, 0.8, 0.5
@@ -61,6 +64,7 @@ def test_inside_the_layer_it_is_a_pid():
     np.testing.assert_allclose(ours.signals["error"], theirs.signals["error"], atol=1e-4)
 
 
+@pytest.mark.full
 def test_a_load_above_the_amplitude_leaves_the_layer():
     """Negative control: then s grows at the rate of the excess."""
     plant = double_integrator(1)

@@ -18,6 +18,7 @@ def run(plant, law, goal, disturbance=None, duration=4.0, dt=1e-2, simulate=samp
     return simulate(loop, duration=duration, dt=dt, record_every=1, **start)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("dt", [1e-2, 2e-3])
 def test_error_of_the_predictor_is_bounded_by_the_sampling_time(dt):
     """|v_tilde| <= T max |d|, whatever the gains: Hovakimyan and Cao (2010), section 3.3, with a scalar A_s."""
@@ -29,6 +30,7 @@ def test_error_of_the_predictor_is_bounded_by_the_sampling_time(dt):
     assert error.max() > 0.99 * amplitude * dt  # the bound is tight where the load is largest
 
 
+@pytest.mark.full
 def test_a_constant_load_gives_the_bound_itself_and_leaves_a_known_share():
     """v_tilde = -d T, the compensation settles at d a T / (exp(a T) - 1), and the rest over w^2 is the error."""
     dt, rate, w, load = 1e-2, 20.0, 2.0, 1.5
@@ -41,6 +43,7 @@ def test_a_constant_load_gives_the_bound_itself_and_leaves_a_known_share():
     np.testing.assert_allclose(np.abs(found.signals["error"][-1, 0]), load * (1 - share) / w**2, rtol=1e-6)
 
 
+@pytest.mark.full
 def test_with_a_slow_predictor_it_is_the_disturbance_observer():
     """For a_s T to 0 the filter of sigma_hat is the first-order observer of the same bandwidth."""
     plant, load = two_link_arm(), sinusoid(1.0, 2.0, offset=[1.0, -0.5])
@@ -51,6 +54,7 @@ def test_with_a_slow_predictor_it_is_the_disturbance_observer():
     np.testing.assert_allclose(adaptive.signals["error"], observer.signals["error"], atol=1e-8)
 
 
+@pytest.mark.full
 def test_limits_do_not_wind_up():
     """The predictor knows what was applied: its error stays within the bound at the limits, too."""
     plant = double_integrator(1, limit=1.5)

@@ -17,6 +17,8 @@ from undertow.navigation import perfect, white_noise
 from undertow.plants import double_integrator
 from undertow.references import setpoint
 
+pytestmark = pytest.mark.full
+
 DT, NOISE, AXES = 1e-3, 0.003, 20  # s, m/s; every axis has noise of its own
 
 

@@ -23,6 +23,8 @@ from undertow.references import lissajous, sine
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 
+pytestmark = pytest.mark.full
+
 DT = 0.02
 OBSERVER = Estimator(gaussian_sets(1), bandwidth=8.0, leakage=0.0)
 GAINS = OBSERVER.gains(jnp.asarray(DT))

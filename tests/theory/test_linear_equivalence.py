@@ -20,6 +20,8 @@ from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 FREQUENCIES = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 150.0, 200.0])
 FAST = np.flatnonzero(FREQUENCIES >= 100)
 

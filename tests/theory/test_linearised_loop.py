@@ -24,6 +24,8 @@ from undertow.scenario.reading import from_data
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
+pytestmark = pytest.mark.full
+
 UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 THREE_SETS = {"sets": 3, "reach": (1.0,), "width": 1.0}
 LAWS = {

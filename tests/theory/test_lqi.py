@@ -22,6 +22,7 @@ def run(plant, law, goal, disturbance=None, duration=20.0, dt=1e-2, **start):
     return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(3))
 def test_gain_is_that_of_the_riccati_equation(seed):
     """Against SciPy's solution by the generalised Schur decomposition."""
@@ -42,6 +43,7 @@ def test_gains_without_lag_are_those_of_the_continuous_regulator():
     assert a == 0.0
 
 
+@pytest.mark.full
 def test_lag_is_in_the_design():
     """Poles of the sampled loop with the actuator: symmetric root locus of the continuous design with lag."""
     w, rho, sigma, tau, dt = 3.0, 0.2, 1.0, 0.2, 1e-4
@@ -53,6 +55,7 @@ def test_lag_is_in_the_design():
     np.testing.assert_allclose(np.sort_complex(closed), np.sort_complex(expected), rtol=2e-3)
 
 
+@pytest.mark.full
 def test_error_follows_the_closed_loop_matrix():
     """e, e_dot and the integral under x_ddot = u + d: the matrix exponential, to the order of the sampling time."""
     law = lqi(double_integrator(1).model(), frequency=2.0, integral_weight=0.2, reference_frequency=0.0)
@@ -64,6 +67,7 @@ def test_error_follows_the_closed_loop_matrix():
         np.testing.assert_allclose(found.signals["error"][k, 0], expected, atol=5e-4)
 
 
+@pytest.mark.full
 def test_no_error_under_a_constant_load_within_limits():
     plant = double_integrator(2, limit=4.0)
     law = lqi(plant.model(), sampling_time=1e-2, frequency=3.0)
@@ -72,6 +76,7 @@ def test_no_error_under_a_constant_load_within_limits():
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
+@pytest.mark.full
 def test_costs_less_than_pid_at_any_frequency():
     """The integral cost that it minimises, from the same start, against PID with the same share of the integral."""
     plant, w = double_integrator(1), 2.0

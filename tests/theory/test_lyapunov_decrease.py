@@ -15,6 +15,8 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.numerics.integrators import rk4
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 STEP, START = 1e-4, 2.0
 CONSTANTS = np.array([0.0, 3.0, -20.0, 50.0, 0.5, -50.0])
 ROBUST = np.array([0.0, 10.0, 10.0, 0.0, 1.0, 10.0])  # w_bar; 0 leaves the switch out

@@ -17,6 +17,8 @@ from undertow.navigation import perfect
 from undertow.plants import double_integrator
 from undertow.references import sine
 
+pytestmark = pytest.mark.full
+
 DT = 0.02
 JUDGING = 30.0
 OBSERVER = Estimator(gaussian_sets(1), bandwidth=8.0, leakage=0.0)

@@ -126,6 +126,7 @@ def dives(tmp_path_factory):
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["robust", "learning", "turned"])
 def test_the_estimation_error_is_within_the_bound_of_what_the_memory_does_not_explain(dives, name):
     """The bound is an L1 norm: it holds for any weights, right or wrong, once the start is forgotten."""
@@ -137,6 +138,7 @@ def test_the_estimation_error_is_within_the_bound_of_what_the_memory_does_not_ex
     assert error.max() > 0.2 * allowed.max()
 
 
+@pytest.mark.full
 def test_what_is_learnt_makes_the_bound_small(dives):
     late = {name: run.isel(time=run["time"].values > 60.0) for name, (_, run) in dives.items()}
     rates = {name: fastest_uncertainty(run)[0] for name, run in late.items()}
@@ -144,6 +146,7 @@ def test_what_is_learnt_makes_the_bound_small(dives):
     assert rates["learning"] < 0.25 * rates["robust"]
 
 
+@pytest.mark.full
 def test_the_run_says_what_was_learnt(dives):
     law, run = dives["learning"]
     found = theory_of(law).certificate(run, run, SteadyWindow(40.0, 80.0), DT).numbers

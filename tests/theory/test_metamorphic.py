@@ -18,6 +18,8 @@ from undertow.references.setpoint import setpoint
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
+pytestmark = pytest.mark.full
+
 POSE = np.array([1.0, -2.0, 3.0, 0.3, -0.4, 2.0])
 
 

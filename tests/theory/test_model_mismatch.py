@@ -23,6 +23,8 @@ from undertow.references import setpoint
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
 
+pytestmark = pytest.mark.full
+
 DT, GOAL = 0.01, [2.0, 1.0, 1.0, 0.0, 0.0, 0.5]  # s; m, rad
 SEA = Together((current([0.3, 0.2, 0.0]), waves(height=0.5, period=5.0)))
 

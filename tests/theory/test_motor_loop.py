@@ -44,6 +44,7 @@ def test_rightmost_eigenvalues(table1, name):
         assert np.sign(value.real) == np.sign(wanted.real)
 
 
+@pytest.mark.full
 def test_unstable_at_every_speed_with_or_without_inductance(table1):
     law, robustless = table1(), table1(composite=0.0)
     for speed in np.linspace(2, 60, 30):
@@ -84,6 +85,7 @@ def test_observer_alone_tolerates_any_lag_or_a_closed_form(table1):
         assert (roots.real.max() < 0) == stable
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("skew", [0.0, 200.0])
 def test_linear_model_is_the_jacobian_of_the_code(skew):
     """At equal weights, and at weights that drifted apart: these are damping, c = -xi'(0)^T theta."""

@@ -21,6 +21,7 @@ def run(plant, law, reference, disturbance=None, duration=20.0, dt=1e-2, **start
     return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_nominal_plant_is_the_reference_model():
     """Without a load nothing is learnt, and the error is that of a critically damped loop."""
     plant, w = double_integrator(1), 2.0
@@ -32,6 +33,7 @@ def test_nominal_plant_is_the_reference_model():
     assert np.abs(found.signals["estimate"]).max() < 1e-8
 
 
+@pytest.mark.full
 def test_lyapunov_function_falls_and_the_parameters_are_found():
     """v_dot = L a + t_1 + t_2 v + t_3 |v| v with L = 0.8: V = 1/2 E^T P E + L |theta - theta*|^2 / (2 gamma).
 
@@ -69,6 +71,7 @@ def test_lyapunov_function_falls_and_the_parameters_are_found():
     np.testing.assert_allclose(away[-1], 0.0, atol=0.02)
 
 
+@pytest.mark.full
 def test_with_the_load_alone_it_is_a_pid():
     """The velocity and the nominal acceleration stay small, so that their parameters do nothing."""
     plant, w, gamma, small = double_integrator(1), 2.0, 1.5, 1e-4
@@ -81,6 +84,7 @@ def test_with_the_load_alone_it_is_a_pid():
     np.testing.assert_allclose(ours.signals["error"] / size, theirs.signals["error"] / size, atol=5e-3)
 
 
+@pytest.mark.full
 def test_limits_teach_nothing():
     """A step far beyond the limit: the reference model is moved by what is missing, and E stays zero."""
     plant = double_integrator(1, limit=1.0)
@@ -91,6 +95,7 @@ def test_limits_teach_nothing():
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)
 
 
+@pytest.mark.full
 def test_e_modification_forgets_and_projection_bounds():
     plant = double_integrator(1)
     options = {"frequency": 2.0, "adaptation": 4.0, "reference_frequency": 0.0}

@@ -24,6 +24,7 @@ def run(plant, law, goal, disturbance=None, duration=4.0, simulate=simd_batch.si
     return simulate(loop, duration=duration, dt=DT, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_with_hidden_weights_of_zero_it_is_a_pid():
     """sigma = 1/2 then, so that the output layer is an integral of r with gain I = F (hidden / 4 + 1):
     k_p = K_v Lambda + I, k_d = K_v + Lambda, k_i = I Lambda, from a start without error."""
@@ -40,6 +41,7 @@ def test_with_hidden_weights_of_zero_it_is_a_pid():
     assert size > 0.1
 
 
+@pytest.mark.full
 def test_at_the_start_it_is_the_outer_loop_alone():
     """W = 0: a = a_d + (K_v + K_z (|V| + Z_M)) r + Lambda e_dot."""
     model = double_integrator(2).model()
@@ -52,6 +54,7 @@ def test_at_the_start_it_is_the_outer_loop_alone():
     np.testing.assert_allclose(u, np.array([0.2, 0.0]) + gain * (rate + 2 * error) + 2 * rate, rtol=1e-12)
 
 
+@pytest.mark.full
 def test_the_network_learns_gravity_and_coriolis_forces_of_an_arm():
     """As in the source's example: both links of an arm follow sines of period 2 pi; the law has no model of weight and
     Coriolis forces. Its gains are K_v = 20, Lambda = 5 and kappa = 0.1, ten neurons, as there."""
@@ -68,6 +71,7 @@ def test_the_network_learns_gravity_and_coriolis_forces_of_an_arm():
     assert found.signals["weights_size"].max() < 100.0
 
 
+@pytest.mark.full
 def test_e_modification_bounds_the_weights_against_a_load_that_nothing_can_remove():
     """Under a fast load the filtered error persists; the decay kappa F |r| keeps W from growing on."""
     plant, load = double_integrator(1), sinusoid(5.0, 30.0, offset=20.0)
@@ -78,6 +82,7 @@ def test_e_modification_bounds_the_weights_against_a_load_that_nothing_can_remov
     assert sizes[1] < 0.5 * sizes[0]
 
 
+@pytest.mark.full
 def test_nothing_is_learnt_while_limits_bind():
     plant = double_integrator(1, limit=0.5)
     law = neural(plant.model(), sampling_time=DT, slope=2.0, gain=3.0, reference_frequency=0.0)

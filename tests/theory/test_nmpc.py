@@ -52,6 +52,7 @@ def condensed(h, steps, w):
 LINEAR = lambda t, state: (jnp.zeros(1), -jnp.eye(1))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("w", "h"), [(2.0, 0.1), (8.0, 0.02), (0.3, 0.2)])
 def test_the_end_is_that_of_the_discrete_riccati_equation(w, h):
     cost, gain = regulator(horizon(w=(w, 2 * w), h=h))
@@ -63,6 +64,7 @@ def test_the_end_is_that_of_the_discrete_riccati_equation(w, h):
         np.testing.assert_allclose(gain[axis], expected[0], rtol=1e-9)
 
 
+@pytest.mark.full
 def test_without_limits_one_step_gives_the_regulator():
     """For any length of the horizon; to the small cost of the forces themselves."""
     start = jnp.array([0.7, -0.4])
@@ -73,6 +75,7 @@ def test_without_limits_one_step_gives_the_regulator():
         np.testing.assert_allclose(found.gain[0], gain, rtol=1e-7)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("start", [(2.0, 0.0), (1.0, 1.5), (-3.0, 0.2)])
 def test_with_limits_it_ends_at_the_exact_optimum(start):
     """Against the box-constrained least squares of scipy for the condensed problem."""
@@ -109,6 +112,7 @@ def test_a_nonlinear_problem_ends_where_ipopt_does():
     np.testing.assert_allclose(converged(4.0, 5), IPOPT, atol=2e-7)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("limit", [3.0, 3.5, 10.0])
 def test_a_nonlinear_problem_ends_at_a_minimum_that_another_method_finds(limit):
     """L-BFGS-B, for limits that bind in several steps, in some and in none."""
@@ -132,6 +136,7 @@ def test_a_nonlinear_problem_ends_at_a_minimum_that_another_method_finds(limit):
     assert (bound > 0) == (limit < 10) and bound < 8
 
 
+@pytest.mark.full
 def test_far_from_limits_the_loop_is_that_of_the_disturbance_observer():
     """With the regulator's gains instead of w^2 and 2 w: on an arm, whose model is nonlinear, with a load."""
     plant, load = two_link_arm(), sinusoid(0.3, 2.0, offset=[1.0, -0.5])
@@ -144,6 +149,7 @@ def test_far_from_limits_the_loop_is_that_of_the_disturbance_observer():
     np.testing.assert_allclose(found, expected, atol=0.01 * float(np.abs(expected).max()))
 
 
+@pytest.mark.full
 def test_it_brakes_in_time_where_feedback_overshoots():
     """A step of 5 m with 1.5 m/s^2 at hand: the same gains without prediction overshoot by more than ten times."""
     plant = double_integrator(1, limit=1.5)
@@ -153,6 +159,7 @@ def test_it_brakes_in_time_where_feedback_overshoots():
     assert predictive < 0.1 * feedback, (predictive, feedback)
 
 
+@pytest.mark.full
 def test_a_prediction_that_is_not_finite_leaves_the_regulator():
     model = double_integrator(2).model()
     law = nmpc(model, sampling_time=DT, tracking=2.0, reference_frequency=0.0)

@@ -14,6 +14,8 @@ from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 SEEDS = 20  # one axis each
 AS_FAST = {"bandwidth": 150.0, "tracking": 30.0}  # rad/s, as Table 1
 LAWS = {

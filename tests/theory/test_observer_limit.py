@@ -13,6 +13,8 @@ from undertow.navigation.pose_only import pose_only
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 ROBUST = LinearLaw(pole=40.0, frequency=20.0, feedback=(25.0, 10.0))
 
 

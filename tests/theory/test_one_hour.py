@@ -21,6 +21,8 @@ from undertow.references.setpoint import setpoint
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
+pytestmark = pytest.mark.full
+
 SEEDS = 20  # one axis each
 DT, NOISE = 1e-3, 1e-2  # s, m/s
 

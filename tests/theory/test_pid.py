@@ -35,6 +35,7 @@ def test_error_follows_the_placed_poles():
         np.testing.assert_allclose(found.signals["error"][k, 0], expected, atol=5e-4)
 
 
+@pytest.mark.full
 def test_integral_is_the_estimate_of_a_constant_load():
     law = pid(double_integrator(2).model(), frequency=3.0)
     found = run(double_integrator(2), law, [0.0, 0.0], sinusoid(0.0, 1.0, offset=[1.5, -0.5]), duration=60.0)
@@ -49,6 +50,7 @@ def test_gains_may_be_given():
         np.testing.assert_allclose(getattr(placed, name), getattr(given, name))
 
 
+@pytest.mark.full
 def test_limits_do_not_wind_up():
     """A step of 5 m and a load of 1 m/s^2 with 1.5 m/s^2 at hand. Negative control: told that all was applied."""
     plant = double_integrator(1, limit=1.5)
@@ -71,6 +73,7 @@ def test_limits_do_not_wind_up():
     assert overshoot < 0.5 * furthest, (overshoot, furthest)
 
 
+@pytest.mark.full
 def test_an_integral_faster_than_the_sampling_stays_bounded():
     """At its limit the integral is at most what takes the other terms back: k_p e + k_d e_dot, and the limit itself."""
     plant, dt, frequency, limit = double_integrator(1, limit=1.5), 1e-2, 2617.0, 1.5
@@ -102,6 +105,7 @@ def test_vehicle_comes_to_its_place(motor):
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=0.02)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("feedforward", [True, False])
 def test_pendulum_stands(feedforward):
     pendulum = inverted_pendulum()
@@ -109,6 +113,7 @@ def test_pendulum_stands(feedforward):
     assert int(found.status) == 0 and abs(float(found.signals["error"][-1, 0])) < 5e-3
 
 
+@pytest.mark.full
 def test_ball_floats():
     ball = magnetic_levitation()
     found = run(ball, pid(ball.model(), frequency=30.0), [0.010], duration=5.0, dt=1e-3, position=[0.010])

@@ -18,6 +18,8 @@ from undertow.references import setpoint, sine
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy, odin
 
+pytestmark = pytest.mark.full
+
 AXIS = double_integrator(1).model()
 LAWS = sorted(
     name for name, law in catalogue.names("controllers").items()

@@ -19,6 +19,8 @@ from undertow.references import setpoint, sine
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy, odin
 
+pytestmark = pytest.mark.full
+
 TARGET = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]
 
 

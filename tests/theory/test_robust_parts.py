@@ -25,6 +25,7 @@ from undertow.vehicles import bluerov2_heavy
 RNG = np.random.default_rng(4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("damping", [0.3, 1.0, 2.5])
 @pytest.mark.parametrize("dt", [1e-4, 1e-2, 1.0])
 def test_estimator_poles_are_those_of_continuous_time(damping, dt):
@@ -43,6 +44,7 @@ def test_estimator_poles_are_those_of_continuous_time(damping, dt):
     np.testing.assert_allclose(found, np.sort_complex(np.exp(poles * dt)), atol=1e-7)
 
 
+@pytest.mark.full
 def test_one_step_moves_the_estimate_by_a_given_amount_whatever_the_sets():
     moved = []
     for sets in (1, 3, 7):
@@ -144,6 +146,7 @@ def test_limits_hold_and_the_share_is_the_largest_in_that_direction():
         assert np.linalg.norm(aside) < 1e-3 * np.linalg.norm(EFFECT @ forces)
 
 
+@pytest.mark.full
 def test_giving_up_the_direction_gives_more():
     for forces in demands(8.0):
         loss = [np.linalg.norm(EFFECT @ (solve(EFFECT, forces, -FULL, FULL, w) - forces)) for w in (1e6, 1.0)]
@@ -191,6 +194,7 @@ def test_a_jump_dies_out_like_three_equal_poles():
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+@pytest.mark.full
 def test_a_smooth_reference_passes_as_it_is():
     """A cubic from rest: all that is known of it at a step leads to the next without error."""
     at = polynomial(0.3, 0.0, 1.0, 2.0)
@@ -198,6 +202,7 @@ def test_a_smooth_reference_passes_as_it_is():
     np.testing.assert_allclose(found, [np.ravel(at(0.02 * k)) for k in range(100)], atol=1e-11)
 
 
+@pytest.mark.full
 def test_what_is_left_of_a_sinusoid_falls_with_the_square_of_the_sampling_time():
     """Once the start from rest has died out."""
     sine = lambda t: Target(*np.asarray([[np.sin(3 * t)], [3 * np.cos(3 * t)], [-9 * np.sin(3 * t)]]))
@@ -210,6 +215,7 @@ def test_what_is_left_of_a_sinusoid_falls_with_the_square_of_the_sampling_time()
     assert 3.5 < left[0] / left[1] < 4.5
 
 
+@pytest.mark.full
 def test_the_filter_waits_while_nothing_can_be_given():
     found = followed(ReferenceFilter(2.0), polynomial(1.0), 0.2, 0.1, 5, share=0.0)
     np.testing.assert_allclose(found, np.tile([0.2, 0.0, 0.0], (5, 1)), atol=1e-15)
@@ -255,6 +261,7 @@ def test_the_range_of_a_drive_is_where_the_supply_ends(name):
         np.testing.assert_allclose(found, volts * float(thruster.supply), rtol=1e-9)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("make", [t200, paper_table3])
 def test_a_predicted_motor_turns_as_the_true_one(make):
     """Against the electromechanical fidelity with steps 200 times smaller, over one second of changing voltage."""
@@ -289,6 +296,7 @@ def body():
     return hybrid_vehicle(bluerov2_heavy(), t200()).model().in_body_axes()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_rates_and_their_derivative(body, t):
     eta, rate, bend = motion(t)
@@ -299,6 +307,7 @@ def test_rates_and_their_derivative(body, t):
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("t", [0.1, 0.7, 1.9])
 def test_wanted_rates_and_their_derivative_seen_from_a_turning_vehicle(body, t):
     """Both move: the target half as fast, along the same way."""

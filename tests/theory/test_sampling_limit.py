@@ -11,6 +11,8 @@ from undertow.analysis import small_signal
 from undertow.loop import sampled
 from undertow.numerics.integrators import rk4
 
+pytestmark = pytest.mark.full
+
 LIMITS = {"euler": 7.09e-3, "exact": 9.71e-3}
 DISCRETISED = {"euler": {}, "exact": {"method": "rk4", "substeps": 3}}
 RULES = list(LIMITS)

@@ -21,6 +21,8 @@ from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 RHO = float(gaussian_sets(3).basis_norm_squared())
 LAYOUTS = {"three sets": {"sets": 3}, "one set": {"sets": 1}, "rho = 1/3": {"sets": 3, "adaptation": 100 / (3 * RHO)}}
 # Rule, delay, RAFC -> limits in ms as printed, one per layout.

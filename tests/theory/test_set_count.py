@@ -8,6 +8,8 @@ from undertow.disturbances.sinusoid import sinusoid
 from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import sampled
 
+pytestmark = pytest.mark.full
+
 GATHERING = 0.4217  # rho of three sets, the layout matched by all others
 PROBES = {"amplitude": np.array([4.0, 2.0]), "frequency": np.array([2.0, 20.0]), "offset": np.array([-2.0, 1.0])}
 LAYOUTS = {

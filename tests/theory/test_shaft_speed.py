@@ -10,6 +10,8 @@ from undertow.core.contracts import Load, known_acceleration
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
+pytestmark = pytest.mark.full
+
 
 def plant(fidelity="shaft"):
     return ut.HybridVehicle(odin(), paper_table3(fidelity, supply=24.0))

@@ -1,5 +1,8 @@
 """Slotine and Li: the regressor against the model, passivity, the Lyapunov function, and a PID as its limit."""
 
+from typing import Any, NamedTuple
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -44,71 +47,92 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_nominal_regressor_is_the_model(name):
-    """M^-1 Y theta = a - F at the nominal parameters and the measured velocity."""
-    model, rng = MODELS[name](), np.random.default_rng(1)
-    n = len(model.coordinates.angles)
-    y = model.coordinates.measurement(*(jnp.asarray(rng.uniform(-0.7, 0.7, n)) for _ in range(2)))
-    wanted, nominal = jnp.asarray(rng.normal(size=n)), model.dynamics.parametrization().nominal
-    force = model.dynamics.generalized_force(y, nominal, model.coordinates.velocity(y), wanted)
-    expected = wanted - model.dynamics.drift(y)
-    np.testing.assert_allclose(model.dynamics.accelerated_by(y, force), expected, rtol=1e-10, atol=1e-10)
+class Told(NamedTuple):
+    """What the parametrization of a model says at one motion."""
+
+    nominal: Any  # acceleration that belongs to the force of the nominal parameters
+    expected: Any  # the same by the model itself
+    forces: Any  # of one and other parameters, and of 0.3 and 0.7 of them
+    slope: Any  # of the force by the parameters
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_force_is_affine_in_the_parameters(name):
-    model, rng = MODELS[name](), np.random.default_rng(2)
+@eqx.filter_jit
+def told(model, motion, parameters):
+    coordinates, dynamics, (one, other) = model.coordinates, model.dynamics, parameters
+    position, rate, wanted, velocity, acceleration = motion
+    y = coordinates.measurement(position, rate)
+    force = lambda parameters: dynamics.generalized_force(y, parameters, velocity, acceleration)
+    nominal = dynamics.generalized_force(y, dynamics.parametrization().nominal, coordinates.velocity(y), wanted)
+    return Told(
+        dynamics.accelerated_by(y, nominal),
+        wanted - dynamics.drift(y),
+        (force(one), force(other), force(0.3 * one + 0.7 * other)),
+        jax.jacfwd(force)(one),
+    )
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def regressor(request):
+    """Name of a model, and what it says at a random motion."""
+    model, rng = MODELS[request.param](), np.random.default_rng(1)
     n, structure = len(model.coordinates.angles), model.dynamics.parametrization()
-    y = model.coordinates.measurement(*(jnp.asarray(rng.uniform(-0.7, 0.7, n)) for _ in range(2)))
-    velocity, acceleration = jnp.asarray(rng.normal(size=n)), jnp.asarray(rng.normal(size=n))
-    force = lambda parameters: model.dynamics.generalized_force(y, parameters, velocity, acceleration)
-    one, other = (structure.nominal + structure.most * rng.uniform(-1, 1, structure.nominal.size) for _ in range(2))
-    np.testing.assert_allclose(force(0.3 * one + 0.7 * other), 0.3 * force(one) + 0.7 * force(other), rtol=1e-9)
-    assert (np.abs(np.asarray(jax.jacfwd(force)(one))).max(0) > 0).all() or name == "arm", "a parameter without effect"
+    motion = [rng.uniform(-0.7, 0.7, n), rng.uniform(-0.7, 0.7, n), *rng.normal(size=(3, n))]
+    spread = [np.asarray(structure.most) * rng.uniform(-1, 1, structure.nominal.size) for _ in range(2)]
+    parameters = [np.asarray(structure.nominal) + one for one in spread]
+    return request.param, told(model, *jax.tree.map(jnp.asarray, (motion, parameters)))
+
+
+def test_nominal_regressor_is_the_model(regressor):
+    """M^-1 Y theta = a - F at the nominal parameters and the measured velocity."""
+    _, found = regressor
+    np.testing.assert_allclose(found.nominal, found.expected, rtol=1e-10, atol=1e-10)
+
+
+def test_force_is_affine_in_the_parameters(regressor):
+    name, found = regressor
+    one, other, both = found.forces
+    np.testing.assert_allclose(both, 0.3 * np.asarray(one) + 0.7 * np.asarray(other), rtol=1e-9)
+    assert (np.abs(found.slope).max(0) > 0).all() or name == "arm", "a parameter without effect"
 
 
 def test_coriolis_matrix_of_the_arm_is_passive_for_any_parameters():
     """s^T (M_dot - 2 C) s = 0, with M_dot along the motion."""
     rng, dynamics = np.random.default_rng(3), two_link_arm().model().dynamics
-    q, rate, s, parameters = (jnp.asarray(rng.normal(size=k)) for k in (2, 2, 2, 5))
     still = jnp.zeros(2)
 
-    def kinetic(q):
-        y = Measurement(q, still)
-        return s @ (
-            dynamics.generalized_force(y, parameters, still, s)
-            - dynamics.generalized_force(y, parameters, still, still)
-        )
+    @jax.jit
+    def powers(q, rate, s, parameters):
+        force = lambda y, *motion: dynamics.generalized_force(y, parameters, *motion)
+        at_rest = lambda q: s @ (force(Measurement(q, still), still, s) - force(Measurement(q, still), still, still))
+        y = Measurement(q, rate)
+        return jax.jvp(at_rest, (q,), (rate,))[1], 2 * s @ (force(y, s, still) - force(y, still, still))
 
-    changed = jax.jvp(kinetic, (q,), (rate,))[1]
-    y = Measurement(q, rate)
-    coriolis = dynamics.generalized_force(y, parameters, s, still) - dynamics.generalized_force(
-        y, parameters, still, still
-    )
-    np.testing.assert_allclose(changed, 2 * s @ coriolis, rtol=1e-10)
+    changed, twice = powers(*(jnp.asarray(rng.normal(size=k)) for k in (2, 2, 2, 5)))
+    np.testing.assert_allclose(changed, twice, rtol=1e-10)
 
 
 def test_coriolis_forces_of_a_vehicle_do_no_work_for_any_inertia():
     """What is left of s^T (force at s - force at 0) is drag, which does not depend on the inertia."""
-    dynamics, rng = vehicle(remus100).dynamics, np.random.default_rng(4)
-    y = vehicle(remus100).coordinates.measurement(*(jnp.asarray(rng.uniform(-0.5, 0.5, 6)) for _ in range(2)))
-    s, still = jnp.asarray(rng.normal(size=6)), jnp.zeros(6)
-    nominal = dynamics.parametrization().nominal
-    power = lambda parameters: (
-        s
-        @ (
-            dynamics.generalized_force(y, parameters, s, still)
-            - dynamics.generalized_force(y, parameters, still, still)
-        )
-    )
-    np.testing.assert_allclose(power(nominal.at[:6].set(rng.uniform(0.5, 1.5, 6))), power(nominal), rtol=1e-10)
-    np.testing.assert_allclose(
-        power(nominal),
-        s @ (dynamics.body.linear_damping @ s + dynamics.body.quadratic_damping @ (jnp.abs(y.body.nu) * s)),
-    )
+    model, rng = vehicle(remus100), np.random.default_rng(4)
+    dynamics, still = model.dynamics, jnp.zeros(6)
+    motion, s = jnp.asarray(rng.uniform(-0.5, 0.5, (2, 6))), jnp.asarray(rng.normal(size=6))
+    inertia = jnp.asarray(rng.uniform(0.5, 1.5, 6))
+
+    @eqx.filter_jit
+    def powers(dynamics, motion, s, inertia):
+        y, nominal = model.coordinates.measurement(*motion), dynamics.parametrization().nominal
+        force = lambda parameters, velocity: dynamics.generalized_force(y, parameters, velocity, still)
+        power = lambda parameters: s @ (force(parameters, s) - force(parameters, still))
+        body = dynamics.body
+        drag = body.linear_damping @ s + body.quadratic_damping @ (jnp.abs(y.body.nu) * s)
+        return power(nominal.at[:6].set(inertia)), power(nominal), s @ drag
+
+    changed, nominal, drag = powers(dynamics, motion, s, inertia)
+    np.testing.assert_allclose(changed, nominal, rtol=1e-10)
+    np.testing.assert_allclose(nominal, drag)
 
 
+@pytest.mark.full
 def test_lyapunov_function_falls_as_in_the_theorem():
     """The arm of Slotine and Li (1991), section 9.2, with K_D = 100 I, l = 20 and Gamma = (0.03, 0.05, 0.1, 0.3).
 
@@ -154,6 +178,7 @@ def test_lyapunov_function_falls_as_in_the_theorem():
     assert np.abs(off[-1]).sum() < np.abs(off[0]).sum()
 
 
+@pytest.mark.full
 def test_with_the_load_alone_it_is_a_pid():
     plant, slope, gain, gamma = double_integrator(1), 1.5, 2.5, 0.8
     law = slotine_li(
@@ -179,6 +204,7 @@ def test_vehicle_holds_its_place_under_constant_loads():
     np.testing.assert_allclose(found.signals["estimate"][-1], [surge, sway, 0.4, 1.0, 0.5, -0.5], atol=2e-3)
 
 
+@pytest.mark.full
 def test_parameters_wait_at_limits_and_stay_plausible():
     plant = double_integrator(1, limit=1.0)
     law = slotine_li(plant.model(), sampling_time=1e-2, slope=1.0, adaptation_rate=5.0, reference_frequency=0.0)
@@ -194,6 +220,7 @@ def test_parameters_wait_at_limits_and_stay_plausible():
     np.testing.assert_array_equal(moved.law - structure.nominal, [0.0, 0.0, structure.most[2]])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rate", [1.0, 1e6])
 def test_any_rate_of_adaptation_is_stable_when_sampled(rate):
     """The rate is slowed down to what feedback can take away in one sampling time."""

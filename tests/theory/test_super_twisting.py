@@ -49,6 +49,7 @@ def longest_time(first, second, bound, s, w):
     return best
 
 
+@pytest.mark.full
 def test_reaches_the_surface_in_the_time_of_the_lyapunov_function_and_finds_the_load():
     """A load of rate 0.9 L; afterwards w is the load and the error decays at the slope of the surface."""
     first, second, bound = 2.0, 1.5, 1.0
@@ -65,6 +66,7 @@ def test_reaches_the_surface_in_the_time_of_the_lyapunov_function_and_finds_the_
     np.testing.assert_allclose(decay, np.exp(-1.0), rtol=5e-3)
 
 
+@pytest.mark.full
 def test_time_grows_with_the_root_of_the_distance():
     """The homogeneity of degree -1 without a load: four times as far takes twice as long."""
     plant = double_integrator(1)
@@ -76,6 +78,7 @@ def test_time_grows_with_the_root_of_the_distance():
     np.testing.assert_allclose(far, 2 * near, rtol=0.01)
 
 
+@pytest.mark.full
 def test_sampled_surface_has_the_accuracy_of_second_order():
     """|s| is of the order of L T^2 (Levant 1993), where a first-order sliding mode has T."""
     plant, sizes = double_integrator(1), []
@@ -87,6 +90,7 @@ def test_sampled_surface_has_the_accuracy_of_second_order():
     np.testing.assert_allclose(sizes[0], sizes[1], rtol=0.3)
 
 
+@pytest.mark.full
 def test_inside_the_layer_it_is_a_pid():
     plant, slope, bound, layer = double_integrator(1), 1.5, 2.0, 0.4
     law = super_twisting(plant.model(), slope=slope, rate_bound=bound, layer=layer, reference_frequency=0.0)
@@ -131,6 +135,7 @@ def test_least_second_gain_is_where_nothing_contracts(first):
         np.testing.assert_allclose(least, 1.0, rtol=1e-6)
 
 
+@pytest.mark.full
 def test_limits_do_not_wind_up():
     plant = double_integrator(1, limit=1.5)
     law = super_twisting(plant.model(), sampling_time=1e-2, slope=1.0, rate_bound=0.5, reference_frequency=0.0)

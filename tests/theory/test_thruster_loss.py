@@ -28,6 +28,8 @@ from undertow.references.setpoint import setpoint
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
+pytestmark = pytest.mark.full
+
 LOSS, SETTLED, END, DT = 2.0, 10.0, 16.3, 2e-3  # s; the last 6.3 s are one period of the load
 
 

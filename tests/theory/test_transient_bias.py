@@ -7,6 +7,8 @@ import pytest
 
 from undertow.loop import sampled
 
+pytestmark = pytest.mark.full
+
 STEP = 2.0  # m; s = 10 at the start, d = 0 all the while
 
 

@@ -11,6 +11,8 @@ import pytest
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 
+pytestmark = pytest.mark.full
+
 AXES = 24
 
 

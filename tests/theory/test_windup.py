@@ -17,6 +17,8 @@ from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 LIMITS = (np.inf, 5.0, 3.0, 1.5)  # m/s^2
 SURVIVES = {
     "applied": (True, True, True, True),

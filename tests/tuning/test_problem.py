@@ -27,6 +27,8 @@ from undertow.tuning.stability import Certifier
 from undertow.tuning.tunable_parameters import options, parameters
 from undertow.vehicles import bluerov2_heavy
 
+pytestmark = pytest.mark.full
+
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20.0},
     "controller": {"kind": "pid", "frequency": 3.0},
