@@ -90,7 +90,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 @pytest.mark.full
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "save", raising(OSError(28, "No space left on device", "run.nc")))
-    write(tmp_path)
+    write(tmp_path, SMALL)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = "Error: files could not be read or written: No space left on device (run.nc)"
     assert said.code == 4

@@ -213,13 +213,14 @@ def test_a_killed_process_leaves_a_log_that_replays(scenario, tmp_path, peer, ca
 
 def test_a_full_disk_does_not_stop_the_controller(scenario, tmp_path):
     """Files end at 20 kB: the run goes on to its end, says so once, and the log is readable up to there."""
+    (tmp_path / "axis.yaml").write_text(AXIS)
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); "
-    code += "from undertow.cli.main import run; sys.exit(run(['run', 'rov.yaml', '--fast', '--duration', '2']))"
+    code += "from undertow.cli.main import run; sys.exit(run(['run', 'axis.yaml', '--fast', '--duration', '10']))"
     environment = os.environ | {"UNDERTOW_CACHE": str(tmp_path / "cache")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
     assert done.returncode == 4 and "later steps are not logged" in done.stderr
-    assert json.loads((tmp_path / "runs/rov/statistics.json").read_text())["steps"] == 200
-    assert 5 < len(read_log(tmp_path / "runs/rov/run.mcap")["elapsed"].time) < 100
+    assert json.loads((tmp_path / "runs/axis/statistics.json").read_text())["steps"] == 1000
+    assert 5 < len(read_log(tmp_path / "runs/axis/run.mcap")["elapsed"].time) < 500
 
 
 def test_without_a_vehicle_nothing_is_written(scenario, tmp_path, peer, capsys):

@@ -8,8 +8,8 @@ Blocks of text on a page of docs/tutorials are what the command before them prin
 output, in this order; `...` stands for anything. Where they show an error, the command must fail with exit code 2.
 
 By default a run is not put beside its prediction or, on most pages, its scenario is built only; blank figures and
-no replay are written, and PID stands for the preset `robust`, also in examples/bluerov2_heavy.yaml, which is without waves
-then: most of the time of a short run. Of a tutorial, only `undertow init` runs, and the scenarios are validated. Slow
+no replay are written, and PID stands for the preset `robust`, also in examples/bluerov2_heavy.yaml, which is without
+waves and sensors then: most of the time of a short run. Of a tutorial, only `undertow init` runs, and the scenarios are validated. Slow
 tests run everything as it stands.
 """
 
@@ -71,7 +71,10 @@ QUICKER = {
     "{kind: rcaf, preset: robust}": "{kind: pid, frequency: 1}",
     'ut.rcaf(plant.model(), preset="robust", sampling_time=0.01)': "ut.controllers.pid(plant.model(), sampling_time=0.01)",
 }
-HEAVY = {r"kind: rcaf\n  preset: robust": "kind: pid\n  frequency: 1", r"  - kind: waves\n(    .*\n)+": ""}
+HEAVY = {
+    r"kind: rcaf\n  preset: robust": "kind: pid\n  frequency: 1",
+    r"  - kind: waves\n(    .*\n)+navigation:\n(  .*\n)+": "",
+}
 
 
 def quicker(code: str) -> str:
