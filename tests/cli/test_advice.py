@@ -32,8 +32,8 @@ def said_of(text):
     return plausibility(built.closed_loop, built.scenario.loop.duration, built.scenario.initial.position)
 
 
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 @pytest.mark.full
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_examples_get_no_advice(path):
     assert said_of(read(path)) == ()
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from good_scenario import SCENARIO, SMALL
 
+from undertow.checks import check
 from undertow.core import catalogue
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -119,11 +120,13 @@ def test_bad_scenario(refused, tmp_path):
     assert refused("check", "s.yaml", "--option", "seed=4") == said
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("kind", "name"), [pytest.param(*one, marks=pytest.mark.slow) if one in SLOW else one for one in PARTS]
 )
-@pytest.mark.full
-def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
+def test_parts_of_the_catalogue_keep_their_contract(undertow, monkeypatch, kind, name):
+    """Without the feedback of a law, which gives advice, never an error, and takes longest: tests/docs/test_own_controller."""
+    monkeypatch.setattr(check, "_of_feedback", lambda make, axes: check.Report((), ()))
     needed = {
         "table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"],
         "policy": ["--option", f"function={Path(__file__).parents[1]}/conformance/proportional_policy.py:act"],
@@ -133,8 +136,8 @@ def test_parts_of_the_catalogue_keep_their_contract(undertow, kind, name):
     assert said.code == 0, said
 
 
-@pytest.mark.parametrize("name", sorted(catalogue.names("references")))
 @pytest.mark.full
+@pytest.mark.parametrize("name", sorted(catalogue.names("references")))
 def test_references_are_consistent(undertow, name):
     samples = "[[0, 0, 0, 0, 0, 0, 0], [5, 1, 0, 1, 0, 0, 0.3], [10, 1, 2, 1, 0, 0, 0]]"
     needed = {

@@ -77,8 +77,8 @@ def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]
 
 
-@pytest.mark.parametrize("way", ["option", "environment"])
 @pytest.mark.full
+@pytest.mark.parametrize("way", ["option", "environment"])
 def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
     monkeypatch.setenv("UNDERTOW_TRACEBACK", "1" if way == "environment" else "")
     monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken")))
@@ -90,7 +90,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 @pytest.mark.full
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
     monkeypatch.setattr(execute, "save", raising(OSError(28, "No space left on device", "run.nc")))
-    write(tmp_path)
+    write(tmp_path, SMALL)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = "Error: files could not be read or written: No space left on device (run.nc)"
     assert said.code == 4
@@ -142,8 +142,8 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("interrupted", [SWALLOWED, "import interrupted; assert interrupted.whole"])
 @pytest.mark.full
+@pytest.mark.parametrize("interrupted", [SWALLOWED, "import interrupted; assert interrupted.whole"])
 def test_an_interrupt_that_was_not_heard_ends_the_next_wait(tmp_path, interrupted):
     """Swallowed by compiled code that calls back into Python, or put off as it came while a module was imported."""
     (tmp_path / "interrupted.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = 'whole'")
@@ -193,6 +193,7 @@ EVERY = {
 QUICK = {("list", 2), ("simulate", 15)}  # both signals, and a command that waits for compiled code
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("command", "signal"),
     [
@@ -201,7 +202,6 @@ QUICK = {("list", 2), ("simulate", 15)}  # both signals, and a command that wait
         for signal in (2, 15)
     ],
 )
-@pytest.mark.full
 def test_signals_while_modules_are_imported_end_every_command(tmp_path, command, signal):
     """It may not be forgotten by those that wait for no compiled code; SIGTERM ends like Ctrl-C, with its own code."""
     write(tmp_path)

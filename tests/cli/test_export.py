@@ -5,6 +5,7 @@ import shutil
 import subprocess
 
 import pytest
+from good_scenario import SMALL
 
 from undertow.cli.main import run
 
@@ -15,6 +16,14 @@ COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 
 def made(folder, *arguments):
     return run(["export", "examples/paper_example2.yaml", "--c99", str(folder), *arguments])
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """A folder that tests copy before they change it."""
+    folder = tmp_path_factory.mktemp("exported") / "c"
+    assert made(folder) == 0
+    return folder
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
@@ -33,9 +42,8 @@ def test_the_code_meets_its_test(tmp_path, precision, capsys):
             assert "0 of 50 steps differ" in done.stdout
 
 
-def test_no_heap_and_no_globals(tmp_path):
-    made(tmp_path / "c")
-    text = (tmp_path / "c/controller.c").read_text()
+def test_no_heap_and_no_globals(exported):
+    text = (exported / "controller.c").read_text()
     assert not re.search(r"\b(malloc|calloc|free|printf|static (?!const)\w+ \w+(\[|;| =))", text)
     called = set(re.findall(r"\b([a-z]+)f?\(", text)) - {"if", "sizeof", "switch", "for"}
     known = {"fma", "fmod", "copysign", "fabs", "sqrt", "floor", "ceil", "nearbyint", "memcpy", "isfinite"}
@@ -43,9 +51,9 @@ def test_no_heap_and_no_globals(tmp_path):
     assert called <= known | {"void"}
 
 
-def test_a_changed_test_vector_is_noticed(tmp_path):
+def test_a_changed_test_vector_is_noticed(exported, tmp_path):
     """The test can fail: one last bit of one output."""
-    made(tmp_path / "c")
+    shutil.copytree(exported, tmp_path / "c")
     path = tmp_path / "c/controller_vectors.h"
     head, outputs = path.read_text().split("OUTPUTS[STEPS]")
     number = re.search(r"0x1\.[0-9a-f]{12}([0-9a-f])p", outputs)
@@ -71,13 +79,18 @@ def test_what_is_wrong(tmp_path, capsys, arguments, said):
     assert not (tmp_path / "c").exists()
 
 
-def test_an_earlier_export_is_kept(tmp_path, capsys):
-    assert made(tmp_path / "c") == 0
+def test_an_earlier_export_is_kept(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.yaml").write_text(SMALL)
+    export = ["export", "s.yaml", "--c99", "c"]
+    assert run(export) == 0
     before = (tmp_path / "c/controller.c").read_text()
-    assert made(tmp_path / "c", "--attitude", "quaternion") == 2
+    (tmp_path / "s.yaml").write_text(SMALL.replace("frequency: 2", "frequency: 3"))
+    assert run(export) == 2
     assert "Use --overwrite" in capsys.readouterr().err
     assert (tmp_path / "c/controller.c").read_text() == before
-    assert made(tmp_path / "c", "--attitude", "quaternion", "--overwrite") == 0
+    assert run([*export, "--overwrite"]) == 0
+    assert (tmp_path / "c/controller.c").read_text() != before
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
+from undertow.scenario.part_cache import PartCache
 
 pytestmark = pytest.mark.full
 
@@ -96,9 +97,12 @@ def mutated(draw):
     return scenario
 
 
+PARTS = PartCache()  # those that no change has met, made once
+
+
 def built_or_refused_in_one_line(scenario):
     try:
-        build(scenario)
+        build(scenario, PARTS)
     except BadInput as error:
         said = str(error)
         assert said.startswith("`") and " must " in said

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -22,6 +23,12 @@ SCENARIO = """
 plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}
 controller: {kind: pid, frequency: 2.0}
 reference: {kind: setpoint, position: [1, 0.5, 0.3, 0, 0, 0.4], settling: 2}
+loop: {duration: 0.5, dt: 0.01, record: 0.01}
+"""
+AXIS = """
+plant: {kind: double_integrator, axes: 1, limit: 20}
+controller: {kind: pid, frequency: 2.0}
+reference: {kind: setpoint, position: [1]}
 loop: {duration: 0.5, dt: 0.01, record: 0.01}
 """
 AT_REST = np.concatenate([np.zeros(3), [1, 0, 0, 0], np.zeros(6 + 8)])
@@ -44,11 +51,16 @@ def test_a_fast_run_has_the_bits_of_simulate_and_replays(scenario, tmp_path, cap
         np.testing.assert_array_equal(log[name].values, record[name].values[:-1])
     assert run(["run", "rov.yaml", "--link", "log:runs/rov/run.mcap"]) == 0
     assert "50 steps replayed: every bit" in capsys.readouterr().out
-    (tmp_path / "other.yaml").write_text(SCENARIO.replace("2.0", "2.5"))
-    assert run(["run", "other.yaml", "--link", "log:runs/rov/run.mcap"]) == 1
+
+
+def test_another_law_differs_from_the_log_and_an_earlier_result_is_kept(scenario, tmp_path, capsys):
+    (tmp_path / "axis.yaml").write_text(AXIS)
+    assert run(["run", "axis.yaml", "--fast"]) == 0
+    (tmp_path / "other.yaml").write_text(AXIS.replace("2.0", "2.5"))
+    assert run(["run", "other.yaml", "--link", "log:runs/axis/run.mcap"]) == 1
     captured = capsys.readouterr()
     assert "Commands that differ" in captured.out and "differ from the log" in captured.err
-    assert run(["run", "rov.yaml", "--fast", "--out", "runs/rov"]) == 2  # an earlier result is there
+    assert run(["run", "axis.yaml", "--fast", "--out", "runs/axis"]) == 2  # an earlier result is there
     assert "--overwrite" in capsys.readouterr().err
 
 
@@ -124,39 +136,72 @@ def started(peer, *arguments):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
 
 
-def controlled(peer, process):
-    """Answer until control has been going on for a while."""
-    peer.answer(60, until=lambda: sum(not one.flag for one in peer.commands) > 40 or process.poll() is not None)
+def controlled(peer, ended):
+    """Answer until control has been going on for a while, or the command has ended."""
+    peer.answer(60, until=lambda: sum(not one.flag for one in peer.commands) > 40 or ended())
 
 
-@pytest.mark.parametrize("one, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_it_with_the_safe_output(scenario, tmp_path, peer, one, code):
+def ended_with_the_safe_output(folder, peer, out, error):
+    assert error.strip().endswith("Interrupted: stopping.") and "Ended: stopped" in out
+    assert all((one.values == 0.5).all() for one in peer.commands[-3:])
+    assert not (peer.commands[-4].values == 0.5).all()
+    found = json.loads((folder / "statistics.json").read_text())
+    assert found["steps"] == len(read_log(folder / "run.mcap")["elapsed"].time) > 40
+
+
+def test_a_signal_ends_it_with_the_safe_output(scenario, tmp_path, peer):
+    """SIGTERM, to a process of its own."""
     process = started(peer, "--safe", "0.5", "--max-age", "10")
-    controlled(peer, process)
-    process.send_signal(one)
+    controlled(peer, lambda: process.poll() is not None)
+    process.send_signal(signal.SIGTERM)
     peer.answer(30, until=lambda: process.poll() is not None)
     peer.answer(0.3)
     out, error = process.communicate(timeout=30)
-    assert process.returncode == code and error.strip().endswith("Interrupted: stopping.") and "Ended: stopped" in out
-    assert all((one.values == 0.5).all() for one in peer.commands[-3:])
-    assert not (peer.commands[-4].values == 0.5).all()
-    found = json.loads((tmp_path / "runs/rov/statistics.json").read_text())
-    assert found["steps"] == len(read_log(tmp_path / "runs/rov/run.mcap")["elapsed"].time) > 40
+    assert process.returncode == 143
+    ended_with_the_safe_output(tmp_path / "runs/rov", peer, out, error)
 
 
-def test_a_lost_vehicle_and_one_that_never_was(scenario, tmp_path, peer):
-    process = started(peer, "--max-age", "1")
-    controlled(peer, process)
-    peer.commands.clear()
-    _, error = process.communicate(timeout=30)  # nobody answers any more
+def test_ctrl_c_ends_it_with_the_safe_output(scenario, tmp_path, peer, capfd):
+    ended = threading.Event()
+
+    def vehicle():
+        controlled(peer, ended.is_set)
+        if not ended.is_set():
+            os.kill(os.getpid(), signal.SIGINT)
+        peer.answer(30, until=ended.is_set)
+
+    answering = threading.Thread(target=vehicle)
+    answering.start()
+    try:
+        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--safe", "0.5", "--max-age", "10"])
+    finally:
+        ended.set()
+        answering.join()
     peer.answer(0.3)
-    assert process.returncode == 1 and "no measurement for 1 s" in error
+    out, error = capfd.readouterr()
+    assert code == 130
+    ended_with_the_safe_output(tmp_path / "runs/rov", peer, out, error)
+
+
+def test_a_lost_vehicle_and_one_that_never_was(scenario, peer, capsys):
+    """After a while nobody answers any more; what was sent since then waits in the socket."""
+    ended = threading.Event()
+    vehicle = threading.Thread(target=controlled, args=(peer, ended.is_set))
+    vehicle.start()
+    try:
+        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--max-age", "1"])
+    finally:
+        ended.set()
+        vehicle.join()
+    peer.commands.clear()
+    peer.answer(0.3)
+    assert code == 1 and "no measurement for 1 s" in capsys.readouterr().err
     assert not peer.commands[-1].values.any() and peer.commands[-4].values.any()
 
 
 def test_a_killed_process_leaves_a_log_that_replays(scenario, tmp_path, peer, capsys):
     process = started(peer, "--max-age", "10")
-    controlled(peer, process)
+    controlled(peer, lambda: process.poll() is not None)
     process.kill()
     process.communicate(timeout=30)
     log = read_log(tmp_path / "runs/rov/run.mcap")
@@ -168,13 +213,14 @@ def test_a_killed_process_leaves_a_log_that_replays(scenario, tmp_path, peer, ca
 
 def test_a_full_disk_does_not_stop_the_controller(scenario, tmp_path):
     """Files end at 20 kB: the run goes on to its end, says so once, and the log is readable up to there."""
+    (tmp_path / "axis.yaml").write_text(AXIS)
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); "
-    code += "from undertow.cli.main import run; sys.exit(run(['run', 'rov.yaml', '--fast', '--duration', '2']))"
+    code += "from undertow.cli.main import run; sys.exit(run(['run', 'axis.yaml', '--fast', '--duration', '10']))"
     environment = os.environ | {"UNDERTOW_CACHE": str(tmp_path / "cache")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
     assert done.returncode == 4 and "later steps are not logged" in done.stderr
-    assert json.loads((tmp_path / "runs/rov/statistics.json").read_text())["steps"] == 200
-    assert 5 < len(read_log(tmp_path / "runs/rov/run.mcap")["elapsed"].time) < 100
+    assert json.loads((tmp_path / "runs/axis/statistics.json").read_text())["steps"] == 1000
+    assert 5 < len(read_log(tmp_path / "runs/axis/run.mcap")["elapsed"].time) < 500
 
 
 def test_without_a_vehicle_nothing_is_written(scenario, tmp_path, peer, capsys):

@@ -65,8 +65,8 @@ BASE = {
 }
 
 
-@pytest.mark.parametrize("method", ["rk4", pytest.param("euler", marks=pytest.mark.slow)])
 @pytest.mark.full
+@pytest.mark.parametrize("method", ["rk4", pytest.param("euler", marks=pytest.mark.slow)])
 def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     """x_ddot = -1000 x_dot + u at 10 ms: 2.785 (2 for Euler's method) over 1000 / s, in so many substeps, and no fewer."""
     failed = execute(BASE | {"loop": BASE["loop"] | {"method": method}})
@@ -109,6 +109,7 @@ def test_a_law_too_stiff_for_one_ode():
     assert execute(scenario | {"loop": loop | {"dt": 0.01}}).status is Status.OK
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("loop", "said"),
     [
@@ -129,7 +130,6 @@ def test_a_law_too_stiff_for_one_ode():
         ),
     ],
 )
-@pytest.mark.full
 def test_times_that_are_no_multiples_are_told(loop, said):
     """And what is said of them is what a run does."""
     given = rounded_times(Loop(**loop))

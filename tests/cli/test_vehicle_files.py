@@ -203,8 +203,8 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
 @pytest.mark.full
+@pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistake_is_one_exact_line_in_a_scenario(rov, refused, tmp_path, mistake):
     old, new, said = MISTAKES[mistake]
     rov(old, new)

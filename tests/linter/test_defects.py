@@ -85,8 +85,8 @@ def test_defect_is_found(name):
         assert any(words in sentence for sentence in said), (words, said)
 
 
-@pytest.mark.parametrize("name", EXPECTED)
 @pytest.mark.full
+@pytest.mark.parametrize("name", EXPECTED)
 def test_command_line_says_where(name, capsys):
     from undertow.cli.main import run
 

@@ -98,8 +98,8 @@ def damaged(whole, chance):
 KINDS = ("mcap", "csv", "json", "db3", "ros_mcap", "bin", "ulg", "odometry.ulg")
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.full
+@pytest.mark.parametrize("kind", KINDS)
 def test_damaged_files(tmp_path, kind, capsys):
     """Nothing but a log, or one line that names the file, comes of 150 damaged files."""
     path, mapping = good_file(kind, tmp_path)
