@@ -79,9 +79,12 @@ def pytest_ignore_collect(collection_path, config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Every test is `quick`, or `full`, or by itself."""
-    for item in items:
-        marks = {mark.name for mark in item.iter_markers()}
+    """Every test is `quick`, or `full`, or by itself, also where its file or its other cells have the mark `full`."""
+    every = [{mark.name for mark in item.iter_markers()} for item in items]
+    for item, marks in zip(items, every, strict=True):
+        if BY_THEMSELVES & marks:
+            for node in (item, item.getparent(pytest.Module)):
+                node.own_markers = [mark for mark in node.own_markers if mark.name != "full"]
         if not marks & BY_THEMSELVES:
             item.add_marker("full" if marks & IN_THE_FULL_SET else "quick")
 
