@@ -6,7 +6,7 @@ import pytest
 
 from undertow.campaign.task import site
 from undertow.loop import vmap_batch
-from undertow.report import run_page
+from undertow.report import campaign_page, run_page
 from undertow.report.figures import writing
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
@@ -61,8 +61,9 @@ def whole_figures():
 
 @pytest.fixture(autouse=True)
 def blank_figures(monkeypatch, request):
-    """Figures are made, but blank ones are written unless a test has the fixture `whole_figures`."""
+    """Unless a test has the fixture `whole_figures`, a campaign has none, and those of a run are blank."""
     if "whole_figures" not in request.fixturenames:
+        monkeypatch.setattr(campaign_page, "_plots", lambda results, found: {})
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
         monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)

@@ -15,6 +15,12 @@ from undertow.core.disk import alone
 from undertow.scenario.reading import dump
 
 
+@pytest.fixture(scope="module")
+def campaign_folder(tmp_path_factory):
+    """One for all tests, so that the campaign of four trials is compiled once."""
+    return tmp_path_factory.mktemp("campaigns")
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(
     "changes, said",
@@ -159,9 +165,9 @@ def test_a_mistake_is_one_line_and_leaves_nothing(campaign_file, tmp_path, capsy
         ),
     ],
 )
-def test_a_mistake_on_the_command_line(campaign, campaign_file, tmp_path, capsys, monkeypatch, arguments, said):
+def test_a_mistake_on_the_command_line(campaign, tmp_path, capsys, monkeypatch, arguments, said):
     monkeypatch.chdir(tmp_path)
-    campaign_file("campaign")
+    Path("campaign.yaml").write_text(dump(campaign()))
     Path("scenario.yaml").write_text(dump(campaign()["scenario"]))
     assert run(arguments) in (2, 4)
     complaint = capsys.readouterr().err

@@ -15,6 +15,8 @@ from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import from_data, read
 
+pytestmark = pytest.mark.full
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SAMPLED = [path.stem for path in sorted(EXAMPLES.glob("*.yaml")) if path.stem not in ("my_rov", "magnetic_levitation")]
 
@@ -146,8 +148,6 @@ OWN = """
 import jax.numpy as jnp
 import numpy as np
 from undertow.disturbances.sinusoid import sinusoid
-
-pytestmark = pytest.mark.full
 
 def by_numpy(amplitude=1.0):
     return sinusoid(amplitude=float(np.sqrt(amplitude)))

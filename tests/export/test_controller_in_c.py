@@ -51,6 +51,11 @@ def folder(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def autopilot():
+    return ut.Autopilot(SCENARIO)
+
+
 def commands(folder, wrong):
     compiled = [COMPILER, "-std=c99", f"-DWRONG={wrong}", "loop.c", "controller.o", "-o", "loop", "-lm"]
     subprocess.run(compiled, cwd=folder, check=True)
@@ -61,9 +66,8 @@ def commands(folder, wrong):
 @pytest.mark.parametrize(
     "wrong, seconds", [("0.05", 0.05), ("10.0", 10.0), ("INFINITY", None), ("NAN", None), ("0.0", None), ("-1.0", None)]
 )
-def test_a_time_that_is_wrong_costs_one_step(folder, wrong, seconds):
+def test_a_time_that_is_wrong_costs_one_step(folder, autopilot, wrong, seconds):
     """A long time counts as five sampling times; one that is none leaves the state, and the next step is as if it had not been."""
-    autopilot = ut.Autopilot(SCENARIO)
     target = [1.0, 0, 0, 0, 0, 0]
     at = lambda k: ([0.001 * k, 0.0, 0.0], np.zeros(6), np.zeros(3))
     expected = autopilot.start(*at(0), target=target)

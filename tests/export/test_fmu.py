@@ -1,5 +1,6 @@
 """FMUs of controller and vehicle, stepped by FMPy: the bits of a simulation, names, and what masters do wrong."""
 
+import functools
 import shutil
 import xml.etree.ElementTree as ET
 
@@ -49,9 +50,14 @@ def vehicle(pendulum, tmp_path):
     return Unit(pendulum[1], tmp_path / "vehicle")
 
 
-def compared(scenario, paths, folders):
+@functools.cache
+def record_of(plant, precision="float64"):
+    """The run of `ODIN` or of `PENDULUM`."""
+    return ut.simulate_scenario({"odin": ODIN, "pendulum": PENDULUM}[plant] | {"precision": precision}).dataset
+
+
+def compared(scenario, record, paths, folders):
     """Largest differences of positions and commands between the units and a simulation."""
-    record = ut.simulate_scenario(scenario).dataset
     several = [Unit(path, folder) for path, folder in zip(paths, folders, strict=True)]
     steps = round(scenario["loop"]["duration"] / scenario["loop"]["dt"])
     positions, commands = closed_loop(*several, steps)
@@ -61,12 +67,12 @@ def compared(scenario, paths, folders):
 
 def test_the_closed_loop_has_the_bits_of_a_simulation(odin, tmp_path):
     """ODIN with electromechanical thrusters: the quaternion says all of the attitude."""
-    assert compared(ODIN, odin, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
+    assert compared(ODIN, record_of("odin"), odin, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
 
 
 def test_signals_of_the_plant_are_outputs(odin, tmp_path):
     """The energies of the thrusters after 300 steps."""
-    record = ut.simulate_scenario(ODIN).dataset.isel(time=300)
+    record = record_of("odin").isel(time=300)
     controller, vehicle = (Unit(path, tmp_path / path.stem) for path in odin)
     closed_loop(controller, vehicle, 300)
     energies = vehicle.names("energy_")
@@ -75,9 +81,10 @@ def test_signals_of_the_plant_are_outputs(odin, tmp_path):
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
-def test_another_plant_has_them_too(tmp_path, precision):
-    scenario = PENDULUM | {"precision": precision}
-    assert compared(scenario, units(scenario, tmp_path), [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
+def test_another_plant_has_them_too(pendulum, tmp_path, precision):
+    scenario, record = PENDULUM | {"precision": precision}, record_of("pendulum", precision)
+    paths = pendulum if precision == "float64" else units(scenario, tmp_path)
+    assert compared(scenario, record, paths, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
 
 
 @pytest.mark.slow
@@ -85,7 +92,8 @@ def test_another_plant_has_them_too(tmp_path, precision):
 def test_the_heavy_in_current_and_waves(tmp_path, attitude, nearest):
     """Euler angles are turned into the quaternion again, with rounding; positions in m, commands in V."""
     paths = units(HEAVY, tmp_path, attitude=attitude)
-    position, command = compared(HEAVY, paths, [tmp_path / "c", tmp_path / "v"])
+    record = ut.simulate_scenario(HEAVY).dataset
+    position, command = compared(HEAVY, record, paths, [tmp_path / "c", tmp_path / "v"])
     assert position <= nearest and command <= 10 * nearest
 
 
@@ -95,7 +103,7 @@ def test_sources_that_fmpy_compiles(odin, tmp_path):
     for folder in folders:
         (folder / "build").mkdir()
         build_platform_binary(folder, folder / "build")
-    assert compared(ODIN, odin, folders) == (0.0, 0.0)
+    assert compared(ODIN, record_of("odin"), odin, folders) == (0.0, 0.0)
 
 
 def test_the_controller_has_the_bits_of_an_autopilot(odin, tmp_path):
@@ -316,7 +324,7 @@ def test_a_compiler_that_fails(monkeypatch):
 def test_compilers_agree(monkeypatch, tmp_path, compiler):
     monkeypatch.setenv("CC", compiler)
     paths = units(PENDULUM, tmp_path)
-    assert compared(PENDULUM, paths, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
+    assert compared(PENDULUM, record_of("pendulum"), paths, [tmp_path / "c", tmp_path / "v"]) == (0.0, 0.0)
 
 
 def test_the_command(tmp_path, capsys):

@@ -20,7 +20,6 @@ SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
     "controller": {"kind": "pid", "frequency": 2.0},
     "reference": {"kind": "setpoint", "position": [0, 0, 0, 0, 0, 0]},
-    "navigation": {"kind": "kalman", "sensors": SENSORS},
     "loop": {"duration": 1.0, "dt": 0.01},
 }
 LOOP = """\
@@ -66,14 +65,16 @@ def test_every_bit_is_that_of_the_batch_compiler(tmp_path, kind, precision):
     assert not re.search(r"\b(malloc|calloc|free|printf)\b", (tmp_path / "navigation.c").read_text())
 
 
-def test_a_loop_in_c_is_the_loop_in_python(tmp_path):
-    export_navigation(build(from_data(SCENARIO))).write(tmp_path)
+@pytest.mark.parametrize("kind", ["observer", pytest.param("kalman", marks=pytest.mark.slow)])
+def test_a_loop_in_c_is_the_loop_in_python(tmp_path, kind):
+    scenario = SCENARIO | {"navigation": {"kind": kind, "sensors": SENSORS}}
+    export_navigation(build(from_data(scenario))).write(tmp_path)
     (tmp_path / "loop.c").write_text(LOOP)
     flags = ["-O1", "-std=c99", "-ffp-contract=off"]
     subprocess.run([COMPILERS[0], *flags, "loop.c", "navigation.c", "-o", "loop", "-lm"], cwd=tmp_path, check=True)
     said = subprocess.run([tmp_path / "loop"], capture_output=True, text=True, check=True).stdout
     found = [float.fromhex(line) for line in said.split()]
-    alone = ut.NavigationFilter(SCENARIO)
+    alone = ut.NavigationFilter(scenario)
     for k in range(200):
         readings = {"imu": [0.001 * i * (k % 7) if i < 7 else -9.81 for i in range(8)]}
         if k % 10 == 0:

@@ -163,14 +163,21 @@ int main(void) {
 """
 
 
+@pytest.fixture(scope="module")
+def units(tmp_path_factory):
+    """Folder of the two units of the pendulum."""
+    folder = tmp_path_factory.mktemp("units")
+    export_fmu(build(PENDULUM)).exported.write(folder)
+    return folder
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", ["controller", "vehicle"])
-def test_random_calls_of_an_fmu_under_sanitizers(tmp_path, compiler, name):
+def test_random_calls_of_an_fmu_under_sanitizers(units, tmp_path, compiler, name):
     """Two instances, compiled from the sources with a prefix, as for a program that has them inside."""
     import fmpy
 
-    export_fmu(build(PENDULUM)).exported.write(tmp_path)
-    fmpy.extract(tmp_path / f"{name}.fmu", tmp_path)
+    fmpy.extract(units / f"{name}.fmu", tmp_path)
     sources, guid = tmp_path / "sources", fmpy.read_model_description(tmp_path).guid
     head = f'#define PREFIXED(name) {name}_##name\n#define GUID "{guid}"\n#define PERIOD 0.001\n'
     (sources / "master.c").write_text(head + MASTER)

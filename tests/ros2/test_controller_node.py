@@ -43,7 +43,7 @@ def compiled(scenario):
     return CompiledController(scenario)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def autopilot(scenario):
     return ut.Autopilot(scenario, attitude="quaternion")
 
