@@ -7,10 +7,10 @@ first line is `# my_part.py` is that file: it is written into the folder.
 Blocks of text on a page of docs/tutorials are what the command before them prints: each of their lines must occur in the
 output, in this order; `...` stands for anything. Where they show an error, the command must fail with exit code 2.
 
-By default a run is not put beside its prediction or, on most pages, its scenario is built only; blank figures and
-no replay are written, PID stands for the preset `robust`, a static thruster for one with a rotor, and the example of a
-BlueROV2 Heavy is without waves and sensors: most of the time of a short run. Of a tutorial, only `undertow init` runs,
-and the scenarios are validated. Slow tests run everything as it stands.
+By default a run is not put beside its prediction or, on most pages, its scenario is checked only, once for all lines
+and pages that name it; blank figures and no replay are written, and PID stands for the preset `robust`: most of the time
+of a short run. Of a tutorial, only `undertow init` runs, and the scenarios are validated. Slow tests run everything as
+it stands.
 """
 
 import functools
@@ -26,7 +26,6 @@ from undertow.cli.main import run
 from undertow.comparison.prepare import prepare_comparison
 from undertow.report import run_page
 from undertow.report.figures import writing
-from undertow.scenario.build import Built, build
 from undertow.scenario.reading import read
 from undertow.scenario.schema import validate
 
@@ -67,56 +66,23 @@ def commands(code: str) -> list[list[str]]:
     return [words[1:] for words in lines if words[:1] == ["undertow"] and not LONG & set(words) and "&&" not in words]
 
 
-# What a page or the example that most pages use says, and what is quicker.
-QUICKER = {
-    "{kind: rcaf, preset: robust}": "{kind: pid, frequency: 1}",
-    "{kind: t200, supply: 16}": "{kind: t200, fidelity: static, supply: 16}",
-    "ut.thrusters.t200(supply=16.0)": 'ut.thrusters.t200(fidelity="static", supply=16.0)',
-    'ut.rcaf(plant.model(), preset="robust", sampling_time=0.01)': "ut.controllers.pid(plant.model(), sampling_time=0.01)",
-}
-HEAVY = {
-    r"kind: rcaf\n  preset: robust": "kind: pid\n  frequency: 1",
-    r"  - kind: waves\n(    .*\n)+navigation:\n(  .*\n)+": "",
-}
-
-
-def quicker(code: str) -> str:
-    """The same block with laws that are built in less time."""
-    for old, new in QUICKER.items():
-        code = code.replace(old, new)
-    return code
-
-
-def quick_examples(folder: Path) -> None:
-    """The examples, of which the one of a BlueROV2 Heavy is built in less time."""
-    folder.mkdir()
-    for path in (ROOT / "examples").iterdir():
-        if path.name != "bluerov2_heavy.yaml":
-            (folder / path.name).symlink_to(path)
-    text = (ROOT / "examples" / "bluerov2_heavy.yaml").read_text(encoding="utf-8")
-    for old, new in HEAVY.items():
-        text, changes = re.subn(old, new, text)
-        assert changes == 1
-    (folder / "bluerov2_heavy.yaml").write_text(quicker(text), encoding="utf-8")
+ROBUST, QUICKER = "{kind: rcaf, preset: robust}", "{kind: pid, frequency: 1}"
 
 
 def without_a_run(arguments: list[str], page: str) -> int:
-    """The same command without a prediction; or the scenario that it names built, and nothing run."""
+    """The same command without a prediction; or the check of its scenario, which builds everything and runs nothing."""
     if arguments[0] == "simulate" and page in SIMULATED:
         return run([*arguments, "--no-prediction"])
-    path = Path(arguments[1]) if len(arguments) > 1 else Path()
-    if arguments[0] == "simulate" or (
-        arguments[0] == "check" and path.suffix == ".yaml" and "plant" in read(path).data
-    ):
-        built(path.resolve(), path.read_bytes())
-        return 0
+    if arguments[0] == "simulate" or arguments[:-1] == ["check"]:
+        path = Path(arguments[1])
+        return checked(path.resolve(), path.read_bytes() if path.is_file() else b"")
     return run(arguments)
 
 
 @functools.cache
-def built(path: Path, contents: bytes) -> Built:
-    """The scenario of a file, built once for the lines that name it, as long as it stays the same."""
-    return build(read(path))
+def checked(path: Path, contents: bytes) -> int:
+    """Exit code of the check of a file, for all lines that name it as long as it stays the same."""
+    return run(["check", str(path)])
 
 
 def compared(arguments: list[str]) -> None:
@@ -168,9 +134,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
         monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
-        quick_examples(tmp_path / "examples")
-    else:
-        (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}
     several = blocks(page)
@@ -181,7 +145,8 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
         before = before if block.language == "text" else block.line
     for block in several:
         if file := FILE.match(block.code):
-            (tmp_path / file["name"]).write_text(block.code if whole else quicker(block.code), encoding="utf-8")
+            code = block.code if whole or not file["name"].endswith(".yaml") else block.code.replace(ROBUST, QUICKER)
+            (tmp_path / file["name"]).write_text(code, encoding="utf-8")
         elif not whole and page.stem in BUILT:
             for arguments in commands(block.code):
                 if arguments[0] == "compare":
@@ -192,8 +157,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
             for arguments in commands(block.code) if block.language == "bash" else ():
                 begun(arguments)
         elif block.language == "python":
-            code = block.code if whole else quicker(block.code)
-            exec(compile("\n" * (block.line - 1) + code, str(page), "exec"), namespace)
+            exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), namespace)
         elif block.language == "bash":
             for arguments in commands(block.code):
                 if not whole and arguments[0] == "compare":
