@@ -73,9 +73,10 @@ def without_a_run(arguments: list[str], page: str) -> int:
     """The same command without a prediction; or the check of its scenario, which builds everything and runs nothing."""
     if arguments[0] == "simulate" and page in SIMULATED:
         return run([*arguments, "--no-prediction"])
-    if arguments[0] == "simulate" or arguments[:-1] == ["check"]:
-        path = Path(arguments[1])
-        return checked(path.resolve(), path.read_bytes() if path.is_file() else b"")
+    arguments = ["check", arguments[1]] if arguments[0] == "simulate" else arguments
+    path = Path(arguments[-1])
+    if arguments[:-1] == ["check"] and path.is_file():
+        return checked(path.resolve(), path.read_bytes())
     return run(arguments)
 
 
