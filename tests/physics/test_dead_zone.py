@@ -148,9 +148,18 @@ def test_voltage_for_a_thrust(name):
         np.testing.assert_array_equal(found[lost], 0.0)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["shaft", "electromechanical", "t200"])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("t200", "subtract"),
+        *(
+            pytest.param(name, kind, marks=pytest.mark.full)
+            for name in ("shaft", "electromechanical", "t200")
+            for kind in KINDS
+            if (name, kind) != ("t200", "subtract")
+        ),
+    ],
+)
 def test_drive_of_a_motor(name, kind):
     """Its command aims where it was told to; its prediction turns as the true motor; its range ends at the supply."""
     thruster, rate = with_zone(name, kind), 40.0
