@@ -158,7 +158,6 @@ def test_a_drive_knows_both_limits_and_the_steady_curve(name):
     np.testing.assert_allclose(back, [newtons, newtons], rtol=1e-12)
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("name", THRUSTERS)
 def test_a_drive_predicts_the_thrust_behind_its_lag(name):
     """Step by step with the thruster itself; made to follow faster than by itself, it does: exp(-rate t)."""

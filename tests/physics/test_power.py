@@ -129,14 +129,13 @@ def test_ledger_closes_in_both_loops(name, fidelity, kind):
         )
 
 
-@pytest.mark.full
 @pytest.mark.parametrize(
     ("fidelity", "method", "source"),
     [
-        ("shaft", "rk4", "battery"),
-        ("shaft", "euler", "supply"),
-        ("electromechanical", "rk4", "supply"),
         ("electromechanical", "euler", "battery"),
+        pytest.param("shaft", "rk4", "battery", marks=pytest.mark.full),
+        pytest.param("shaft", "euler", "supply", marks=pytest.mark.full),
+        pytest.param("electromechanical", "rk4", "supply", marks=pytest.mark.full),
         pytest.param("shaft", "rk4", "supply", marks=pytest.mark.slow),
         pytest.param("shaft", "euler", "battery", marks=pytest.mark.slow),
         pytest.param("electromechanical", "rk4", "battery", marks=pytest.mark.slow),
