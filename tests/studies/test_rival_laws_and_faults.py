@@ -225,6 +225,7 @@ def test_given_thrusters_fail_when_they_are_meant_to():
     assert built.disturbance.jumps(5.0) == (2.0,)
 
 
+@pytest.mark.full
 def test_thrusters_that_there_are_not():
     with pytest.raises(BadInput, match="failing` must have numbers from 1 to 8"):
         thruster_loss(failing=(0, 3))

@@ -142,6 +142,7 @@ def test_pid_keeps_the_same_margins(lag):
         assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, steps)
 
 
+@pytest.mark.full
 def test_laws_take_them():
     """Per axis where noise differs; a bandwidth that is given has its tracking beside it; PID by the same rule."""
     model = hybrid_vehicle(bluerov2_heavy(), t200()).model()

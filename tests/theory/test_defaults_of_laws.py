@@ -13,6 +13,7 @@ from undertow.controllers.mrac import _load_alone
 from undertow.controllers.slotine_li import _small_errors
 from undertow.controllers.super_twisting import _inside_the_layer as twisting_law
 from undertow.core.errors import BadInput
+from undertow.core.param import tuning_ranges
 from undertow.plants import double_integrator
 
 DT = 0.02
@@ -219,3 +220,12 @@ def test_neural_gains_and_inputs():
     np.testing.assert_allclose(free.slope, np.sqrt(pid.proportional))
     np.testing.assert_allclose(free.gain, np.sqrt(pid.proportional))
     assert free.start.shape == (9, 8)
+
+
+@pytest.mark.parametrize("name", [*DEFAULTS, "neural", "cascade", "lqi"])
+def test_what_is_chosen_lies_in_the_range_of_tuning(name):
+    law = made(name)
+    for option, (low, high) in tuning_ranges(law).items():
+        assert 0 < low < high, option
+        value = np.asarray(getattr(law, option))
+        assert ((low <= value) & (value <= high)).all(), option

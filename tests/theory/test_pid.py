@@ -24,6 +24,7 @@ def run(plant, law, goal, disturbance=None, duration=20.0, dt=1e-2, **start):
     return sampled.simulate(loop, duration=duration, dt=dt, record_every=1, **start)
 
 
+@pytest.mark.full
 def test_error_follows_the_placed_poles():
     """e, e_dot and the integral under x_ddot = u + d: the matrix exponential, to the order of the sampling time."""
     law = pid(double_integrator(1).model(), frequency=2.0, damping=0.7, integral_share=0.2, reference_frequency=0.0)
@@ -84,6 +85,7 @@ def test_an_integral_faster_than_the_sampling_stays_bounded():
     assert np.abs(found.signals["estimate"]).max() <= (k_p + dt * k_i) * error + k_d * rate + limit
 
 
+@pytest.mark.full
 def test_steady_curve_holds_a_force_and_limits_of_an_endless_supply_are_endless():
     plant = hybrid_vehicle(bluerov2_heavy(), t200(dead_zone=0.0))
     drive = plant.model().in_body_axes().actuators.quasi_static()

@@ -71,7 +71,10 @@ def told(model, motion, parameters):
     )
 
 
-@pytest.fixture(scope="module", params=MODELS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.full) if name == "remus100" else name for name in MODELS],
+)
 def regressor(request):
     """Name of a model, and what it says at a random motion."""
     model, rng = MODELS[request.param](), np.random.default_rng(1)
