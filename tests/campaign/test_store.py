@@ -211,8 +211,13 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
             "`series` was not given, is {'signals': ['position', 'error'], 'every': 1.0}",
             marks=pytest.mark.full,
         ),
-        ({}, {"trials": 80, "requirements": {}, "design": "latin"}, "`design` was random, is latin"),
-        ({}, {"trials": 39}, "`trials` was 40, is 39"),
+        pytest.param(
+            {},
+            {"trials": 80, "requirements": {}, "design": "latin"},
+            "`design` was random, is latin",
+            marks=pytest.mark.full,
+        ),
+        pytest.param({}, {"trials": 39}, "`trials` was 40, is 39", marks=pytest.mark.full),
         pytest.param(
             {"design": "latin"}, {"design": "latin", "trials": 41}, "`trials` was 40, is 41", marks=pytest.mark.full
         ),
