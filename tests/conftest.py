@@ -75,11 +75,14 @@ def compile_quickly():
 def share_lowering_context():
     """JAX lowers each program in an MLIR context of its own, most of the time of a small one; tests have thousands.
 
-    One for each thread is enough. The function is JAX's own; where a version has none of that name, nothing is shared.
+    One for each thread is enough, but for programs that are lowered while another one is. The function is JAX's own:
+    where a version has none of that name, nothing is shared.
     """
     make, kept = getattr(mlir, "make_ir_context", None), threading.local()
 
     def context_of_this_thread():
+        if mlir.ir.Context.current is not None:
+            return make()
         if not hasattr(kept, "context"):
             kept.context = make()
         return kept.context
