@@ -12,13 +12,12 @@ from use_of_parts import NUMBERS, USES, numbers
 
 from undertow.core import catalogue
 
-pytestmark = pytest.mark.full
-
 
 def inputs(rows):
     return jnp.asarray(np.random.default_rng(8).uniform(-1, 1, (rows, NUMBERS)))
 
 
+@pytest.mark.full
 def test_every_kind_has_a_use():
     assert set(USES) == set(catalogue.KINDS)
 
@@ -64,7 +63,7 @@ def plain(kind, thing, v):
         return np.asarray(numbers(kind, thing, v))
 
 
-TOGETHER = [pytest.param(pairs, id="/".join(pairs[0])) for pairs in groups(left_out=HEAVY)]
+TOGETHER = [pytest.param(pairs, id="/".join(pairs[0]), marks=pytest.mark.full) for pairs in groups(left_out=HEAVY)]
 ALONE = [pytest.param([pair], id="/".join(pair), marks=pytest.mark.slow) for pair in ALL if pair in HEAVY]
 
 
