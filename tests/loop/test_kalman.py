@@ -360,7 +360,7 @@ def test_the_drift_that_is_predicted_is_that_of_the_filter():
     drifts = np.repeat([1e-5**2, 1e-4**2], 3)
     noise = np.concatenate([of_rates, drifts[:3], of_force, drifts[3:], np.zeros(3)])
     predicted = deviations(sensed(sensors), np.asarray(own.initial_deviations()), noise, 60.0)
-    _, covariances = followed(navigation, 0.0, 6000, jax.random.split(jax.random.PRNGKey(0), 40))
+    _, covariances = followed(navigation, 0.0, 6000, jax.random.split(jax.random.PRNGKey(0), 1))
     of_filter = np.sqrt(np.diag(np.asarray(covariances[0, -1])))
     for name, i in {"north": 12, "east": 13, "down": 14, "yaw": 2, "roll": 0}.items():
         np.testing.assert_allclose(predicted[name], of_filter[i], rtol=0.05, err_msg=name)
