@@ -53,3 +53,11 @@ def variants(kind, name):
 
 
 ALL = [(kind, which) for kind in catalogue.KINDS for name in catalogue.names(kind) for which in variants(kind, name)]
+
+
+def groups(left_out):
+    """Parts of a kind that one program computes together: few where parts are large."""
+    for kind in catalogue.KINDS:
+        pairs = [pair for pair in ALL if pair[0] == kind and pair not in left_out]
+        size = 4 if kind in ("controllers", "navigation") else 40
+        yield from (pairs[k : k + size] for k in range(0, len(pairs), size))

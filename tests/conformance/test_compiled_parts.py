@@ -7,17 +7,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from catalogue_parts import ALL, groups, make
 from use_of_parts import NUMBERS, USES, numbers
 
 from undertow.core import catalogue
-
-pytestmark = pytest.mark.full
 
 
 def inputs(rows):
     return jnp.asarray(np.random.default_rng(8).uniform(-1, 1, (rows, NUMBERS)))
 
 
+@pytest.mark.full
 def test_every_kind_has_a_use():
     assert set(USES) == set(catalogue.KINDS)
 
@@ -63,38 +63,49 @@ def plain(kind, thing, v):
         return np.asarray(numbers(kind, thing, v))
 
 
-def test_compiled_batched_and_differentiated(part, request):
+TOGETHER = [pytest.param(pairs, id="/".join(pairs[0]), marks=pytest.mark.full) for pairs in groups(left_out=HEAVY)]
+ALONE = [pytest.param([pair], id="/".join(pair), marks=pytest.mark.slow) for pair in ALL if pair in HEAVY]
+
+
+@pytest.mark.parametrize("pairs", TOGETHER + ALONE)
+def test_compiled_batched_and_differentiated(pairs):
     """jit = no jit; a batch of parts and of what comes in is a loop, without a second trace; gradients are finite.
 
-    With respect to every parameter and every number that comes in. Two programs are compiled: the values with their
-    gradients, and a batch of values.
+    With respect to every parameter and every number that comes in. Two programs are compiled for several parts of a
+    kind: the values with their gradients, and a batch of values.
     """
-    kind, thing = part
-    arrays, rest = eqx.partition(thing, eqx.is_inexact_array)
+    arrays, rest = eqx.partition({pair: make(*pair) for pair in pairs}, eqx.is_inexact_array)
     traces = []
 
-    def total(arrays, v):
-        traces.append(kind)
-        found = numbers(kind, eqx.combine(arrays, rest), v)
-        return found.sum(), found
+    def values(arrays, vs):
+        return {pair: numbers(pair[0], part, vs[pair]) for pair, part in eqx.combine(arrays, rest).items()}
+
+    def total(arrays, vs):
+        traces.append(pairs)
+        found = values(arrays, vs)
+        return sum(one.sum() for one in found.values()), found
 
     use = eqx.filter_jit(jax.grad(total, argnums=(0, 1), has_aux=True))
     many, batch = jax.tree.map(lambda leaf: jnp.stack([leaf, 1.01 * leaf, leaf]), arrays), inputs(3)
     rows = [jax.tree.map(operator.itemgetter(i), many) for i in range(3)]
-    found = [use(one, v) for one, v in zip(rows, batch, strict=True)]
-    looped = np.stack([np.asarray(values) for _, values in found])
-    _, other = use(jax.tree.map(moved, arrays), batch[0])
+    each = lambda v: dict.fromkeys(pairs, v)
+    found = [use(one, each(v)) for one, v in zip(rows, batch, strict=True)]
+    _, other = use(jax.tree.map(moved, arrays), each(batch[0]))
     assert len(traces) == 1
-    for leaf in jax.tree.leaves([gradients for gradients, _ in found]):
-        assert np.isfinite(np.asarray(leaf)).all()
-
-    assert looped.size and np.isfinite(looped).all()
-    if request.node.callspec.params["part"] not in LONG:
-        np.testing.assert_allclose(looped[0], plain(kind, thing, batch[0]), rtol=1e-10, atol=1e-12)
-    batched = eqx.filter_jit(eqx.filter_vmap(lambda arrays, v: numbers(kind, eqx.combine(arrays, rest), v)))
-    np.testing.assert_allclose(np.asarray(batched(many, batch)), looped, rtol=1e-10, atol=1e-12)
-    if jax.tree.leaves(arrays):
-        assert (looped[0] != np.asarray(other)).any(), "the parameters have no effect at all"
+    batched = eqx.filter_jit(eqx.filter_vmap(values))(many, each(batch))
+    for pair in pairs:
+        for gradients in ((of_parts[pair], of_numbers[pair]) for (of_parts, of_numbers), _ in found):
+            assert all(np.isfinite(np.asarray(leaf)).all() for leaf in jax.tree.leaves(gradients)), pair
+        looped = np.stack([np.asarray(values[pair]) for _, values in found])
+        assert looped.size and np.isfinite(looped).all(), pair
+        if pair not in LONG:
+            part = eqx.combine(arrays[pair], rest[pair])
+            np.testing.assert_allclose(
+                looped[0], plain(pair[0], part, batch[0]), rtol=1e-10, atol=1e-12, err_msg=str(pair)
+            )
+        np.testing.assert_allclose(np.asarray(batched[pair]), looped, rtol=1e-10, atol=1e-12, err_msg=str(pair))
+        if jax.tree.leaves(arrays[pair]):
+            assert (looped[0] != np.asarray(other[pair])).any(), f"the parameters of {pair} have no effect at all"
 
 
 @pytest.mark.slow

@@ -36,21 +36,25 @@ def is_abstract(cls):
     return any(left)
 
 
+@pytest.mark.full
 def test_every_module_imports():
     assert len(modules()) > 50
     assert all(module.__doc__ for module in modules()), [m.__name__ for m in modules() if not m.__doc__]
 
 
+@pytest.mark.full
 def test_everything_public_is_documented():
     missing = [f"{m.__name__}.{name}" for m in modules() for name, thing in public(m) if not inspect.getdoc(thing)]
     assert not missing
 
 
+@pytest.mark.full
 def test_everything_is_ascii():
     files = [Path(module.__file__) for module in modules() if module.__file__]
     assert not [file for file in files if not file.read_text(encoding="utf-8").isascii()]
 
 
+@pytest.mark.full
 def test_classes_are_abstract_or_final():
     ours = [cls for cls in classes() if cls.__module__.startswith("undertow.")]
     assert len(ours) > 20
@@ -60,6 +64,7 @@ def test_classes_are_abstract_or_final():
                 assert is_abstract(base), f"{cls.__qualname__} inherits from {base.__qualname__}, which is final"
 
 
+@pytest.mark.full
 def test_abstract_classes_say_so():
     for cls in classes():
         if cls.__module__.startswith("undertow."):
@@ -85,11 +90,13 @@ def is_abstract_method(method):
 STILL_OVERRIDDEN = {f"AbstractThruster.{name}" for name in ("limits", "terminal", "electrical_power", "actuator_model")}
 
 
+@pytest.mark.full
 def test_no_concrete_method_is_overridden():
     found = {name for name, _ in overridden(c for c in classes() if c.__module__.startswith("undertow."))}
     assert found <= STILL_OVERRIDDEN, found - STILL_OVERRIDDEN
 
 
+@pytest.mark.full
 def test_the_check_sees_an_overridden_method():
     """Negative control."""
     base = next(cls for cls in classes() if cls.__name__ == "AbstractOutputCoordinates")
@@ -97,6 +104,7 @@ def test_the_check_sees_an_overridden_method():
     assert ("AbstractOutputCoordinates.velocity", "Heir") in set(overridden([heir]))
 
 
+@pytest.mark.full
 def test_the_check_sees_an_heir_of_a_final_class():
     """Negative control."""
     final = next(cls for cls in classes() if cls.__module__.startswith("undertow.") and not is_abstract(cls))

@@ -11,8 +11,8 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from catalogue_parts import ALL, make
-from use_of_parts import NUMBERS, USES, numbers
+from catalogue_parts import ALL, groups, make
+from use_of_parts import NUMBERS, numbers
 
 from undertow.process_setup import prepare
 
@@ -20,14 +20,6 @@ RECORDED = Path(__file__).with_name("values_of_parts.json")
 # Their programs take longest to compile, and tests of their own check what they compute.
 HEAVY = {("navigation", "kalman"), ("supervision", "supervisor"), ("controllers", "nmpc")}
 QUICK = ("faults", "sensors", "navigation")
-
-
-def groups():
-    """Parts of a kind are one program, but for kinds of large parts."""
-    for kind in USES:
-        pairs = [pair for pair in ALL if pair[0] == kind and pair not in HEAVY]
-        size = 4 if kind in ("controllers", "navigation") else 40
-        yield from (pairs[k : k + size] for k in range(0, len(pairs), size))
 
 
 def digests(pairs):
@@ -53,7 +45,7 @@ def digests(pairs):
 
 @pytest.mark.parametrize(
     "pairs",
-    [pytest.param(pairs, marks=() if pairs[0][0] in QUICK else pytest.mark.full) for pairs in groups()],
+    [pytest.param(pairs, marks=() if pairs[0][0] in QUICK else pytest.mark.full) for pairs in groups(HEAVY)],
     ids=lambda pairs: "/".join(pairs[0]),
 )
 def test_values_are_those_that_were_recorded(pairs):
@@ -68,7 +60,7 @@ def test_a_value_is_recorded_of_every_part():
 
 def record():
     """Writes the present values."""
-    found = {name: digest for pairs in groups() for name, digest in digests(pairs).items()}
+    found = {name: digest for pairs in groups(HEAVY) for name, digest in digests(pairs).items()}
     lines = ",\n".join(f'"{name}": {json.dumps([round(x, 9) for x in one])}' for name, one in sorted(found.items()))
     RECORDED.write_text(f"{{\n{lines}\n}}\n")
 

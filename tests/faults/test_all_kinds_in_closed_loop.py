@@ -10,7 +10,7 @@ from undertow.faults.kinds import list_kinds
 from undertow.loop import simd_batch
 from undertow.scenario.build import build
 
-pytestmark = pytest.mark.full
+pytestmark = pytest.mark.slow
 
 ONSET, DURATION, DT = 0.5, 1.2, 0.01
 NEVER = 1e9
@@ -67,7 +67,6 @@ def both(kind):
     return {name: np.asarray(one) for name, one in outcome.signals.items()}, np.asarray(outcome.time[0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", list_kinds(), ids=lambda kind: f"{kind.target}-{kind.mode}".replace(" ", "_"))
 def test_every_kind_alters_the_run_after_its_onset_only(kind):
     signals, time = both(kind)

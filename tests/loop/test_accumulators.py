@@ -13,6 +13,8 @@ from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 TICKS, DT = 600, 2e-3
 
 

@@ -72,7 +72,7 @@ def run(law, sensor, simulate=sampled.simulate, duration=6.0, load=None):
 @pytest.mark.parametrize(
     ("law", "back_end"),
     [
-        ("robust", "simd"),
+        pytest.param("robust", "simd", marks=pytest.mark.full),
         pytest.param("pid", "xla", marks=pytest.mark.full),
         pytest.param("paper", "simd", marks=pytest.mark.full),
         pytest.param("robust", "xla", marks=pytest.mark.slow),

@@ -12,11 +12,13 @@ from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
 
+pytestmark = pytest.mark.full
+
 
 @pytest.mark.parametrize(
     ("tolerances", "steps"),
     # As many records of the adaptive run either way, so that it is compiled once.
-    [(None, (0.01, 0.1)), pytest.param((1e-10, 1e-12), (0.29 / 3, 0.08), marks=pytest.mark.full)],
+    [(None, (0.01, 0.1)), ((1e-10, 1e-12), (0.29 / 3, 0.08))],
     ids=["fixed", "adaptive"],
 )
 def test_the_end_does_not_depend_on_the_records(tolerances, steps):

@@ -18,6 +18,8 @@ from undertow.references.circle import circle
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
+pytestmark = pytest.mark.full
+
 STATES = 32
 THRUSTERS = {"all eight": range(1, 9), "five, rank below six": (1, 2, 3, 5, 6)}
 
@@ -41,7 +43,7 @@ def terms(realization, t, position, velocity, estimates):
     return left, right, sigma, sample["uncertainty"], prescribed
 
 
-@pytest.fixture(scope="module", params=["all eight", pytest.param("five, rank below six", marks=pytest.mark.full)])
+@pytest.fixture(scope="module", params=THRUSTERS)
 def batch(request):
     plant = HybridVehicle(odin().with_thrusters(tuple(THRUSTERS[request.param])), paper_table3("ideal"))
     load = sinusoid(np.arange(1.0, 7.0), 3.0, offset=-1.0)

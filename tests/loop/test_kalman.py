@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jaxtyping import Float
+from recorded import is_as_recorded
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 from textbook import rotation_from_euler
@@ -28,29 +29,57 @@ BIASES = {"rate_bias": 5e-3, "force_bias": 0.05}
 ALL = [imu(**BIASES), dvl(), depth(), compass(), position_fix()]
 
 
-def swinging(t):
-    return measurement_of_outputs(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
+def swinging(t, size=1.0):
+    outputs = AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t)
+    return measurement_of_outputs(*(size * output for output in outputs))
 
 
 def level(t):
-    return measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
+    return swinging(t, 0.0)
+
+
+STEP, BLOCK = 0.01, 500  # s; steps of a program that runs of any length repeat
+
+
+def followed(navigation, size, steps, keys):
+    """Errors of every state at every step, [keys, steps, 15], of runs with these keys of a body that swings so far.
+
+    And their covariances after every `BLOCK` steps, [keys, blocks, 15, 15].
+    """
+    # As NumPy arrays: what JAX knows of the types of its own would be another program.
+    state, errors, covariances = jax.tree.map(np.asarray, _begun(navigation, np.asarray(size), keys)), [], []
+    for first in range(0, steps, BLOCK):
+        state, block, covariance = _followed(navigation, np.asarray(size), keys, state, np.asarray(float(first)))
+        errors.append(np.asarray(block))
+        covariances.append(np.asarray(covariance))
+    return np.concatenate(errors, axis=1), np.stack(covariances, axis=1)
 
 
 @eqx.filter_jit
-def followed(navigation, motion, steps, step, keys):
-    """Errors of every state, [keys, steps, 15], and their covariances, of runs with these keys."""
+def _begun(navigation, size, keys):
+    return jax.vmap(lambda key: navigation.init(navigation.realize(key), swinging(0.0, size)))(keys)
 
-    def run(key):
+
+@eqx.filter_jit
+def _followed(navigation, size, keys, states, first):
+    def run(key, state):
         realization = navigation.realize(key)
 
         def advance(state, k):
-            truth = motion(k * step)
-            _, state = navigation.measure(realization, state, k * step, truth)
-            return state, (errors_of(state, truth), navigation.filter.covariance(state.filter))
+            truth = swinging((first + k) * STEP, size)
+            _, state = navigation.measure(realization, state, (first + k) * STEP, truth)
+            return state, errors_of(state, truth)
 
-        return jax.lax.scan(advance, navigation.init(realization, motion(0.0)), jnp.arange(steps, dtype=float))[1]
+        state, errors = jax.lax.scan(advance, state, jnp.arange(BLOCK, dtype=float))
+        return state, errors, navigation.filter.covariance(state.filter)
 
-    return jax.vmap(run)(keys)
+    return jax.vmap(run)(keys, states)
+
+
+@jax.jit
+def updated(own, state, elapsed, received):
+    """State of a filter after a step: one program for all numbers in it."""
+    return own.update(state, elapsed, received)
 
 
 def errors_of(state, truth):
@@ -75,23 +104,22 @@ def nothing(sensors):
     """Deliveries of sensors that are silent."""
     widths = {"IMU": 8, "DVL": 3, "PositionFix": 2}
     return tuple(
-        Received(jnp.zeros(widths.get(type(one).__name__, 1)), jnp.asarray(False), jnp.zeros(())) for one in sensors
+        Received(np.zeros(widths.get(type(one).__name__, 1)), np.asarray(False), np.zeros(())) for one in sensors
     )
 
 
 def with_reading(received, index, reading, age=0.0):
     """The same with one reading."""
-    one = Received(jnp.atleast_1d(jnp.asarray(reading, dtype=float)), jnp.asarray(True), jnp.asarray(age))
+    one = Received(np.atleast_1d(np.asarray(reading, dtype=float)), np.asarray(True), np.asarray(age))
     return (*received[:index], one, *received[index + 1 :])
 
 
 def test_the_covariance_spreads_as_the_matrix_exponential_says():
     """At rest and level the errors follow constant matrices; Van Loan (1978) gives the covariance exactly."""
     own, h, steps = kalman(ALL, gyro_drift=1e-3, force_drift=1e-2).filter, 0.01, 300
-    state = own.start(level(0.0))
-    update = eqx.filter_jit(own.update)
+    state, quiet = own.start(level(0.0)), nothing(ALL)
     for _ in range(steps):
-        state = update(state, jnp.asarray(h), nothing(ALL))
+        state = updated(own, state, np.asarray(h), quiet)
     a = np.zeros((15, 15))
     g = 9.81
     a[ATTITUDE, GYRO_BIAS], a[VELOCITY, FORCE_BIAS], a[POSITION, VELOCITY] = -np.eye(3), -np.eye(3), np.eye(3)
@@ -111,10 +139,10 @@ def test_the_covariance_spreads_as_the_matrix_exponential_says():
 
 def test_a_correction_is_that_of_the_textbook():
     """Entry by entry it gives what K = P H' (H P H' + R)^-1 gives for the whole reading."""
-    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    own, quiet = kalman(ALL).filter, nothing(ALL)
     state = own.start(swinging(0.7))
     for _ in range(50):
-        state = update(state, jnp.asarray(0.01), nothing(ALL))
+        state = updated(own, state, np.asarray(0.01), quiet)
     before, p = state, np.asarray(own.covariance(state))
     w = rotation_from_euler(np.asarray(state_angles(state)))
     velocity = np.asarray(state.velocity)
@@ -124,7 +152,8 @@ def test_a_correction_is_that_of_the_textbook():
     noise = 5e-3**2 + 1e-3**2 / 12
     gain = p @ slopes.T @ np.linalg.inv(slopes @ p @ slopes.T + noise * np.eye(3))
     correction, after = gain @ (reading - w.T @ velocity), (np.eye(15) - gain @ slopes) @ p
-    state = update(state, jnp.zeros(()), with_reading(nothing(ALL), 1, reading))
+    is_as_recorded("kalman: half a second by an IMU", state)
+    state = updated(own, state, np.zeros(()), with_reading(quiet, 1, reading))
     np.testing.assert_allclose(own.covariance(state), after, atol=1e-9 * np.abs(p).max())
     turned = Rotation.from_rotvec(np.array(correction[ATTITUDE])).as_matrix()
     np.testing.assert_allclose(state.velocity, turned @ (velocity + correction[VELOCITY]), atol=1e-10)
@@ -143,20 +172,19 @@ EXACT = dict.fromkeys(("position_deviation", "velocity_deviation", "tilt_deviati
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    "sensors, motion",
-    [(ALL, swinging), (ALL[:3], level)],
-    ids=["all sensors, swinging", "no compass or fixes, at rest"],
+    "sensors, size", [(ALL, 1.0), (ALL[:3], 0.0)], ids=["all sensors, swinging", "no compass or fixes, at rest"]
 )
-def test_errors_are_as_large_as_the_filter_says(sensors, motion):
+def test_errors_are_as_large_as_the_filter_says(sensors, size):
     """Normalised squared errors of 15 states over 40 runs: their mean is 15, within four standard deviations.
 
     At rest without a compass a filter with velocity errors in world axes believes in a heading that nothing measured.
     """
     keys = jax.random.split(jax.random.PRNGKey(4), 40)
     biases = {"gyro_bias_deviation": 5e-3, "force_bias_deviation": 0.05, "gyro_drift": 0, "force_drift": 0}
-    found, covariances = followed(kalman(sensors, **EXACT, **biases), motion, 3000, 0.01, keys)
-    for k in (500, 1500, 2999):
-        squares = np.einsum("ki,kij,kj->k", found[:, k], np.linalg.inv(covariances[:, k]), found[:, k])
+    found, covariances = followed(kalman(sensors, **EXACT, **biases), size, 3000, keys)
+    for k in (500, 1500, 3000):
+        errors, covariance = found[:, k - 1], covariances[:, k // BLOCK - 1]
+        squares = np.einsum("ki,kij,kj->k", errors, np.linalg.inv(covariance), errors)
         assert abs(squares.mean() - 15) < 4 * np.sqrt(2 * 15 / len(keys)), (k, squares.mean())
     last = np.sqrt((np.asarray(found[:, -1]) ** 2).mean(0))
     observed = slice(GYRO_BIAS.start, GYRO_BIAS.stop if len(sensors) == len(ALL) else GYRO_BIAS.stop - 1)  # yaw is not
@@ -168,7 +196,7 @@ def test_late_readings_count_as_much_as_their_age_says():
     """Fixes and velocities that come a second late, while the body swings: as consistent as fresh ones."""
     keys = jax.random.split(jax.random.PRNGKey(5), 40)
     late = [imu(), dvl(delay=1.0), depth(delay=0.5), compass(delay=0.7), position_fix(delay=1.0)]
-    found, covariances = followed(kalman(late), swinging, 2000, 0.01, keys)
+    found, covariances = followed(kalman(late), 1.0, 2000, keys)
     position, of_position = np.asarray(found[:, -1, POSITION]), np.asarray(covariances[:, -1, POSITION, POSITION])
     squares = np.einsum("ki,kij,kj->k", position, np.linalg.inv(of_position), position)
     assert abs(squares.mean() - 3) < 4 * np.sqrt(2 * 3 / len(keys))
@@ -176,14 +204,14 @@ def test_late_readings_count_as_much_as_their_age_says():
 
 
 def test_an_outlier_is_rejected_and_a_lasting_jump_is_believed_in_the_end():
-    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    own = kalman(ALL).filter
     state = own.start(level(0.0))
-    fixed = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
+    fixed = updated(own, state, np.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
     assert int(fixed.rejected) == 1
     np.testing.assert_array_equal(fixed.position, state.position)
     np.testing.assert_array_equal(fixed.covariance, state.covariance)
     for count in range(1, 60):
-        fixed = update(fixed, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
+        fixed = updated(own, fixed, np.asarray(0.0), with_reading(nothing(ALL), 4, [100.0, 0.0]))
         if int(fixed.rejected) == count:
             break
     assert count < 20 and float(fixed.position[0]) > 50.0
@@ -194,36 +222,54 @@ def test_nothing_that_a_sensor_says_makes_the_estimate_undefined():
     """A sensor that has gone mad, for minutes: numbers of any size, of any age."""
     own, rng = kalman(ALL).filter, np.random.default_rng(0)
 
-    @jax.jit
-    def fly(state, readings, ages):
-        def step(state, given):
-            reading, age = given
-            received = tuple(Received(reading[: len(one.reading)], jnp.asarray(True), age) for one in nothing(ALL))
-            return own.update(state, jnp.asarray(0.01), received), None
-
-        return jax.lax.scan(step, state, (readings, ages))[0]
-
     mad = rng.normal(size=(3000, 8)) * 10.0 ** rng.uniform(-3, 300, size=(3000, 8))
-    state = fly(own.start(level(0.0)), jnp.asarray(mad), jnp.asarray(10.0 ** rng.uniform(-3, 9, size=3000)))
+    state, quiet = own.start(level(0.0)), nothing(ALL)
+    for reading, age in zip(mad, 10.0 ** rng.uniform(-3, 9, size=3000), strict=True):
+        received = tuple(Received(reading[: len(one.reading)], np.asarray(True), age) for one in quiet)
+        state = updated(own, state, np.asarray(0.01), received)
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
     assert int(state.rejected) > 0
 
 
 def test_entries_that_are_none_are_left_out():
     """East is taken although north is NaN; a reading of nothing but NaN changes nothing."""
-    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    own = kalman(ALL).filter
     state = own.start(level(0.0))
-    half = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, 0.1]))
+    half = updated(own, state, np.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, 0.1]))
     assert float(half.position[0]) == 0.0 and float(half.position[1]) > 0.05
-    none = update(state, jnp.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, np.inf]))
+    none = updated(own, state, np.asarray(0.0), with_reading(nothing(ALL), 4, [np.nan, np.inf]))
     for before, after in zip(jax.tree.leaves(state), jax.tree.leaves(none), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
+def test_readings_of_every_sensor_of_any_age():
+    """Tilt, heading, depth and places that come late, while the body swings."""
+    own, rng, times = kalman(ALL).filter, np.random.default_rng(3), 0.01 * np.arange(200)
+    truth = jax.tree.map(np.asarray, jax.vmap(swinging)(times))
+    gravity = truth.body.rotation[:, 2] * -9.81  # what accelerometers would read at rest
+    readings = [
+        np.concatenate([truth.position[:, 3:5], truth.body.nu[:, 3:], gravity], axis=1),
+        truth.body.nu[:, :3],
+        truth.position[:, 2:3],
+        truth.position[:, 5:],
+        truth.position[:, :2],
+    ]
+    state = own.start(swinging(0.0))
+    for k in range(1, 200):
+        received = tuple(
+            Received(rows[k] + 1e-3 * rng.normal(size=rows.shape[1]), np.asarray(k % every == 0), np.asarray(age))
+            for rows, every, age in zip(readings, (1, 12, 5, 7, 50), (0.0, 0.08, 0.0, 0.02, 0.3), strict=True)
+        )
+        state = updated(own, state, np.asarray(0.01), received)
+    assert np.abs(state.position - truth.position[-1, :3]).max() < 0.1
+    told = jax.jit(lambda state: (own.diagnostics(state), own.measurement(state)))(state)
+    is_as_recorded("kalman: readings of every sensor", (state, told))
+
+
 def test_an_angle_may_have_turned_once():
-    own, update = kalman(ALL).filter, eqx.filter_jit(kalman(ALL).filter.update)
+    own = kalman(ALL).filter
     turned = lambda yaw: measurement_of_outputs(jnp.zeros(6).at[5].set(yaw), jnp.zeros(6))
-    state = update(own.start(turned(3.13)), jnp.asarray(0.0), with_reading(nothing(ALL), 3, -3.13))
+    state = updated(own, own.start(turned(3.13)), np.asarray(0.0), with_reading(nothing(ALL), 3, -3.13))
     assert int(state.rejected) == 0
     assert abs(abs(float(state_angles(state)[2])) - np.pi) < 0.0117  # between both: half a turn
 
@@ -240,7 +286,7 @@ def test_tilt_is_observed_without_a_reading_of_it():
     """Accelerometers tell it where velocities or positions are measured, as well as the filter says."""
     keys = jax.random.split(jax.random.PRNGKey(6), 40)
     sensors = [RawIMU(imu().sampling), *ALL[1:]]
-    found, covariances = followed(kalman(sensors, tilt_deviation=0.05), swinging, 2000, 0.01, keys)
+    found, covariances = followed(kalman(sensors, tilt_deviation=0.05), 1.0, 2000, keys)
     tilt, of_tilt = np.asarray(found[:, -1, :2]), np.asarray(covariances[:, -1, :2, :2])
     squares = np.einsum("ki,kij,kj->k", tilt, np.linalg.inv(of_tilt), tilt)
     assert abs(squares.mean() - 2) < 4 * np.sqrt(2 * 2 / len(keys))
@@ -259,7 +305,7 @@ class Altimeter(AbstractSensor):
 @pytest.mark.full
 def test_a_sensor_of_a_user_needs_no_more_than_its_reading():
     sensors = [imu(), dvl(), compass(), position_fix(), Altimeter(Sampling(0.2, noise=0.02), bottom=20.0)]
-    found, _ = followed(kalman(sensors), swinging, 2000, 0.01, jax.random.split(jax.random.PRNGKey(0), 4))
+    found, _ = followed(kalman(sensors), 1.0, 2000, jax.random.split(jax.random.PRNGKey(0), 4))
     assert np.sqrt((np.asarray(found[:, 500:, 14]) ** 2).mean()) < 0.02
 
 
@@ -278,7 +324,7 @@ def sensed(sensors):
     return found
 
 
-@pytest.mark.parametrize(
+UNSEEN = pytest.mark.parametrize(
     "sensors, unseen",
     [
         (ALL, []),
@@ -288,8 +334,16 @@ def sensed(sensors):
         ([imu()], ["north", "east", "down", "yaw"]),
     ],
 )
-def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
+
+
+@UNSEEN
+def test_what_sensors_cannot_observe(sensors, unseen):
     assert unobservable(sensed(sensors)) == unseen
+
+
+@pytest.mark.full
+@UNSEEN
+def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
     said = kalman(sensors).advice(60.0)
     assert len(said) == bool(unseen)
     if unseen:
@@ -306,7 +360,7 @@ def test_the_drift_that_is_predicted_is_that_of_the_filter():
     drifts = np.repeat([1e-5**2, 1e-4**2], 3)
     noise = np.concatenate([of_rates, drifts[:3], of_force, drifts[3:], np.zeros(3)])
     predicted = deviations(sensed(sensors), np.asarray(own.initial_deviations()), noise, 60.0)
-    _, covariances = followed(navigation, level, 6000, 0.01, jax.random.split(jax.random.PRNGKey(0), 1))
+    _, covariances = followed(navigation, 0.0, 6000, jax.random.split(jax.random.PRNGKey(0), 1))
     of_filter = np.sqrt(np.diag(np.asarray(covariances[0, -1])))
     for name, i in {"north": 12, "east": 13, "down": 14, "yaw": 2, "roll": 0}.items():
         np.testing.assert_allclose(predicted[name], of_filter[i], rtol=0.05, err_msg=name)

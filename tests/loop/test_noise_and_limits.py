@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import Measurement
@@ -48,6 +49,7 @@ def test_noise_is_white_with_the_given_deviations(key):
         assert np.abs(neighbours).max() < 5 / np.sqrt(20_000)
 
 
+@pytest.mark.full
 def test_two_laws_meet_the_same_noise(key):
     """From eps = x_hat_dot - (x_dot + noise), both runs give back the same noise at every step."""
     plant = double_integrator(2)
@@ -69,6 +71,7 @@ def limited():
     law = rcaf(plant.model(), sets=3)
     loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
     samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals
+    is_as_recorded("loop: two axes with limits", [samples[name][::50] for name in sorted(samples)])
     return law, jax.tree.map(np.asarray, samples)
 
 

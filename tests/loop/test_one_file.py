@@ -128,8 +128,9 @@ def test_a_metric_of_ones_own_in_a_run(folder, capsys):
     assert row.replace("│", " ").split()[-1] == "m"
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "backend", [pytest.param("simd", marks=pytest.mark.full), pytest.param("xla", marks=pytest.mark.slow)]
+)
 def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
     """A column like every other, and a criterion of success: each trial is what its run is."""
     scenario = SCENARIO | {"loop": SCENARIO["loop"] | {"backend": backend}, "success": {"overshoot": 0.2}}

@@ -125,6 +125,7 @@ def test_fourth_order_in_the_step_of_the_plant(make):
     assert 3.8 <= np.log2(coarse / fine) <= 4.6, (coarse, fine)
 
 
+@pytest.mark.full
 def test_a_jump_at_a_tick_is_met_exactly():
     """No input, constant load within a step: the motion is a parabola, and RK4 has it to rounding."""
     outcome = sampled.simulate(

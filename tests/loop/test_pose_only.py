@@ -93,8 +93,9 @@ def test_angles_of_a_vehicle_are_compared_the_short_way_round():
     )
     state = filter_.init((), at(0))
     key = jax.random.PRNGKey(0)
+    step = jax.jit(lambda state, k: filter_.measure(key, state, k * T, at(k)))
     for k in range(150):
-        y, state = filter_.measure(key, state, k * T, at(k))
+        y, state = step(state, np.asarray(float(k)))
         if k == 0:
             np.testing.assert_allclose(y.position, at(0).position, atol=1e-15)
     assert float(y.velocity[5]) == pytest.approx(0.5, abs=1e-3)

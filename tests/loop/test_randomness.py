@@ -73,13 +73,16 @@ def noise_of_a_run(duration, dt, simulate=sampled.simulate):
     return np.asarray(samples["measured_position"] - samples["position"])[:-1, 0]
 
 
+SCALES = [(1e7, 2e3), (6e3, 1.0), (5e-4, 1e-7)]  # duration and step, s
+
+
 @pytest.mark.parametrize(
-    "simulate",
-    [pytest.param(sampled.simulate, id="xla", marks=pytest.mark.slow), pytest.param(simd_batch.simulate, id="simd")],
-)
-@pytest.mark.parametrize(
-    ("duration", "dt"),
-    [pytest.param(6e3, 1.0, marks=pytest.mark.full), (1e7, 2e3), pytest.param(5e-4, 1e-7, marks=pytest.mark.full)],
+    ("simulate", "duration", "dt"),
+    [
+        (simd_batch.simulate, *SCALES[0]),
+        *(pytest.param(simd_batch.simulate, *scale, marks=pytest.mark.full) for scale in SCALES[1:]),
+        *(pytest.param(sampled.simulate, *scale, marks=pytest.mark.slow) for scale in SCALES),
+    ],
 )
 def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
     """Beyond 2^32 microseconds, to four months, and below a microsecond."""
@@ -93,8 +96,9 @@ def test_noise_is_white_at_any_time_scale(duration, dt, simulate):
         assert abs((part[1:] * part[:-1]).mean()) < 4 * DEVIATION**2 / np.sqrt(m)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("precision", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "precision", [pytest.param("float64", marks=pytest.mark.full), pytest.param("float32", marks=pytest.mark.slow)]
+)
 def test_instruments_are_heard_and_noisy_at_any_time(precision):
     """After 1e7 s at 10 s, and in double precision at a tenth of a microsecond."""
     with runtime.in_precision(precision):

@@ -1,5 +1,7 @@
 """When sensors speak and how wrong they are; what the observer makes of it. Closed forms throughout."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -18,18 +20,33 @@ from undertow.thrusters.thruster import PropellerReport
 QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}
 
 
-def readings_of(sampling, step, duration, truth=lambda t: jnp.stack([t]), key=0):
-    """Instants, readings and freshness of a sensor that is asked every `step` seconds."""
-    steps = round(duration / step)
-    times = jnp.arange(steps, dtype=float) * step
+def itself(t):
+    return jnp.stack([t])
+
+
+def zero(t):
+    return jnp.zeros(1)
+
+
+@eqx.filter_jit
+def delivered(sampling, times, truth, key):
+    """Readings of a sensor at these times, and whether each is new."""
 
     def advance(state, t):
-        chance = jax.random.normal(jax.random.fold_in(jax.random.PRNGKey(key), sampling.number(t)), (2,))
+        chance = jax.random.normal(jax.random.fold_in(key, sampling.number(t)), (2,))
         arrival, state = sampling.deliver(state, t, truth(t), chance)
         return state, arrival
 
-    _, arrivals = jax.lax.scan(advance, sampling.init(jnp.zeros(1), jnp.ones(1)), times)
-    return np.asarray(times), np.asarray(arrivals.reading[:, 0]), np.asarray(arrivals.fresh)
+    arrivals = jax.lax.scan(advance, sampling.init(jnp.zeros(1), jnp.ones(1)), times)[1]
+    return arrivals.reading[:, 0], arrivals.fresh
+
+
+def readings_of(sampling, step, duration, truth=itself, key=0):
+    """Instants, readings and freshness of a sensor that is asked every `step` seconds."""
+    steps = round(duration / step)
+    times = np.arange(max(steps, 800)) * step  # as many for all short runs, which are one program then
+    readings, fresh = delivered(sampling, times, truth, jax.random.PRNGKey(key))
+    return times[:steps], np.asarray(readings)[:steps], np.asarray(fresh)[:steps]
 
 
 def test_readings_come_at_the_period_and_are_as_old_as_the_delay():
@@ -58,19 +75,20 @@ def test_resolution_rounds_to_the_nearest_step():
 
 
 def test_bias_is_one_number_per_run():
-    _, readings, _ = readings_of(Sampling(0.01, bias=0.3), 0.01, 0.5, lambda t: jnp.zeros(1))
+    _, readings, _ = readings_of(Sampling(0.01, bias=0.3), 0.01, 0.5, zero)
     np.testing.assert_allclose(readings, 0.3, rtol=1e-15)
 
 
 def test_noise_belongs_to_the_sample_not_to_the_loop():
-    sampling, still = Sampling(0.02, noise=0.5), lambda t: jnp.zeros(1)
-    _, slow, when_slow = readings_of(sampling, 0.02, 4.0, still)
-    _, fast, when_fast = readings_of(sampling, 0.005, 4.0, still)
+    sampling = Sampling(0.02, noise=0.5)
+    _, slow, when_slow = readings_of(sampling, 0.02, 4.0, zero)
+    _, fast, when_fast = readings_of(sampling, 0.005, 4.0, zero)
     np.testing.assert_array_equal(slow[when_slow], fast[when_fast])
 
 
+@pytest.mark.full
 def test_noise_and_dropout_have_the_stated_statistics():
-    _, readings, fresh = readings_of(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, lambda t: jnp.zeros(1))
+    _, readings, fresh = readings_of(Sampling(0.01, noise=0.5, dropout=0.3), 0.01, 200.0, zero)
     kept, n = readings[fresh], len(fresh)
     assert abs(fresh.mean() - 0.7) < 4 * np.sqrt(0.21 / n)
     assert abs(kept.mean()) < 4 * 0.5 / np.sqrt(len(kept))
@@ -102,8 +120,22 @@ def swinging(t):
     return measurement_of_outputs(AMPLITUDE * jnp.sin(FREQUENCY * t), AMPLITUDE * FREQUENCY * jnp.cos(FREQUENCY * t))
 
 
-def still(t):
-    return measurement_of_outputs(jnp.array([1.0, 2.0, 3.0, 0.1, -0.2, 2.5]), jnp.zeros(6))
+class Moving(NamedTuple):
+    """Outputs that begin somewhere, change steadily, and swing."""
+
+    start: np.ndarray = np.zeros(6)
+    rates: np.ndarray = np.zeros(6)
+    size: float = 0.0
+
+    def at(self, t):
+        swing = swinging(t)
+        outputs = self.start + self.rates * t + self.size * swing.position
+        return measurement_of_outputs(outputs, self.rates + self.size * swing.velocity)
+
+
+STILL = Moving(start=np.array([1.0, 2.0, 3.0, 0.1, -0.2, 2.5]))
+LEVEL = Moving()
+BLOCK = 1000  # steps of a program that runs of any length repeat
 
 
 @eqx.filter_jit
@@ -117,6 +149,21 @@ def observe(sensor, motion, steps, step, key):
         return state, (told, truth)
 
     return jax.lax.scan(advance, sensor.init(path, motion(0.0)), jnp.arange(steps, dtype=float))[1]
+
+
+@eqx.filter_jit
+def observed(sensor, motion, first, step, key, state):
+    """State after `BLOCK` steps, and the errors of position and velocity in them."""
+    path = sensor.realize(key)
+
+    def advance(state, k):
+        truth = motion.at(k * step)
+        told, state = sensor.measure(path, state, k * step, truth)
+        apart = told.position - truth.position
+        apart = apart.at[3:].set(wrap_angle(apart[3:]))
+        return state, jnp.concatenate([apart, told.velocity - truth.velocity])
+
+    return jax.lax.scan(advance, state, first + jnp.arange(BLOCK, dtype=float))
 
 
 @eqx.filter_jit
@@ -140,19 +187,31 @@ def largest(sensors, step):
     return np.asarray(largest_errors(observer(sensors), swinging, np.asarray(round(20.0 / step)), np.asarray(step)))
 
 
+@eqx.filter_jit
+def begun(sensor, motion, key):
+    """State of navigation at the start."""
+    return sensor.init(sensor.realize(key), motion.at(0.0))
+
+
 def errors(sensors, motion, step, duration, key=0, **blends):
     """Errors of position and velocity at every step, [t, 12]."""
-    told, truth = observe(observer(sensors, **blends), motion, round(duration / step), step, jax.random.PRNGKey(key))
-    apart = told.position - truth.position
-    apart = apart.at[:, 3:].set(wrap_angle(apart[:, 3:]))
-    return np.concatenate([apart, told.velocity - truth.velocity], axis=1)
+    sensor, steps, found = observer(sensors, **blends), round(duration / step), []
+    motion = Moving(*(np.asarray(one) for one in motion))
+    state = jax.tree.map(np.asarray, begun(sensor, motion, jax.random.PRNGKey(key)))
+    for first in range(0, steps, BLOCK):
+        at = np.asarray(float(first)), np.asarray(step)
+        state, block = observed(sensor, motion, *at, jax.random.PRNGKey(key), state)
+        found.append(np.asarray(block))
+    return np.concatenate(found)[:steps]
 
 
+@pytest.mark.full
 def test_a_still_vehicle_with_perfect_instruments_is_known_exactly():
     quiet = [imu(**QUIET_IMU), dvl(noise=0, resolution=0), depth(noise=0, resolution=0), compass(noise=0)]
-    assert np.abs(errors([*quiet, position_fix(noise=0)], still, 0.01, 20.0)).max() < 1e-12
+    assert np.abs(errors([*quiet, position_fix(noise=0)], STILL, 0.01, 20.0)).max() < 1e-12
 
 
+@pytest.mark.full
 def test_the_observer_converges_at_second_order_when_corrected_at_every_tick():
     """One prediction is off by the square of the step, and each correction takes away the same share of what is left."""
     found = []
@@ -166,6 +225,7 @@ def test_the_observer_converges_at_second_order_when_corrected_at_every_tick():
     assert found[-1] < 1e-4
 
 
+@pytest.mark.full
 def test_dead_reckoning_converges_at_first_order():
     """Inertial navigation alone, without noise: 20 s of it are off by millimetres at 1 kHz, and half of it at 2 kHz."""
     far = [largest([imu(period=step, **QUIET_IMU)], step)[:3].max() for step in (1e-3, 5e-4)]
@@ -173,22 +233,24 @@ def test_dead_reckoning_converges_at_first_order():
     assert 1.9 < far[0] / far[1] < 2.1
 
 
+@pytest.mark.full
 def test_noise_of_the_dvl_is_smoothed_as_an_exponential_filter_does():
     """Variance alpha / (2 - alpha) of that of the reading."""
     alpha, sigma = 0.3, 0.02
     parts = [imu(**QUIET_IMU), dvl(period=0.01, noise=sigma, resolution=0, delay=0), compass(noise=0)]
-    velocity = errors(parts, still, 0.01, 400.0, dvl_blend=alpha)[1000:, 6:9]
+    velocity = errors(parts, STILL, 0.01, 400.0, dvl_blend=alpha)[1000:, 6:9]
     expected = sigma * np.sqrt(alpha / (2 - alpha))
     # Effective number of independent samples: a third of 39 000 per (2 - alpha) / alpha.
     assert abs(np.sqrt((velocity**2).mean()) / expected - 1) < 4 / np.sqrt(2 * 3 * 39_000 * alpha / (2 - alpha))
 
 
+@pytest.mark.full
 def test_noise_of_fixes_is_smoothed_as_an_alpha_beta_filter_does():
     """Steady variances of position and velocity of the alpha-beta filter. Bar-Shalom et al. (2001), section 6.5."""
     alpha, sigma, period = 0.2, 0.05, 0.1
     beta = alpha**2 / (2 - alpha)
     parts = [imu(**QUIET_IMU), compass(noise=0), position_fix(period, sigma, delay=0.0)]
-    found = errors(parts, still, period, 4000.0, fix_blend=alpha)[400:]
+    found = errors(parts, STILL, period, 4000.0, fix_blend=alpha)[400:]
     denominator = alpha * (4 - 2 * alpha - beta)
     position = (2 * alpha**2 + beta * (2 - 3 * alpha)) / denominator
     velocity = 2 * beta**2 / denominator / period**2
@@ -196,11 +258,9 @@ def test_noise_of_fixes_is_smoothed_as_an_alpha_beta_filter_does():
     np.testing.assert_allclose((found[:, 6:8] ** 2).mean(), velocity * sigma**2, rtol=0.05)
 
 
+@pytest.mark.full
 def test_delays_do_not_matter_at_constant_velocity():
-    def steady(t):
-        rates = jnp.array([0.5, -0.3, 0.1, 0.0, 0.0, 0.2])
-        return measurement_of_outputs(rates * t, rates.at[:3].set(rates[:3]))
-
+    steady = Moving(rates=np.array([0.5, -0.3, 0.1, 0.0, 0.0, 0.2]))
     late = {"delay": 0.4, "noise": 0.0}
     parts = [imu(**QUIET_IMU), depth(resolution=0, **late), compass(**late), position_fix(**late)]
     found = np.abs(errors(parts, steady, 0.01, 30.0))
@@ -210,15 +270,15 @@ def test_delays_do_not_matter_at_constant_velocity():
     np.testing.assert_allclose(found[-1000:, 5].max(), left, rtol=0.05)
 
 
+@pytest.mark.full
 def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     """An offset of b in acceleration grows to b T / alpha between corrections of share alpha every T."""
     offset, period, alpha = 0.01, 0.2, 0.4
     key = 5
     parts = [imu(**QUIET_IMU, force_bias=offset), dvl(period=period, noise=0, resolution=0, delay=0), compass(noise=0)]
     sensor = observer(parts, dvl_blend=alpha)
-    level = lambda t: measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
-    realization = sensor.init(sensor.realize(jax.random.PRNGKey(key)), level(0.0)).sensors[0].offset[5:]
-    velocity = errors(parts, level, 0.01, 40.0, key, dvl_blend=alpha)[2000:, 6:9]
+    realization = begun(sensor, LEVEL, jax.random.PRNGKey(key)).sensors[0].offset[5:]
+    velocity = errors(parts, LEVEL, 0.01, 40.0, key, dvl_blend=alpha)[2000:, 6:9]
     before_correction = np.abs(velocity).max(0)
     expected = np.abs(np.asarray(realization)) * period / alpha * (1 - alpha)
     # The largest value that is reported is the one a step before the correction.
@@ -226,6 +286,7 @@ def test_a_tilted_accelerometer_leaks_gravity_until_the_dvl_speaks():
     np.testing.assert_allclose(before_correction, expected, rtol=1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rate", [jnp.zeros(2), None], ids=["with its rate", "alone"])
 def test_propeller_speed_and_its_rate(rate):
     """A propeller that speeds up steadily: speed as read, rate from two readings where thrusters report one."""
@@ -242,8 +303,11 @@ def test_propeller_speed_and_its_rate(rate):
         np.testing.assert_allclose(told.actuator.acceleration[2:], np.array([[3.0, -2.0]] * 98), rtol=1e-9)
 
 
+@pytest.mark.full
 def test_the_same_key_gives_the_same_bits():
-    run = lambda key: errors([imu(), dvl(dropout=0.2), depth(), compass(), position_fix()], swinging, 0.01, 3.0, key)
+    run = lambda key: errors(
+        [imu(), dvl(dropout=0.2), depth(), compass(), position_fix()], Moving(size=1.0), 0.01, 3.0, key
+    )
     once, again, other = run(7), run(7), run(8)
     np.testing.assert_array_equal(once, again)
     assert (np.abs(once - other).max(0) > 0).all()

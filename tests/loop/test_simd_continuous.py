@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jaxtyping import Array, Float
+from recorded import is_as_recorded
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.contracts import AbstractDisturbance
@@ -45,6 +46,7 @@ def test_figures_of_both_compilers_agree():
     start = {"position": np.array([0.1, -0.1]), "velocity": np.array([0.0, 0.5])}
     own, wanted = simd_batch.integrate(loop, **HOW, **start), continuous.simulate(loop, **HOW, **start)
     assert int(own.status) == int(Status.OK) and float(own.ended) == 0.5
+    is_as_recorded("continuous loop", [wanted.signals[name] for name in sorted(wanted.signals)])
     assert len(own.time) == 26 and list(own.signals) == list(wanted.signals)
     for name, series in wanted.signals.items():
         np.testing.assert_allclose(own.signals[name], series, rtol=1e-9, atol=1e-11, err_msg=name)

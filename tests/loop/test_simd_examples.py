@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 
 from undertow.analysis.metrics import Metrics
 from undertow.bench.workload import constant
@@ -64,6 +65,8 @@ def test_examples_fly_as_they_do_by_xla(name):
     values = lambda run: how["accumulators"][0].values(run.accumulated[0])
     for key, here in values(found).items():
         np.testing.assert_allclose(here, values(wanted)[key], rtol=1e-7, atol=1e-12, err_msg=key)
+    if name in QUICK:
+        is_as_recorded(f"loop: {name}", [wanted.signals[signal] for signal in sorted(wanted.signals)])
     assert found.status == wanted.status == 0 and found.ended == float(wanted.ended)
 
 
@@ -112,6 +115,7 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     jax.tree.map(np.testing.assert_array_equal, pair(general), pair(found))
 
 
+@pytest.mark.full
 def test_a_run_that_diverges_ends_where_it_does_by_xla():
     """Its last sound state is kept, and its end is told."""
     loop, how = example("inverted_pendulum", 3.0)

@@ -8,8 +8,6 @@ import pytest
 
 from undertow.scenario.execute import execute
 
-pytestmark = pytest.mark.full
-
 FILE = Path(__file__).with_name("user_parts.py")
 
 PARTS = {
@@ -46,7 +44,9 @@ def scenario(name, backend):
 SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predictive", "spectrum", "kalman")
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in PARTS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else pytest.mark.full) for name in PARTS]
+)
 def test_the_same_figures_and_the_reason_where_it_is_left_to_xla(name):
     with jax.numpy_dtype_promotion("standard"):  # users are not as strict as these tests
         found, wanted = (execute(scenario(name, backend)).dataset for backend in ("simd", "xla"))

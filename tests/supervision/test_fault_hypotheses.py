@@ -58,6 +58,11 @@ def test_what_remains_of_a_force_solves_its_differential_equations(decay):
         np.testing.assert_allclose(found[:, column], exact, atol=3e-3 if decay != DECAY else 1e-8)
 
 
+@jax.jit
+def step(state, residual, forces, remains):
+    return examine(state, residual, forces, EFFECT, jnp.zeros(5), remains, jnp.asarray(0.0))
+
+
 def examined(share, onset=20, count=27, failing=2, noise=0.0, pushed=None):
     """State and findings after examinations of a healthy thruster model of which one thruster fails at the onset.
 
@@ -70,11 +75,6 @@ def examined(share, onset=20, count=27, failing=2, noise=0.0, pushed=None):
     one, two, lost_one, lost_two = np.zeros(5), np.zeros(5), 0.0, 0.0
     keep, seen = np.exp(-BANDWIDTH * h), None
     force = lambda t: 2 * np.asarray(FORCES) * (1 + 0.2 * np.sin(3.0 * t + np.arange(5.0)))
-    step = jax.jit(
-        lambda state, residual, forces: examine(
-            state, residual, forces, EFFECT, jnp.zeros(5), remains, jnp.asarray(0.0)
-        )
-    )
     for k in range(1, count + 1):
         for i in range(fine):
             t = ((k - 1) * fine + i + 1) * h
@@ -87,7 +87,7 @@ def examined(share, onset=20, count=27, failing=2, noise=0.0, pushed=None):
         residual = -np.asarray(EFFECT)[:, failing] * lost_two + noise * chance.normal(size=6)
         if pushed is not None and k > onset:
             residual = residual + pushed
-        state, seen = step(state, jnp.asarray(residual), jnp.asarray(np.stack([two, one, force(k * ELAPSED)])))
+        state, seen = step(state, residual, np.stack([two, one, force(k * ELAPSED)]), remains)
         if k == onset:
             state = cleared(state, jnp.asarray(True))  # what was before the history was full
     return state, seen

@@ -1,6 +1,9 @@
 """A supervised controller in closed loop: the bits of its law where nothing is wrong, and no jump at any transfer."""
 
+import functools
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,6 +18,8 @@ from undertow.scenario.reading import from_data
 from undertow.supervision.conditions import Request, State
 from undertow.supervision.supervisor import supervisor
 from undertow.supervision.transition_log import transitions
+
+pytestmark = pytest.mark.full
 
 HEAVY = {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}}
 GOAL = {"kind": "setpoint", "position": [1, 1, 1, 0, 0, 0.5]}
@@ -47,9 +52,7 @@ def _outcome(scenario, duration=3.0):
         return simd_batch.simulate(built.closed_loop, duration=duration, dt=built.scenario.loop.dt, record_every=1)
 
 
-@pytest.mark.parametrize(
-    "name", [*(pytest.param(name, marks=pytest.mark.full) for name in ("robust", "pid", "paper")), "pendulum"]
-)
+@pytest.mark.parametrize("name", SCENARIOS)
 def test_where_nothing_is_wrong_a_run_has_the_same_bits(name):
     alone, watched = _outcome(SCENARIOS[name]), _outcome(SCENARIOS[name] | {"supervisor": True})
     for signal in set(alone.signals) - {"commanded_input"}:
@@ -66,22 +69,37 @@ class Controlled:
     """A supervised vehicle, stepped by the test, that an operator's requests reach."""
 
     def __init__(self):
-        self.plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(supply=16.0))
-        law = ut.rcaf(self.plant.model(), preset="robust", sampling_time=T)
-        fallback = ut.controllers.pid(self.plant.model(), sampling_time=T)
-        self.supervised = supervisor(law, self.plant, fallback, sampling_time=T)
-        self.x = self.plant.initial_state()
-        target = ut.references.setpoint(np.array([2.0, 1, 1, 0, 0, 1]))
-        self.z = self.supervised.init(self.plant.output(jnp.zeros(()), self.x), target.at(jnp.zeros(())))
-        self.parts = (self.plant, self.supervised, target)
+        plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(supply=16.0))
+        law = ut.rcaf(plant.model(), preset="robust", sampling_time=T)
+        fallback = ut.controllers.pid(plant.model(), sampling_time=T)
+        self.supervised = supervisor(law, plant, fallback, sampling_time=T)
+        self.parts = (plant, self.supervised, ut.references.setpoint(np.array([2.0, 1, 1, 0, 0, 1])))
+        # With the parts inside, a call takes a third of the time that it takes with the parts as arguments.
+        self.compiled = jax.jit(functools.partial(_step, self.parts))
+        x = plant.initial_state()
+        self.begun = jax.tree.map(np.asarray, (x, _begun(self.parts, x)))
+
+    def restart(self):
+        self.x, self.z = self.begun
 
     def step(self, request: Request):
-        self.z = self.z._replace(request=jnp.asarray(int(request)))
-        self.x, self.z, output = _step(self.parts, self.x, self.z)
+        self.z = self.z._replace(request=np.asarray(int(request)))
+        self.x, self.z, output = self.compiled(self.x, self.z)
         return np.asarray(output)
 
 
+@functools.cache
+def controlled():
+    """A BlueROV2 Heavy whose law and fallback find failed thrusters."""
+    return Controlled()
+
+
 @eqx.filter_jit
+def _begun(parts, x):
+    plant, supervised, target = parts
+    return supervised.init(plant.output(jnp.zeros(()), x), target.at(jnp.zeros(())))
+
+
 def _step(parts, x, z):
     plant, supervised, target = parts
     t = jnp.zeros(())
@@ -92,9 +110,9 @@ def _step(parts, x, z):
     return new, supervised.advance(z, y, r, applied, jnp.asarray(T)), u
 
 
-@pytest.mark.full
 def test_a_thousand_transfers_make_no_jump():
-    run, chance = Controlled(), np.random.default_rng(0)
+    run, chance = controlled(make), np.random.default_rng(0)
+    run.restart()
     most = float(run.supervised.slew) * 32.0 * T
     before, request, seen, largest, transfers = run.step(Request.RUN), Request.RUN, set(), 0.0, 0
     for _ in range(1000):
@@ -114,9 +132,9 @@ def test_a_thousand_transfers_make_no_jump():
     assert {(State.READY, False), (State.READY, True), (State.ACTIVE, True), (State.ACTIVE, False)} <= seen
 
 
-@pytest.mark.full
 def test_stopped_is_for_good():
-    run = Controlled()
+    run = controlled()
+    run.restart()
     for _ in range(5):
         run.step(Request.RUN)
     run.step(Request.STOP)

@@ -1,11 +1,13 @@
 """The residual of the monitor in closed form, and what it makes of it."""
 
+import functools
 import itertools
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 
 import undertow as ut
 from undertow.controllers.pid import pid
@@ -32,26 +34,66 @@ def at(nu, report=None):
     return Measurement(jnp.zeros(6), nu, report, BodyMotion(jnp.asarray([1.0, 0.0, 0.0, 0.0]), jnp.eye(3), nu))
 
 
-def followed(watched, input_of, force_of_plant, steps, load=None, start=None, used=None):
-    """State after steps of a body whose velocity obeys the nominal model with other forces, in Euler's steps."""
-    monitor, model = watched
-    dynamics, load = model.dynamics, jnp.zeros(6) if load is None else load
-    used = jnp.ones(8) if used is None else used
+@functools.cache
+def plain():
+    """The monitor of a vehicle without speed sensors, and its model."""
+    return monitor_of()
+
+
+@jax.jit
+def followed(state, nu, first, steps, amplitude, factor, load):
+    """State after steps of a body whose velocity obeys the nominal model with other forces, in Euler's steps.
+
+    Args:
+        state, nu: of the monitor and of the body before.
+        first, steps: number of the first step, and how many.
+        amplitude: of the change of the input from step to step, and the input without it, V.
+        factor: of the force of each thruster.
+        load: acceleration, m/s^2 and rad/s^2.
+    """
+    monitor, model = plain()
+    dynamics = model.dynamics
 
     def step(k, carry):
         state, nu = carry
-        y, u = at(nu), input_of(k)
-        rate = dynamics.drift(y) + dynamics.gain(y) @ force_of_plant(k, model.actuators.force((), u)) + load
-        return monitor.advance(state, model, y, u, used * (1 - state.lost), jnp.asarray(DT)), nu + DT * rate
+        y, u = at(nu), amplitude[1] + amplitude[0] * jnp.sin(0.05 * k + jnp.arange(8.0))
+        rate = dynamics.drift(y) + dynamics.gain(y) @ (factor * model.actuators.force((), u)) + load
+        return monitor.advance(state, model, y, u, 1 - state.lost, jnp.asarray(DT)), nu + DT * rate
 
-    first = (monitor.init(model, at(jnp.zeros(6))), jnp.zeros(6)) if start is None else start
-    return jax.lax.fori_loop(0, steps, step, first)
+    return jax.lax.fori_loop(first, first + steps, step, (state, nu))
+
+
+NONE = np.zeros(6)  # no load
+# Volts of eight thrusters, each above 4 V.
+CHANGING = np.stack([np.full(8, 0.5), [5.0, -6.0, 5.5, -7.0, 6.0, -5.0, 7.0, -6.5]])
+
+
+@functools.cache
+def start():
+    """State of the monitor and velocity at rest."""
+    monitor, model = plain()
+    return jax.tree.map(np.asarray, (monitor.init(model, at(jnp.zeros(6))), jnp.zeros(6)))
+
+
+@functools.cache
+def healthy():
+    """The same after a while in which nothing fails."""
+    return followed(*start(), 0, WARM, CHANGING, np.ones(8), NONE)
+
+
+def later(begin, steps, factor, load=NONE, first=WARM):
+    return followed(*begin, first, steps, CHANGING, np.asarray(factor, dtype=float), load)
+
+
+@jax.jit
+def each_lost(begin, factors):
+    """What is found lost 50 steps later, for several sets of failed thrusters."""
+    return jax.vmap(lambda factor: later(begin, 50, factor)[0].lost)(factors)
 
 
 def test_the_residual_is_the_unexplained_acceleration_behind_two_low_passes():
-    monitor, load = monitor_of(), jnp.asarray([0.2, -0.1, 0.3, 0.05, -0.4, 0.1])
-    steps = 12
-    state, _ = followed(monitor, lambda k: 3.0 * jnp.ones(8), lambda k, f: f, steps, load)
+    load, steps = np.array([0.2, -0.1, 0.3, 0.05, -0.4, 0.1]), 12
+    state, _ = followed(*start(), 0, steps, np.stack([np.zeros(8), np.full(8, 3.0)]), np.ones(8), load)
     share, one, two = 1 - np.exp(-15.0 * DT), 0.0, 0.0
     for _ in range(steps):
         two, one = two + share * (one - two), one + share * (1.0 - one)
@@ -59,53 +101,47 @@ def test_the_residual_is_the_unexplained_acceleration_behind_two_low_passes():
     assert not state.lost.any()
 
 
-def changing(k):
-    """Volts of eight thrusters, each above 4 V."""
-    return jnp.asarray([5.0, -6.0, 5.5, -7.0, 6.0, -5.0, 7.0, -6.5]) + 0.5 * jnp.sin(0.05 * k + jnp.arange(8.0))
+# Factors of the forces of thrusters that fail: each off, each reversed, and pairs that are off.
+SINGLE = {share: 1 + (share - 1) * np.eye(8) for share in (0.0, -1.0)}
+PAIRS = np.array([np.isin(np.arange(8), pair) for pair in itertools.combinations(range(8), 2)]).astype(float)
 
 
-@pytest.mark.parametrize("share", [0.0, -1.0])
-def test_every_thruster_that_is_off_or_reversed_is_found_and_no_other(share):
-    monitor = monitor_of()
-    healthy = followed(monitor, changing, lambda k, f: f, WARM)
-    assert not healthy[0].lost.any()
-
-    def failed(which):
-        fails = jnp.arange(8) == which
-        later = lambda k: changing(k + WARM)
-        return followed(monitor, later, lambda k, f: jnp.where(fails, share * f, f), 50, start=healthy)[0].lost
-
-    np.testing.assert_array_equal(jax.vmap(failed)(jnp.arange(8)), np.eye(8))
+@functools.cache
+def lost_after():
+    """What is found lost 50 steps after the failure: each off, each reversed, pairs off."""
+    found = np.asarray(each_lost(healthy(), np.concatenate([*SINGLE.values(), 1 - PAIRS])))
+    return found[:8], found[8:16], found[16:]
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("which", [0, 1], ids=["off", "reversed"])
+def test_every_thruster_that_is_off_or_reversed_is_found_and_no_other(which):
+    assert not healthy()[0].lost.any()
+    np.testing.assert_array_equal(lost_after()[which], np.eye(8))
+
+
+@pytest.mark.full
 def test_two_thrusters_that_are_off_at_once_are_both_found():
-    monitor = monitor_of()
-    healthy = followed(monitor, changing, lambda k, f: f, WARM)
-
-    def failed(off):
-        later = lambda k: changing(k + WARM)
-        return followed(monitor, later, lambda k, f: f * (1 - off), 50, start=healthy)[0].lost
-
-    pairs = np.array([np.isin(np.arange(8), pair) for pair in itertools.combinations(range(8), 2)]).astype(float)
-    lost = np.asarray(jax.vmap(failed)(jnp.asarray(pairs)))
+    lost = lost_after()[2]
     found = lost.any(1)
-    np.testing.assert_array_equal(lost[found], pairs[found])
+    np.testing.assert_array_equal(lost[found], PAIRS[found])
     assert found.sum() >= 24  # the others accelerate the vehicle as another pair does
 
 
 def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
-    monitor = monitor_of()
-    fails = jnp.arange(8) == 2
-    state, nu = followed(monitor, changing, lambda k, f: f, WARM)
-    state, nu = followed(monitor, changing, lambda k, f: jnp.where(fails, 0.0, f), 50, start=(state, nu))
-    assert state.lost[2] == 1.0
-    state, nu = followed(monitor, changing, lambda k, f: jnp.where(fails, 0.0, f), 500, start=(state, nu))
+    fails = np.arange(8) == 2
+    state, nu = later(healthy(), 50, ~fails)
     np.testing.assert_array_equal(state.lost, fails.astype(float))
-    healthy = followed(monitor, changing, lambda k, f: f, WARM)
-    pushed, _ = followed(monitor, changing, lambda k, f: f, 200, load=jnp.zeros(6).at[2].set(1.0), start=healthy)
+    is_as_recorded("monitor: 0.5 s after a thruster has failed", (state, nu))
+    state, nu = later((state, nu), 500, ~fails, first=WARM + 50)
+    np.testing.assert_array_equal(state.lost, fails.astype(float))
+    is_as_recorded("monitor: 5 s later", (state, nu))
+    pushed, _ = later(healthy(), 200, np.ones(8), load=np.eye(6)[2])
+    is_as_recorded("monitor: a sudden load", pushed)
     assert not pushed.lost.any()
 
 
+@pytest.mark.full
 def test_a_propeller_that_reports_no_speed_is_lost():
     monitor, model = monitor_of(speed_sensor=True, settling=0.0)
     u = 8.0 * jnp.ones(8)
@@ -119,13 +155,11 @@ def test_a_propeller_that_reports_no_speed_is_lost():
 
 
 def test_a_reading_that_is_not_finite_leaves_the_state_finite():
-    monitor, model = monitor_of()
-    state = monitor.init(model, at(jnp.zeros(6)))
-    state = monitor.advance(
-        state, model, at(jnp.zeros(6).at[0].set(jnp.nan)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT)
-    )
-    state = monitor.advance(state, model, at(jnp.zeros(6)), jnp.ones(8), jnp.ones(8), jnp.asarray(DT))
-    assert all(jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
+    state, nu = start()
+    volts = np.stack([np.zeros(8), np.ones(8)])
+    state, _ = followed(state, np.where(np.arange(6) == 0, np.nan, nu), 0, 1, volts, np.ones(8), NONE)
+    state, _ = followed(state, nu, 1, 1, volts, np.ones(8), NONE)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(state))
 
 
 def test_errors_name_the_option():
