@@ -1,11 +1,11 @@
-"""Do the tests notice a wrong program? Mutants of what computes, drawn at random, and the tests that kill them.
+"""Do the tests notice a wrong program? Mutants of what computes, sampled at random, and the tests that kill them.
 
 A mutant is the project with one operator, number, comparison or condition of one file changed (operators of Cosmic Ray,
 `pip install cosmic-ray`). Every site of a change in the rooms below is as likely as any other. Mutants are tested one
 by one in a copy of the project; a mutant that no test notices has survived.
 
     python benchmarks/mutants.py --out mutants.csv                    # 100 mutants, the quick set
-    python benchmarks/mutants.py --list                               # draw and print them only
+    python benchmarks/mutants.py --list                               # print them only
     python benchmarks/mutants.py --only 3,17 --tests "-m full -n auto"             # further tests for some of them
     python benchmarks/mutants.py --only 3,17 --tests "-m full -n auto" --together  # all in one copy, which saves time
 
@@ -99,15 +99,15 @@ def is_python(mutant: Mutant) -> bool:
     return True
 
 
-def draw(count: int, seed: int) -> list[Mutant]:
+def sample(count: int, seed: int) -> list[Mutant]:
     """Mutants, each at another site."""
     rooms = [ROOT / "undertow" / room for rooms in ROOMS.values() for room in rooms]
     files = [file for room in rooms for file in sorted(room.rglob("*.py"))]
     sites = [mutants for file in files for mutants in sites_of(file).values()]
     chance = random.Random(seed)
     chance.shuffle(sites)
-    drawn = (chance.choice(mutants) for mutants in sites)
-    return list(itertools.islice(filter(is_python, drawn), count))
+    chosen = (chance.choice(mutants) for mutants in sites)
+    return list(itertools.islice(filter(is_python, chosen), count))
 
 
 class Copy:
@@ -147,17 +147,17 @@ class Copy:
 
 
 def main() -> None:
-    """Draw, test, and write a table."""
+    """Sample, test, and write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=38)
     parser.add_argument("--tests", default="-x", help="arguments of pytest")
     parser.add_argument("--only", help="numbers of mutants, with commas")
     parser.add_argument("--together", action="store_true", help="all of them in one copy")
-    parser.add_argument("--list", action="store_true", help="draw and print them only")
+    parser.add_argument("--list", action="store_true", help="print them only")
     parser.add_argument("--out", type=Path, help="a table as CSV")
     options = parser.parse_args()
-    mutants = draw(options.count, options.seed)
+    mutants = sample(options.count, options.seed)
     numbers = [int(number) for number in options.only.split(",")] if options.only else list(range(len(mutants)))
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder), options.tests)

@@ -4,6 +4,7 @@ A test without a mark belongs to the quick set, which `pytest` runs. Every other
 file (`pytestmark`) what it belongs to; pyproject.toml lists the marks.
 """
 
+import gc
 import os
 import re
 import threading
@@ -104,11 +105,17 @@ def pytest_collection_modifyitems(items):
     """Every test is `quick`, or `full`, or by itself, also where its file or its other cells have the mark `full`."""
     every = [{mark.name for mark in item.iter_markers()} for item in items]
     for item, marks in zip(items, every, strict=True):
-        if BY_THEMSELVES & marks:
-            for node in (item, item.getparent(pytest.Module)):
-                node.own_markers = [mark for mark in node.own_markers if mark.name != "full"]
         if not marks & BY_THEMSELVES:
             item.add_marker("full" if marks & IN_THE_FULL_SET else "quick")
+            continue
+        for node in (item, item.getparent(pytest.Module)):
+            node.own_markers = [mark for mark in node.own_markers if mark.name != "full"]
+
+
+def pytest_unconfigure(config):
+    """pytest looks for garbage five times before it ends, through all that JAX keeps: four seconds of the quick set."""
+    if config.getoption("-m") == "quick":
+        gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)

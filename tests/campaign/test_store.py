@@ -93,6 +93,7 @@ def test_order_and_threads_do_not_matter(small, tmp_path):
     assert ran(path, tmp_path / "one", partial(in_threads, threads=1)) == whole
 
 
+@pytest.mark.full
 def test_what_is_done_is_not_flown_again(small, tmp_path):
     path, whole = small
 

@@ -126,6 +126,7 @@ def test_from_python_with_names_and_objects():
         run([{"target": "depth", "mode": "reversed"}])
 
 
+@pytest.mark.full
 def test_a_pendulum_has_inputs_and_outputs():
     scenario = {
         "plant": "inverted_pendulum",

@@ -32,6 +32,7 @@ def several(name, steps, runs, every=0):
     return run, plan, same, many._replace(start=(places, many.start[1]))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "name, steps, runs, every",
     [

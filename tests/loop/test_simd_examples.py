@@ -89,6 +89,7 @@ def test_a_run_lasts_as_long_however_seldom_it_is_recorded(every):
         jax.tree.map(close, (found.accumulated, found.final), (wanted.accumulated, wanted.final))
 
 
+@pytest.mark.full
 def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     """Eleven runs from different places: in one batch, backwards, one by one, and with nothing built in."""
     loop, how = example("inverted_pendulum")

@@ -40,6 +40,7 @@ def pair_in(failed, share=0.7):
     return np.asarray(two_thrusters(Seen(jnp.zeros((ONSETS, 5)), seen, FORCES), FORCES, USED, BOUNDS))
 
 
+@pytest.mark.full
 def test_every_pair_is_found_and_a_single_thruster_is_no_pair():
     for pair in itertools.combinations(range(5), 2):
         np.testing.assert_array_equal(pair_in(pair), np.isin(np.arange(5), pair))

@@ -95,6 +95,7 @@ def knowing(z, lost):
     return z._replace(monitor=z.monitor._replace(findings=findings))
 
 
+@pytest.mark.full
 def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
     _, z, y, target = stepped()
     failed = y._replace(health=jnp.ones(8).at[jnp.asarray([1, 4])].set(0.0))

@@ -114,6 +114,7 @@ def test_coriolis_matrix_of_the_arm_is_passive_for_any_parameters():
     np.testing.assert_allclose(changed, twice, rtol=1e-10)
 
 
+@pytest.mark.full
 def test_coriolis_forces_of_a_vehicle_do_no_work_for_any_inertia():
     """What is left of s^T (force at s - force at 0) is drag, which does not depend on the inertia."""
     model, rng = vehicle(remus100), np.random.default_rng(4)
