@@ -2,6 +2,7 @@
 
 import pytest
 from good_scenario import SCENARIO
+from messages import named
 
 HEADER = "t,d1,d2,d3,d4,d5,d6\n"
 ROW = ",0,0,0,0,0,0\n"
@@ -37,11 +38,11 @@ def test_mistake_is_one_exact_line(refused, tmp_path, mistake):
 def test_missing_file(refused, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: table, file: d.csv"))
     said = f"`disturbance.file` must be an existing CSV file, but is {tmp_path / 'd.csv'} (s.yaml, line 8)"
-    assert refused("simulate", "s.yaml") == said
+    assert named(refused("simulate", "s.yaml")) == named(said)
 
 
 def test_wrong_number_of_columns(refused, tmp_path):
     (tmp_path / "d.csv").write_text("t,d1\n0,1\n1,2\n")
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: u1", "kind: table, file: d.csv"))
     said = "`disturbance.samples` must have columns t, d1..d6, but is a table of 2 columns (s.yaml, line 8)"
-    assert refused("simulate", "s.yaml") == said
+    assert named(refused("simulate", "s.yaml")) == named(said)

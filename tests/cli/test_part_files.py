@@ -2,6 +2,7 @@
 
 import pytest
 from good_scenario import SCENARIO, SMALL
+from messages import named
 
 pytestmark = pytest.mark.full
 
@@ -64,7 +65,7 @@ def test_part_that_does_not_work(refused, tmp_path, part, code, said):
 def test_option_of_a_part_from_a_file(refused, tmp_path):
     scenario(tmp_path, "./my_rov.py:my_rov, mass: heavy")
     said = "`plant.vehicle.mass` must be a number, but is 'heavy' (s.yaml, line 2)"
-    assert refused("simulate", "s.yaml") == said
+    assert named(refused("simulate", "s.yaml")) == named(said)
 
 
 BYTES = """

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from good_scenario import SCENARIO
+from messages import named
 
 import undertow as ut
 from undertow.report.figures import writing
@@ -68,7 +69,7 @@ def test_scenario_as_data():
 def test_bad_argument_is_one_line(parts, options, said):
     with pytest.raises(ut.BadInput) as caught:
         ut.simulate(*parts, **options)
-    assert str(caught.value) == said
+    assert named(str(caught.value)) == named(said)
 
 
 def test_public_names():

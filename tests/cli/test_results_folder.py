@@ -3,6 +3,7 @@
 import pytest
 from good_scenario import SCENARIO
 from matplotlib.figure import Figure
+from messages import named
 
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.core.errors import BadInput
@@ -142,7 +143,7 @@ def test_what_is_published_stays_whatever_follows(tmp_path):
 def test_impossible_folder_is_refused_before_the_scenario_is_read(refused, tmp_path, out, said):
     (tmp_path / "file").touch()
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    assert refused("simulate", "s.yaml", "--out", out) == said
+    assert named(refused("simulate", "s.yaml", "--out", out)) == named(said)
 
 
 def test_earlier_result_is_refused(refused, tmp_path):

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from messages import named
 
 from undertow.controllers.rcaf import rcaf
 from undertow.core.errors import BadInput
@@ -346,4 +347,4 @@ def test_bad_input(name):
     make, said = BAD[name]
     with pytest.raises(BadInput) as error:
         make()
-    assert str(error.value) == said
+    assert named(str(error.value)) == named(said)

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from messages import named
 
 from undertow.analysis.linearization.jacobians import without
 from undertow.controllers import pid
@@ -159,7 +160,7 @@ def test_dials_and_options():
 def test_ranges_that_cannot_be(ranges, said):
     with pytest.raises(BadInput) as error:
         parameters(ranges, [(0,)])
-    assert str(error.value) == said
+    assert named(str(error.value)) == named(said)
 
 
 def test_one_ode_is_not_what_a_vehicle_runs():
