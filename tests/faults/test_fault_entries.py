@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
 
 from undertow.cli.main import run
@@ -277,7 +277,7 @@ KEY = some.sampled_from(
 
 
 @pytest.mark.full
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
 @given(some.dictionaries(KEY, VALUE, max_size=8))
 def test_any_entry_is_used_or_refused(entry):
     try:

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from undertow.core import runtime
@@ -98,7 +98,7 @@ def test_single_precision(count):
     np.testing.assert_allclose(found, direct(gaussian_sets(count), x.astype(float)), rtol=0, atol=3e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     # XLA flushes subnormal numbers to zero.
     weights=st.lists(st.floats(-1e6, 1e6, allow_subnormal=False), min_size=5, max_size=5),

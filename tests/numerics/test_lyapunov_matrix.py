@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
@@ -55,7 +55,7 @@ def test_law_uses_the_second_column_of_each_axis():
 bad = st.one_of(st.floats(-1e3, 0), st.sampled_from([np.nan, np.inf, -np.inf]))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(wrong=bad, right=st.floats(1e-2, 1e2), place=st.integers(0, 1), axis=st.one_of(st.none(), st.integers(0, 2)))
 def test_feedback_that_is_not_hurwitz_is_refused_by_name(wrong, right, place, axis):
     pair = [right, right]

@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -69,7 +69,7 @@ def test_power_of_the_plant_is_volts_times_amperes():
     )
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.floats(0.5, 2.0))
 def test_torque_and_back_emf_constants_that_disagree_are_pointed_out(ratio):
     motor = DCMotor(**{**CONSTANTS, "torque_constant": ratio * CONSTANTS["back_emf_constant"]})

@@ -111,7 +111,7 @@ def _step(parts, x, z):
 
 
 def test_a_thousand_transfers_make_no_jump():
-    run, chance = controlled(make), np.random.default_rng(0)
+    run, chance = controlled(), np.random.default_rng(0)
     run.restart()
     most = float(run.supervised.slew) * 32.0 * T
     before, request, seen, largest, transfers = run.step(Request.RUN), Request.RUN, set(), 0.0, 0

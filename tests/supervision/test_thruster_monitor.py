@@ -88,7 +88,7 @@ def later(begin, steps, factor, load=NONE, first=WARM):
 @jax.jit
 def each_lost(begin, factors):
     """What is found lost 50 steps later, for several sets of failed thrusters."""
-    return jax.vmap(lambda factor: later(begin, 50, factor)[0].lost)(factors)
+    return jax.vmap(lambda factor: followed(*begin, WARM, 50, CHANGING, factor, NONE)[0].lost)(factors)
 
 
 def test_the_residual_is_the_unexplained_acceleration_behind_two_low_passes():
