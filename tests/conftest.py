@@ -67,8 +67,8 @@ def compile_quickly():
     if "xla_backend_optimization_level" in GIVEN_XLA_FLAGS:
         return
     flags = os.environ["XLA_FLAGS"] + " --xla_backend_optimization_level=0"  # of two, the last counts
-    if jax.__version_info__ < (0, 11):  # later ones know no other emitters, and stop at a flag that they do not know
-        flags += " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
+    if jax.__version_info__ < (0, 11):  # later ones stop at a flag that they do not know
+        flags += " --xla_cpu_parallel_codegen_split_count=1"  # both cores are busy
     os.environ["XLA_FLAGS"] = flags
     os.environ.setdefault("SIMDJIT_OPTIMIZATION", "0")
 
