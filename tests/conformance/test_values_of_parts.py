@@ -43,6 +43,12 @@ def test_values_are_those_that_were_recorded(pairs):
         is_as_recorded(name, values)
 
 
+def test_parameters_are_those_that_were_recorded():
+    """All numbers of every part and of what it is made of, its defaults among them; nothing is compiled."""
+    for pair in ALL:
+        is_as_recorded(f"parameters of {'/'.join(pair)}", eqx.filter(make(*pair), eqx.is_inexact_array))
+
+
 def test_a_value_is_recorded_of_every_part():
     parts = {name for name in json.loads(FILE.read_text()) if name.partition("/")[0] in {kind for kind, _ in ALL}}
     assert parts == {"/".join(pair) for pair in set(ALL) - HEAVY}

@@ -1,0 +1,24 @@
+"""Settings of the observer with constant gains: every blend is a share, above 0 and at most 1."""
+
+import pytest
+
+from undertow.core.errors import BadInput
+from undertow.navigation.observer import observer
+from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+
+SENSORS = (imu, dvl, depth, compass, position_fix, propeller_speed)
+BLENDS = ("imu", "dvl", "compass", "depth", "fix", "propeller")
+
+
+@pytest.mark.parametrize("blend", [0.0, -0.1, 1.5])
+@pytest.mark.parametrize("name", BLENDS)
+def test_a_blend_that_is_no_share(name, blend):
+    with pytest.raises(BadInput) as error:
+        observer([sensor() for sensor in SENSORS], **{f"{name}_blend": blend})
+    assert error.value.name == f"{name}_blend"
+
+
+@pytest.mark.parametrize("name", BLENDS)
+def test_a_blend_of_one_is_a_share(name):
+    built = observer([sensor() for sensor in SENSORS], **{f"{name}_blend": 1.0})
+    assert float(getattr(built.filter, f"{name}_blend")) == 1.0
