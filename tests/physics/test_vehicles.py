@@ -2,10 +2,12 @@
 
 import importlib
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 from textbook import coriolis_matrix, rotation_from_euler
 
 from undertow import vehicles
@@ -72,6 +74,14 @@ def check_digits(values, texts):
 
 
 every_hull = pytest.mark.parametrize("name, variant", list(variants("PARAMETERS")))
+
+
+def test_numbers_of_every_variant_are_those_that_were_recorded():
+    """All of them; the sheets below hold the few that are printed in the sources or follow from others."""
+    for name, hull in variants("PARAMETERS"):
+        is_as_recorded(f"hull of {name}, {hull}", eqx.filter(make(name, hull), eqx.is_inexact_array))
+    for name, layout in variants("LAYOUTS"):
+        is_as_recorded(f"thrusters of {name}, {layout}", make(name, layout=layout).thruster_matrix())
 
 
 def test_every_variant_has_a_sheet():
