@@ -120,6 +120,26 @@ def test_sensor(kind):
     altered(differs)
 
 
+def test_a_lagging_sensor_follows_by_implicit_euler():
+    """dv/dt = (reading - v) / tau from the onset on, with the time since the last control step."""
+    (kind,) = [kind for kind in KINDS if (kind.target, kind.mode) == ("sensor dvl", "slow")]
+    navigation = with_fault(kind).navigation
+    place, tau = SENSORS.index("dvl"), 0.5
+    readings = [np.array([0.3, -0.2, 0.1]) * (k + 1) for k in range(STEPS)]
+    silent = [Received(jnp.zeros(width), jnp.asarray(False), 0.0) for width in (8, 3, 1, 1, 2, 8)]
+    received = lambda k: (
+        *silent[:place],
+        silent[place]._replace(reading=jnp.asarray(readings[k])),
+        *silent[place + 1 :],
+    )
+    state, lagging = navigation.faults.init([one.reading for one in received(0)]), readings[0]
+    for k in range(STEPS):
+        found, state = navigation.faults.received(jax.random.PRNGKey(2), state, jnp.asarray(k * DT), received(k))
+        share = DT / (DT + tau) if FIRST <= k < STOP else 1.0
+        lagging = lagging + share * (readings[k] - lagging)
+        np.testing.assert_allclose(found[place].reading, lagging, rtol=1e-9)
+
+
 @kinds_of("thruster", "bus")
 def test_input(kind):
     faults = with_fault(kind).faults
