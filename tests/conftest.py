@@ -101,15 +101,20 @@ def pytest_ignore_collect(collection_path, config):
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Every test is `quick`, or `full`, or by itself, also where its file or its other cells have the mark `full`."""
-    every = [{mark.name for mark in item.iter_markers()} for item in items]
-    for item, marks in zip(items, every, strict=True):
+def pytest_collection_modifyitems(items, config):
+    """Every test is `quick`, or `full`, or by itself: then only an expression that names its mark has it run.
+
+    So a slow test does not run with the rest of its file, whatever the mark of the file.
+    """
+    named = BY_THEMSELVES & set(re.findall(r"\w+", config.getoption("-m")))
+    kept, left_out = [], []
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()}
         if not marks & BY_THEMSELVES:
             item.add_marker("full" if marks & IN_THE_FULL_SET else "quick")
-            continue
-        for node in (item, item.getparent(pytest.Module)):
-            node.own_markers = [mark for mark in node.own_markers if mark.name != "full"]
+        (kept if marks & BY_THEMSELVES <= named else left_out).append(item)
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = kept
 
 
 def pytest_unconfigure(config):
