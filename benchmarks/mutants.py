@@ -31,12 +31,13 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
 ROOT = Path(__file__).parents[1]
-ROOMS = {
-    "core": ("core", "numerics", "estimation"),
-    "physics": ("vehicles", "thrusters", "power", "disturbances", "sensors", "plants", "faults"),
-    "control": ("controllers", "references", "navigation", "supervision"),
-    "simulation": ("loop",),
-}
+# Core, physics, control and simulation.
+ROOMS = (
+    *("core", "numerics", "estimation"),
+    *("vehicles", "thrusters", "power", "disturbances", "sensors", "plants", "faults"),
+    *("controllers", "references", "navigation", "supervision"),
+    "loop",
+)
 # Operators that need arguments, and unions of types, which compute nothing.
 LEFT_OUT = re.compile(r"Variable|RemoveDecorator|BitOr|ExceptionReplacer")
 # What a test of the whole program prints for a test that failed.
@@ -64,7 +65,7 @@ class Mutant(NamedTuple):
         return " -> ".join(line.strip() for line in changed[0]) if changed else "?"
 
 
-def annotation_lines(source: str) -> set[tuple[int, int]]:
+def annotation_positions(source: str) -> set[tuple[int, int]]:
     """Positions (line, column) inside annotations, which compute nothing."""
     found = set()
     for node in ast.walk(ast.parse(source)):
@@ -76,7 +77,7 @@ def annotation_lines(source: str) -> set[tuple[int, int]]:
 
 def sites_of(path: Path) -> dict[tuple[int, int], list[Mutant]]:
     """Every place of a file that can be changed, with the changes that are possible there."""
-    tree, ignored = get_ast_from_path(path), annotation_lines(path.read_text())
+    tree, ignored = get_ast_from_path(path), annotation_positions(path.read_text())
     sites: dict[tuple[int, int], list[Mutant]] = {}
     for name in operator_names():
         if LEFT_OUT.search(name):
@@ -101,8 +102,7 @@ def is_python(mutant: Mutant) -> bool:
 
 def sample(count: int, seed: int) -> list[Mutant]:
     """Mutants, each at another site."""
-    rooms = [ROOT / "undertow" / room for rooms in ROOMS.values() for room in rooms]
-    files = [file for room in rooms for file in sorted(room.rglob("*.py"))]
+    files = [file for room in ROOMS for file in sorted((ROOT / "undertow" / room).rglob("*.py"))]
     sites = [mutants for file in files for mutants in sites_of(file).values()]
     chance = random.Random(seed)
     chance.shuffle(sites)
@@ -111,12 +111,13 @@ def sample(count: int, seed: int) -> list[Mutant]:
 
 
 class Copy:
-    """A copy of the tracked files with caches of its own, in which mutants stand one after the other."""
+    """A copy of all files but ignored ones, with caches of its own, in which mutants stand one after the other."""
 
     def __init__(self, folder: Path, tests: str):
         self.project, self.caches, self.tests = folder / "project", folder / "caches", tests
-        command = ["git", "ls-files"]
-        for name in subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
+        command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+        names = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+        for name in names:
             (self.project / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, self.project / name)
 
@@ -146,6 +147,11 @@ class Copy:
         return found if found or ended.returncode == 0 else [f"pytest ended with {ended.returncode}"]
 
 
+def described(number: int, mutant: Mutant) -> list[str]:
+    """Number, place and change."""
+    return [str(number), f"{mutant.path}:{mutant.line}", mutant.change()]
+
+
 def main() -> None:
     """Sample, test, and write a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -159,19 +165,22 @@ def main() -> None:
     options = parser.parse_args()
     mutants = sample(options.count, options.seed)
     numbers = [int(number) for number in options.only.split(",")] if options.only else list(range(len(mutants)))
+    if options.list:
+        for number in numbers:
+            print(*described(number, mutants[number]), sep=" | ")
+        return
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder), options.tests)
         if options.together:
             print(*copy.failures([mutants[number] for number in numbers]), sep="\n")
             return
-        if not options.list and (broken := copy.failures([])):
+        if broken := copy.failures([]):
             sys.exit(f"Without a mutant these tests fail: {' '.join(broken)}")
         rows = []
         for number in numbers:
-            mutant = mutants[number]
-            killers = [] if options.list else copy.failures([mutant])
-            verdict = "" if options.list else "killed" if killers else "survived"
-            rows.append([number, f"{mutant.path}:{mutant.line}", mutant.change(), verdict, " ".join(killers[:1])])
+            killers = copy.failures([mutants[number]])
+            verdict = "killed" if killers else "survived"
+            rows.append([*described(number, mutants[number]), verdict, " ".join(killers[:1])])
             print(*rows[-1], sep=" | ", flush=True)
     if options.out:
         with options.out.open("w", newline="") as file:
