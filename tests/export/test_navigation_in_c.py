@@ -65,7 +65,7 @@ def test_every_bit_is_that_of_the_batch_compiler(tmp_path, kind, precision):
     assert not re.search(r"\b(malloc|calloc|free|printf)\b", (tmp_path / "navigation.c").read_text())
 
 
-@pytest.mark.parametrize("kind", ["observer", pytest.param("kalman", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["observer", "kalman"])
 def test_a_loop_in_c_is_the_loop_in_python(tmp_path, kind):
     scenario = SCENARIO | {"navigation": {"kind": kind, "sensors": SENSORS}}
     export_navigation(build(from_data(scenario))).write(tmp_path)

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.interop
 
 SHORT = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
-    "controller": {"kind": "pid", "frequency": 2.0},
+    "controller": {"kind": "rcaf", "preset": "robust"},
     "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 5},
     "disturbance": {"kind": "random_suite"},
     "navigation": {"kind": "white_noise", "position": 0.001, "velocity": 0.01},

@@ -17,10 +17,9 @@ from undertow.scenario.reading import from_data
 
 pytestmark = pytest.mark.interop
 
-# A law with few states on many axes; that of the pendulum has many states, and learns.
 AUV = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
-    "controller": {"kind": "pid", "frequency": 2.0},
+    "controller": {"kind": "rcaf", "preset": "robust"},
     "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 5},
     "disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]},
     "navigation": {"kind": "white_noise", "position": 0.001, "velocity": 0.01},

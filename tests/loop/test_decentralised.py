@@ -29,9 +29,6 @@ START = np.array([0.0, 0, 0, 0, 0, 0.1, -4.2, 0.3, 0, 0, 0, -0.2])
 GOAL = np.array([0.3, -0.2, 0.1, 0, 0, 0.2, -4.5, 0.1, 0.2, 0.1, 0, -0.1])
 
 
-THRUSTER = t200(fidelity="static")  # what is tested here does not depend on it
-
-
 def robust(model):
     return rcaf(model, preset="robust", sampling_time=0.01)
 
@@ -42,7 +39,7 @@ def run(plant, law, goal, start, simulate=simd_batch.simulate, navigation=None):
 
 
 def pair(link="none"):
-    return two_vehicles(bluerov2_heavy(), THRUSTER, second_vehicle=bluerov2(), link=link, length=3.5)
+    return two_vehicles(bluerov2_heavy(), t200(), second_vehicle=bluerov2(), link=link, length=3.5)
 
 
 @pytest.mark.full
@@ -51,7 +48,7 @@ def test_without_a_link_each_run_is_that_of_the_vehicle_alone():
     plant = pair()
     found, _ = run(plant, decentralised(plant.model(), robust), GOAL, START)
     for i, hull in enumerate((bluerov2_heavy(), bluerov2())):
-        alone, axes = hybrid_vehicle(hull, THRUSTER, ledger=False), slice(6 * i, 6 * i + 6)
+        alone, axes = hybrid_vehicle(hull, t200(), ledger=False), slice(6 * i, 6 * i + 6)
         expected, _ = run(alone, robust(alone.model()), GOAL[axes], START[axes])
         actuators = slice(0, 8) if i == 0 else slice(8, None)
         for name, part in (("position", axes), ("estimate", axes), ("input", actuators)):
@@ -139,7 +136,7 @@ def test_a_plant_of_one_part_has_one_law():
 
 def test_composite_of_different_plants():
     """Blocks of a plant with 2 outputs and one with 6; the inverse of each is its own."""
-    arm, rov = two_link_arm().model(), hybrid_vehicle(bluerov2_heavy(), THRUSTER).model()
+    arm, rov = two_link_arm().model(), hybrid_vehicle(bluerov2_heavy(), t200()).model()
     both = composite_model((arm, rov), (2, 8))
     y = both.coordinates.measurement(jnp.linspace(-0.5, 0.7, 8), jnp.linspace(0.3, -0.2, 8))
     demanded = jnp.linspace(1, -1, 8)

@@ -56,7 +56,7 @@ def run_of(built):
     return link
 
 
-@pytest.mark.parametrize("navigation", [NOISY, {"kind": "observer"}, None])
+@pytest.mark.parametrize("navigation", [NOISY, {"kind": "kalman"}, None])
 def test_every_bit_is_that_of_a_simulation(navigation, heavy_data):
     scenario = PENDULUM if navigation is None else heavy_data | {"navigation": navigation}
     link, record = run_of(build(from_data(scenario))), ut.simulate_scenario(scenario).dataset

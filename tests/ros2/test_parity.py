@@ -23,7 +23,7 @@ pytestmark = pytest.mark.interop
 # Thrusters reach their limits at the start.
 SCENARIO = """
 plant: {vehicle: bluerov2_heavy, thruster: {kind: t200, supply: 16}}
-controller: {kind: pid, frequency: 2}
+controller: {kind: rcaf, preset: robust}
 reference: {kind: setpoint, position: [4, 1, 1, 0, 0, 0.5], settling: 2}
 disturbance: {kind: current, velocity: [0.3, 0.2, 0]}
 loop: {duration: 2, dt: 0.01, record: 0.01}

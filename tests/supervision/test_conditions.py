@@ -44,7 +44,7 @@ class Tampering(NamedTuple):
     target: np.ndarray = np.zeros(6)  # added to the target
     report: float = 0.0  # added to the reported speeds of the propellers
     dt: float = T  # that the controller is told
-    replaced: float = 0.0  # 1: the controller is told another applied input
+    replaced: float = 0.0  # 1: the applied input is another one
     applied: float = 0.0  # which
     request: float = 0.0  # of the operator
 
@@ -109,7 +109,7 @@ def on_axes(name: str):
 
 
 class Stepped:
-    """A supervised law that watches a plant which another law moves; what it is told can be tampered with."""
+    """A supervised law that watches a plant which another law moves; what it is given can be tampered with."""
 
     def __init__(self, plant, supervised):
         mover = ut.controllers.pid(plant.model(), sampling_time=T)
@@ -184,8 +184,8 @@ def _step(parts, t, now, how):
     y = y._replace(actuator=jax.tree.map(lambda speed: speed + how.report, y.actuator))
     z = z._replace(law=(z.law[0], _of_law(how)), request=how.request.astype(int))
     output, _ = supervised.command(z, y, r)
-    told = jnp.where(how.replaced > 0, how.applied, plant.admissible(x, output))
-    z = supervised.advance(z, y, r, told, how.dt)
+    reported = jnp.where(how.replaced > 0, how.applied, plant.admissible(x, output))
+    z = supervised.advance(z, y, r, reported, how.dt)
     u, _ = mover.command(moving, truth, _target(t, Tampering()))
     applied = plant.admissible(x, u)
     motion = lambda t, x: plant.dynamics(t, x, applied, plant.no_load())
@@ -230,6 +230,9 @@ def stepped(make, name: str) -> Stepped:
     return Stepped(*make(name))
 
 
+ON_BOTH = pytest.mark.parametrize("make", [on_axes, pytest.param(vehicle, marks=pytest.mark.full)])
+
+
 def test_every_line_of_the_table_has_a_cause():
     assert set(CAUSES) == set(NAMES)
 
@@ -272,8 +275,9 @@ def test_a_condition_leads_to_its_state_in_its_time(make, name):
         assert run.states[-1][1] == name
 
 
-def test_output_that_is_not_finite_never_leaves():
-    run = stepped(on_axes, "")
+@ON_BOTH
+def test_output_that_is_not_finite_never_leaves(make):
+    run = stepped(make, "")
     run.restart()
     run.steps(0.1)
     run.steps(0.1, Tampering(spoil=1.0))
@@ -292,17 +296,19 @@ def test_codes_of_reasons(reason):
     assert reason_of(code_of(reason)) == reason
 
 
-def test_one_stuck_entry_is_found():
-    run = stepped(on_axes, "")
+@ON_BOTH
+def test_one_stuck_entry_is_found(make):
+    run = stepped(make, "")
     run.restart()
     run.steps(0.6, Tampering(hold_north=1.0))
     assert run.states[-1] == (State.DEGRADED, "measurement_stuck")
     assert set(run.states[:8]) == {(State.ACTIVE, "")}
 
 
-def test_a_reference_that_nothing_can_follow_is_rejected():
+@ON_BOTH
+def test_a_reference_that_nothing_can_follow_is_rejected(make):
     """A target 9999 m away for one step leaves no allowance behind; one beyond 10 km is rejected."""
-    run = stepped(on_axes, "")
+    run = stepped(make, "")
     run.restart()
     run.steps(0.2)
     run.step(Tampering(target=_only(1, 9999.0)))
@@ -312,8 +318,9 @@ def test_a_reference_that_nothing_can_follow_is_rejected():
     assert run.states[-1] == (State.DEGRADED, "reference_rejected")
 
 
-def test_whatever_was_applied_the_output_keeps_to_its_limits():
-    run = stepped(on_axes, "")
+@ON_BOTH
+def test_whatever_was_applied_the_output_keeps_to_its_limits(make):
+    run = stepped(make, "")
     run.restart()
     high = np.asarray(run.parts[2].watch.high)
     for request, applied in ((0, 1e6), (1, 1e6), (1, -1e300), (0, np.inf), (0, np.nan), (0, 1e30)):
@@ -348,11 +355,12 @@ def test_codes_of_a_damaged_memory():
     assert (reason_of(1234), reason_of(-7), state_of(99)) == ("", "", State.INIT)
 
 
+@ON_BOTH
 @pytest.mark.parametrize(
     "field", ["time", "output", "variation", "restarts", "cause", "safe_for", "gate", "conditions", "law"]
 )
-def test_damage_to_the_memory_never_leaves_and_is_mended(field):
-    run = stepped(on_axes, "")
+def test_damage_to_the_memory_never_leaves_and_is_mended(make, field):
+    run = stepped(make, "")
     run.restart()
     run.steps(0.2)
     spoilt = jax.tree.map(lambda leaf: jnp.full_like(leaf, jnp.nan) if leaf.dtype == float else leaf, run.z)

@@ -14,14 +14,12 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, linear_plant, two_link_arm
+from undertow.plants import double_integrator, hybrid_vehicle, two_link_arm
 from undertow.references import setpoint
 from undertow.thrusters import t200
 from undertow.vehicles import bluerov2_heavy
 
 DT = 1e-2
-# Two coupled axes with drift.
-GAIN, STIFFNESS, DAMPING = [[2.0, 0.3], [0.5, 1.5]], [[-0.4, 0.1], [0.2, -0.6]], [[-0.5, 0.2], [0.1, -0.3]]
 
 
 def run(plant, law, goal, disturbance=None, duration=4.0, simulate=sampled.simulate, **start):
@@ -32,7 +30,7 @@ def run(plant, law, goal, disturbance=None, duration=4.0, simulate=sampled.simul
 @pytest.mark.full
 def test_without_limits_it_is_a_pid():
     """k_p = k p + k_i, k_i p and k; from a start without error, where both integrals begin with the same."""
-    plant, load = linear_plant(GAIN, STIFFNESS, DAMPING), sinusoid(2.0, 3.0, offset=[1.0, -0.5])
+    plant, load = two_link_arm(), sinusoid(2.0, 3.0, offset=[1.0, -0.5])
     p, k, i = 1.2, 6.0, 2.5
     nested = cascade(plant.model(), sampling_time=DT, outer=p, inner=k, integral=i)
     flat = pid(plant.model(), sampling_time=DT, gains=(k * p + i, i * p, k))

@@ -11,7 +11,7 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, linear_plant
+from undertow.plants import double_integrator, two_link_arm
 from undertow.references import setpoint
 
 DT = 1e-2
@@ -47,7 +47,7 @@ def test_error_at_a_frequency_is_that_of_a_first_order_observer():
 
 @pytest.mark.full
 def test_a_constant_load_leaves_no_error():
-    plant = linear_plant([[2.0, 0.3], [0.5, 1.5]], [[-0.4, 0.1], [0.2, -0.6]], [[-0.5, 0.2], [0.1, -0.3]])
+    plant = two_link_arm()
     law = disturbance_observer(plant.model(), sampling_time=DT)
     found = run(plant, law, [0.4, -0.3], sinusoid(0.0, 1.0, offset=[2.0, -1.0]), duration=20.0)
     np.testing.assert_allclose(found.signals["error"][-1], 0.0, atol=1e-6)

@@ -9,11 +9,8 @@ from undertow.disturbances import none, sinusoid
 from undertow.loop import sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import perfect
-from undertow.plants import double_integrator, linear_plant
+from undertow.plants import double_integrator, two_link_arm
 from undertow.references import setpoint
-
-# Two coupled axes with drift.
-GAIN, STIFFNESS, DAMPING = [[2.0, 0.3], [0.5, 1.5]], [[-0.4, 0.1], [0.2, -0.6]], [[-0.5, 0.2], [0.1, -0.3]]
 
 
 def run(plant, law, goal, disturbance=None, duration=4.0, dt=1e-2, simulate=sampled.simulate, **start):
@@ -49,7 +46,7 @@ def test_a_constant_load_gives_the_bound_itself_and_leaves_a_known_share():
 @pytest.mark.full
 def test_with_a_slow_predictor_it_is_the_disturbance_observer():
     """For a_s T to 0 the filter of sigma_hat is the first-order observer of the same bandwidth."""
-    plant, load = linear_plant(GAIN, STIFFNESS, DAMPING), sinusoid(1.0, 2.0, offset=[1.0, -0.5])
+    plant, load = two_link_arm(), sinusoid(1.0, 2.0, offset=[1.0, -0.5])
     same = {"sampling_time": 1e-2, "bandwidth": [5.0, 9.0], "tracking": 2.5}
     adaptive = run(plant, l1_adaptive(plant.model(), predictor=1e-8, **same), [0.3, -0.2], load)
     observer = run(plant, disturbance_observer(plant.model(), **same), [0.3, -0.2], load)

@@ -271,14 +271,15 @@ def test_what_is_said_of_moving_weights(sets, said):
 
 
 def test_a_law_that_learns_is_predicted_without_what_it_learns():
-    """A memory adds nothing to the fast part of the loop, and hundreds of states and an oscillation to the rest."""
+    """A memory adds nothing to the fast part of the loop, and thousands of states and an oscillation to the rest."""
 
     def at(preset):
         scenario = {
-            "plant": {"kind": "double_integrator", "axes": 3, "limit": 5.0},
-            "controller": {"kind": "rcaf", "preset": preset} | ({"probing": 0.1} if preset == "learning" else {}),
-            "reference": {"kind": "setpoint", "position": [0.0] * 3},
-            "disturbance": [{"kind": "sinusoid", "amplitude": [0.3, 0.1, 0.0], "frequency": [1.0, 2.0, 1.0]}],
+            "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16.0}},
+            "model": {"rate_term": True},
+            "controller": {"kind": "rcaf", "preset": preset},
+            "reference": {"kind": "setpoint", "position": [0.0] * 6},
+            "disturbance": [{"kind": "current", "velocity": [0.2, 0.1, 0.0]}],
             "loop": {"dt": 0.01, "duration": 30.0},
         }
         return operating_point(build(from_data(scenario)))
