@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from two_axes import DT, V, X
 
 from undertow import controllers
 from undertow.controllers.actuation import Given, actuation_for
@@ -25,9 +26,7 @@ from undertow.controllers.neural import Weights
 from undertow.core.contracts import Measurement, Target, TrackingError
 from undertow.plants import double_integrator
 
-DT = 0.02
 MODEL = double_integrator(2, limit=4.0).model()
-X, V = np.array([0.3, -0.2]), np.array([0.4, -0.7])
 E, R, A = np.array([0.5, -0.3]), np.array([-0.2, 0.6]), np.array([0.1, -0.4])
 KNOWN, MISSING = np.array([0.7, -1.1]), np.array([0.25, -0.35])
 CASES = {"begins": (0, 1.0), "runs": (1, 1.0), "limited": (1, 0.6)}

@@ -1,4 +1,4 @@
-"""One step of the paper's law, of the robust one and of its memory, against their equations written out in NumPy.
+"""One step of the paper's law, of the robust one and of its filter of jumps, against their equations written out in NumPy.
 
 On two coupled axes with drift, so that neither F nor G may be left out; everything is traced into few programs.
 """
@@ -9,32 +9,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
+from two_axes import DRIFT, DT, GAINS, GOAL, THETA, A, E, F, G, H, R, V, X, Y, same
 
 from undertow.controllers import rcaf
 from undertow.controllers.composite_law import RCAFState, projected_rate
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
-from undertow.controllers.robust import evidence
 from undertow.controllers.robust.estimator import EstimatorState
-from undertow.controllers.robust.evidence import Evidence
-from undertow.controllers.robust.inertia import InertiaIdentification, InertiaState
-from undertow.controllers.robust.memory import MemoryState, Observed, memory
 from undertow.controllers.robust.robust_law import RobustState
-from undertow.core.contracts import Measurement, Target, TrackingError
+from undertow.core.contracts import Target
 from undertow.estimation.fuzzy_system import FuzzySystem, gaussian_sets
 from undertow.plants import double_integrator, linear_plant
 
-DT = 0.02
-G, F, H = np.array([[2.0, 0.3], [0.5, 1.5]]), np.array([[-0.4, 0.1], [0.2, -0.6]]), np.array([[-0.5, 0.2], [0.1, -0.3]])
 MODEL = linear_plant(G, F, H).model()
-X, V = np.array([0.3, -0.2]), np.array([0.4, -0.7])
-Y = Measurement(X, V)
-GOAL = Target(np.array([0.8, -0.5]), np.array([0.2, -0.1]), np.array([0.1, -0.4]))
-E, R, A = GOAL.position - X, GOAL.velocity - V, GOAL.acceleration
-DRIFT = F @ X + H @ V
 APPLIED = np.array([0.3, -0.4])
-GAINS = np.array([[1.0, 2.0], [3.0, 1.5]])
 WEIGHT = np.array([[10.0, 1.0], [1.0, 6.0]])
-RNG = np.random.default_rng(11)
+# What both laws have.
+SHARED = {"feedback": GAINS, "weight": WEIGHT, "robust_gain": [1.2, 0.7], "layer": [2.0, 0.5]}
 
 
 def lyapunov():
@@ -57,28 +47,18 @@ def basis_of(x, centres, widths):
     return weights / weights.sum(-1, keepdims=True)
 
 
-def same(found, expected, **more):
-    for leaf, value in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
-        np.testing.assert_allclose(leaf, value, **({"rtol": 1e-10, "atol": 1e-12} | more))
-
-
 # The paper's law.
 
 GAMMA, SHARE, POLE, OMEGA, PHI_V = 4.0, 3.0, 15.0, np.array([0.2, 0.3]), np.array([0.05, 0.4])
-CHOICES = {
-    "feedback": GAINS,
-    "weight": WEIGHT,
+CHOICES = SHARED | {
     "adaptation": GAMMA,
     "composite": SHARE,
-    "robust_gain": [1.2, 0.7],
-    "layer": [2.0, 0.5],
     "pole": POLE,
     "compensation_gain": OMEGA,
     "compensation_layer": PHI_V,
 }
 MODIFIED = {"leakage": 0.2, "e_modification": 0.6, "dead_zone": [0.0, 0.5]}
 BOX = 0.9
-THETA = np.array([[0.9, -0.9, 0.2, 0.4, -0.1], [0.3, -0.5, 0.8, -0.2, 0.6]])
 PREDICTED = RCAFState(np.array([0.25, -0.1]), np.array([0.9, -0.4]), THETA)
 
 
@@ -175,16 +155,12 @@ def test_many_even_sets_and_uneven_ones_are_gaussians():
 # The robust law, without limits: the filter of jumps waits for nothing, and the target is not moved.
 
 NATURAL, ZETA, LEAK, MU = np.array([8.0, 5.0]), 0.7, 0.4, np.array([0.02, 0.05])
-ROBUST = {
+ROBUST = SHARED | {
     "preset": "robust",
     "sampling_time": DT,
     "bandwidth": NATURAL,
     "damping": ZETA,
-    "feedback": GAINS,
-    "weight": WEIGHT,
     "tracking_share": MU,
-    "robust_gain": [1.2, 0.7],
-    "layer": [2.0, 0.5],
     "weights_bound": [0.905, 0.81],
     "leakage": LEAK,
     "reference_frequency": 0.0,
@@ -292,281 +268,3 @@ def test_the_filter_is_slower_far_away_and_moved_towards_a_vehicle_that_drifted(
     same(after.offset, tuple(left), rtol=1e-5)  # the peak is rounded to four digits
     at = GOAL.position + DT * GOAL.velocity + DT**2 / 2 * A
     same((after.expected, after.elapsed), ((at, GOAL.velocity + DT * A, A), DT))
-
-
-# What the law remembers.
-
-PROBED = {"duration": 50.0, "horizon": 400.0, "window": 5.0, "plausible": 0.4, "error_share": 0.25}
-AMPLITUDE, FREQUENCY, EXPECTED = np.array([0.1, 0.0]), np.array([4.0, 6.0]), np.array([1.2, 0.9])
-
-
-def inertia_state(since):
-    sums = iter(RNG.uniform(0.5, 1.5, (20, 2)))
-    pair = lambda scale: scale * np.stack([next(sums), next(sums)])
-    response = pair(0.02)
-    applied = (1.7 + 0.2j) * 1j * FREQUENCY * (response[0] + 1j * response[1])
-    return InertiaState(
-        angle=np.array([6.2, 1.3]),
-        time=np.array([12.0, 20.0]),
-        counted=np.array([11.0, 15.0]),
-        response=response,
-        applied=np.stack([applied.real, applied.imag]),
-        since=np.array(since),
-        window_response=pair(0.01),
-        window_applied=pair(0.05),
-        window_size=0.1 * next(sums),
-        noise=1e-3 * next(sums),
-        square=np.array([1e-4, 4e-4]),
-    )
-
-
-def response_of(z):
-    """N / (j w V) of complex sums."""
-    v, n = (one[0] + 1j * one[1] for one in (z.response, z.applied))
-    motion = 1j * FREQUENCY * v
-    return (n * motion.conj()).real / np.abs(motion) ** 2, (n * motion.conj()).imag / np.abs(motion) ** 2
-
-
-def standard_error(z):
-    real, _ = response_of(z)
-    size = (np.abs(z.response[0] + 1j * z.response[1]) * FREQUENCY) ** 2
-    beyond = real - np.clip(real, 1 / 2.5, 2.5)
-    return np.sqrt(5.0 * z.noise / (2 * size) + (5.0 / z.counted) ** 4 + beyond**2)
-
-
-def ratio_of(z):
-    real, error = response_of(z)[0], standard_error(z)
-    found = np.clip(EXPECTED + (real - EXPECTED) * 0.16 / (0.16 + error**2), 0.4, 2.5)
-    return np.where(AMPLITUDE > 0, found, EXPECTED)
-
-
-def motion_of(z):
-    left = np.sqrt(1 - z.time / 50.0)
-    size = left * np.minimum(AMPLITUDE, 0.25 * FREQUENCY**2 * np.sqrt(z.square))
-    turning = size * np.exp(1j * z.angle)
-    return turning.imag / FREQUENCY**2, turning.real / FREQUENCY, -turning.imag, size, left
-
-
-def probed(z, error, rate, nominal, free):
-    """Sums one step later, as complex numbers; at the end of a window they enter what is found."""
-    span = free * DT
-    displacement, _, _, size, share = motion_of(z)
-    v = z.window_response[0] + 1j * z.window_response[1] + span * rate * np.exp(-1j * z.angle)
-    n = z.window_applied[0] + 1j * z.window_applied[1]
-    n = n + span * nominal * np.exp(-1j * (z.angle + FREQUENCY * DT / 2))
-    real, imaginary = response_of(z)
-    left = np.abs(n - (real + 1j * imaginary) * 1j * FREQUENCY * v) ** 2 / 5.0
-    total = z.window_size + span * size
-    most = 5.0 * 9.0 * z.noise / z.counted + (total / 2) ** 2 / 5.0
-    ended = z.since + span >= 5.0
-    weight = most / (most + left) if ended else 0.0
-    kept, running = 1 - span / 400.0, 0.0 if ended else 1.0
-    pair = lambda one: np.stack([one.real, one.imag])
-    return InertiaState(
-        angle=np.mod(z.angle + FREQUENCY * DT, 2 * np.pi),
-        time=kept * z.time + span * share**2,
-        counted=kept * z.counted + share**2 * weight * 5.0,
-        response=kept * z.response + share * weight * pair(v),
-        applied=kept * z.applied + share * weight * pair(n),
-        since=running * (z.since + span),
-        window_response=running * pair(v),
-        window_applied=running * pair(n),
-        window_size=running * total,
-        noise=kept * z.noise + share**2 * weight * left,
-        square=z.square + DT / 5.0 * ((error + displacement) ** 2 - z.square),
-    )
-
-
-def test_one_step_of_the_identification_of_inertia():
-    """Within a window, at its end, and while limits bind."""
-    one = InertiaIdentification(AMPLITUDE, FREQUENCY, expected=jnp.asarray(EXPECTED), **PROBED)
-    error, rate, nominal = np.array([0.02, -0.01]), np.array([0.03, 0.05]), np.array([0.2, -0.3])
-    states = [inertia_state(since) for since in (1.0, 4.99, 4.99)]
-
-    @jax.jit
-    @jax.vmap
-    def step(z, free):
-        told = one.ratio(z), one.used(z), one.error(z), one.motion(z)
-        return told, one.advance(z, *map(jnp.asarray, (error, rate, nominal)), free, jnp.asarray(DT))
-
-    frees = np.array([1.0, 1.0, 0.0])
-    told, after = step(jax.tree.map(lambda *each: np.stack(each), *states), frees)
-    for place, (z, free) in enumerate(zip(states, frees, strict=True)):
-        ratio, used, found_error, motion = (np.asarray(each)[..., place, :] for each in (*told[:3], np.stack(told[3])))
-        np.testing.assert_allclose(ratio, ratio_of(z), rtol=1e-4)  # what is too small to be judged is left out here
-        np.testing.assert_allclose(used, np.maximum(ratio, 1.0))
-        np.testing.assert_allclose(found_error, np.where(AMPLITUDE > 0, standard_error(z), 1e3), rtol=1e-4)
-        same(motion, np.stack(motion_of(z)[:3]))
-        same([leaf[place] for leaf in after], list(probed(z, error, rate, nominal, free)), rtol=1e-5)
-
-
-def test_what_is_implausible_or_not_seen_is_doubted():
-    """An inertia of five is taken for 2.5 at most, and its excess for an error; before two windows nothing is known."""
-    one = InertiaIdentification(AMPLITUDE[:1], FREQUENCY[:1], plausible=1e3, window=5.0)
-    still = jax.tree.map(np.asarray, one.init(1))
-    v = 0.3 + 0.4j
-    n = 5.0 * 1j * 4.0 * v
-    heavy = still._replace(
-        response=np.array([[v.real], [v.imag]]), applied=np.array([[n.real], [n.imag]]), counted=np.array([1e6])
-    )
-    told = jax.jit(jax.vmap(lambda z: (one.ratio(z), one.error(z))))
-    ratio, error = told(jax.tree.map(lambda *each: np.stack(each), still, heavy))
-    np.testing.assert_allclose(ratio[:, 0], [1.0, 2.5])
-    np.testing.assert_allclose(error[:, 0], [1000.0, 2.5], rtol=1e-6)
-
-
-JUDGING, HORIZON, RATE = 20.0, 60.0, 7.0
-
-
-def best_share(found):
-    """g of least squares and twice its standard error, with a correlation time of 1 s."""
-    left = found.alone * found.explained - found.shared**2
-    return found.shared / found.explained, 2 * np.sqrt(left / max(float(found.time), 1.0)) / found.explained
-
-
-def test_evidence_counts_and_forgets():
-    before = Evidence(np.array(3.0), *np.array([[4e-3, 5e-3], [1e-3, -2e-3], [3e-3, 6e-3]]))
-    unsure = before._replace(explained=np.array([1e-13, 6e-3]))
-    new = np.array([[0.05, -0.03], [0.02, 0.04]])
-    rules = lambda found: (*evidence.best_share(found), evidence.trust(found), evidence.wrong(found))
-    told = jax.jit(
-        lambda *each: (evidence.gathered(each[0], *new, jnp.asarray(DT), JUDGING), *(rules(one) for one in each))
-    )
-    after, found, doubtful = told(*jax.tree.map(jnp.asarray, (before, unsure)))
-    fresh = (1.0, new[0] ** 2, new[0] * new[1], new[1] ** 2)
-    same(after, tuple((1 - DT / JUDGING) * old + DT * one for old, one in zip(before, fresh, strict=True)))
-    share, spread = best_share(before)
-    wrong = np.clip(np.abs(share - 1) - spread, 0, 1).max()
-    same(found, (share, spread, np.clip(share + spread, 0, 1), wrong))
-    assert 0 < found[2][1] < 1 or found[2][1] == 0
-    same((doubtful[0][0], doubtful[1][0], doubtful[2][0]), (1.0, 1.0, 1.0))
-
-
-def remembered(inertia):
-    """A memory of two axes with a linear regressor of seven entries, and a state of it."""
-    part = memory(
-        2, regressor="linear", speeds=[0.5, 0.8], horizon=HORIZON, learning_rate=RATE, bound=0.6, judging_time=JUDGING,
-        inertia=inertia,
-    )  # fmt: skip
-    root = RNG.normal(size=(7, 7))
-    state = MemoryState(
-        weights=RNG.uniform(-0.6, 0.6, (7, 2)),
-        covariance=root @ root.T / 7,
-        lagged=RNG.normal(size=7),
-        ahead=0.1 * RNG.normal(size=7),
-        evidence=Evidence(np.array(9.0), *np.array([[4e-4, 5e-3], [4e-4, 5e-3], [3e-3, 6e-3]])),
-        taken=np.array([0.1, -0.2]),
-        inertia=None if inertia is None else inertia_state(4.99),
-    )
-    return part, state
-
-
-@pytest.mark.parametrize("with_inertia", [False, True])
-def test_one_step_of_the_memory(with_inertia):
-    """Recursive least squares that forgets what is excited; the observer loses what the memory gains."""
-    one = InertiaIdentification(AMPLITUDE, FREQUENCY, expected=jnp.asarray(EXPECTED), **PROBED)
-    part, z = remembered(one if with_inertia else None)
-    seen = Observed(*RNG.normal(size=(6, 2)) * 0.3)
-    gains, off = (np.array(0.2), np.array(1.9)), TrackingError(E, R, A)
-
-    @jax.jit
-    def step(z, free):
-        phi = part.regressors(Y, jnp.asarray(V), off, False)
-        rules = part.value(z, phi, seen.correction), part.inertia_ratio(z), part.probing(z, jnp.asarray(GAINS))
-        return phi, rules, part.advance(z, phi, seen, gains, free, jnp.asarray(DT))
-
-    share = (V + R) / [0.5, 0.8]
-    phi = np.concatenate([[1.0], A, share, share * np.abs(share)])
-    given = jax.tree.map(jnp.asarray, z)
-    best, spread = best_share(z.evidence)
-    trust, wrong = np.clip(best + spread, 0, 1), np.clip(np.abs(best - 1) - spread, 0, 1).max()
-    assert 0 < trust.min() < 1
-    assert wrong > 0
-    h, probing = np.ones(2), np.zeros(2)
-    if with_inertia:
-        h, moved = np.maximum(ratio_of(z.inertia), 1.0), motion_of(z.inertia)
-        assert h[0] > 1
-        probing = moved[2] + GAINS[:, 0] * moved[0] + GAINS[:, 1] * moved[1]
-    value = trust * (z.weights.T @ phi) + (1 - h) * seen.correction
-    for free in (1.0, 0.0):
-        found_phi, rules, (after, lost) = step(given, free)
-        same(found_phi, phi)
-        same(rules, (value, h, probing), rtol=1e-4)
-        innovation = h * seen.rest - (1 - trust) * (z.weights.T @ z.lagged)
-        towards = z.covariance @ z.lagged
-        size = DT * z.lagged @ towards
-        kept = 1 - DT / HORIZON / size
-        assert 0 < kept < 1
-        explained = z.weights.T @ z.ahead
-        alone = h * seen.error + trust * explained
-        reopened = wrong * free * DT / JUDGING
-        expected = {
-            "weights": np.clip(z.weights + free * DT / (1 + size) * np.outer(towards, innovation), -0.6, 0.6),
-            "covariance": z.covariance
-            - kept * free * DT / (1 + kept * size) * np.outer(towards, towards)
-            + reopened * (RATE * np.eye(7) - z.covariance),
-            "lagged": z.lagged - 1.9 * z.ahead,
-            "ahead": z.ahead + DT * (z.lagged - phi) - 0.2 * z.ahead,
-        }
-        for name, wanted in expected.items():
-            same(getattr(after, name), wanted, rtol=1e-4)
-        fresh = (1.0, alone**2, alone * explained, explained**2)
-        forgets = 1 - free * DT / JUDGING
-        same(
-            after.evidence,
-            tuple(forgets * old + free * DT * one for old, one in zip(z.evidence, fresh, strict=True)),
-            rtol=1e-4,
-        )
-        later, later_spread = best_share(after.evidence)
-        after_trust = np.clip(later + later_spread, 0, 1)
-        after_h = np.ones(2)
-        if with_inertia:
-            nominal = seen.nominal + trust * (z.weights.T @ phi)
-            same(list(after.inertia), list(probed(z.inertia, seen.off, seen.rate, nominal, free)), rtol=1e-5)
-            after_h = np.maximum(ratio_of(jax.tree.map(np.asarray, after.inertia)), 1.0)
-        gained = after_trust * (np.asarray(after.weights).T @ phi) + (1 - after_h) * seen.correction - value
-        same((lost, after.taken - z.taken), (gained / after_h, gained / after_h), rtol=1e-3, atol=1e-6)
-
-
-def test_the_law_uses_what_it_remembers():
-    """Command and estimator of preset `learning` with an inertia that is known: on what the memory itself gives."""
-    law = rcaf(
-        double_integrator(2).model(), preset="learning", sampling_time=DT, bandwidth=6.0, feedback=GAINS, damping=1.0,
-        reference_frequency=0.0, actuator_rate=9.0, regressor="linear", probing=[0.1, 0.2], weights_bound=50.0,
-    )  # fmt: skip
-    probed = law.memory.inertia
-    np.testing.assert_array_equal(probed.amplitude, [0.1, 0.2])
-    np.testing.assert_allclose(probed.frequency, np.sqrt(np.sqrt(GAINS[:, 0]) * 6.0) * [0.8, 1.2])
-    part, kept = remembered(InertiaIdentification(AMPLITUDE, FREQUENCY, expected=jnp.asarray(EXPECTED), **PROBED))
-    law = eqx.tree_at(lambda law: law.memory, law, part)
-    z = RobustState(EstimatorState(np.array([0.9, -0.4]), THETA), (), None, kept)
-
-    double, eps = 1 - np.exp(-6.0 * DT), np.array([0.9, -0.4]) - V
-
-    @eqx.filter_jit
-    def step(z):
-        u, signals = law.command(z, Y, GOAL)
-        phi = part.regressors(Y, jnp.asarray(V), TrackingError(E, R, A), False)
-        observer, h = law.estimator.estimate(z.estimator, jnp.asarray(V)), part.inertia_ratio(z.memory)
-        desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + part.probing(z.memory, jnp.asarray(GAINS))
-        rest = observer.uncertainty
-        correction = desired - A - rest
-        value = signals["memory_trust"] * (kept.weights.T @ phi) + (1 - h) * correction
-        # What differs from the desired acceleration acts on the inertia that was learnt.
-        known = u + (1 / h - 1) * (u + rest + value - desired)
-        observed = Observed(rest, eps, jnp.asarray(E), correction, jnp.asarray(-R), u - A)
-        gains = jnp.asarray(2 * double), jnp.asarray(double**2 / DT)
-        remembered, lost = part.advance(z.memory, phi, observed, gains, jnp.ones(()), jnp.asarray(DT))
-        alone = law.estimator.advance(z.estimator, observer, known, jnp.zeros(2), jnp.asarray(DT))
-        expected = value, rest + value, desired - rest - value, known + rest + value, h, remembered, lost, alone
-        return u, signals, law.advance(z, Y, GOAL, u, jnp.asarray(DT)), expected
-
-    u, signals, after, expected = jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, z)))
-    value, estimate, force, acceleration, h, memory_after, lost, alone = expected
-    assert h.max() > 1
-    assert np.abs(value).min() > 0.01
-    same((signals["memory"], signals["estimate"], u), (value, estimate, force))
-    same(signals["memory_variance"], np.diagonal(kept.covariance) / RATE)
-    same(after.estimator.rates, [0.9, -0.4] + DT * acceleration - 2 * double * eps)
-    same(after.memory, memory_after, rtol=1e-8)
-    same(after.estimator.weights, alone.weights - lost[:, None])

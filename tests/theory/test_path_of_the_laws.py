@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import lsq_linear
+from two_axes import DRIFT, DT, F, G, H, V, X, Y
 
 from undertow.controllers import nmpc, pid, policy, rcaf, replay
 from undertow.controllers.actuation import ActuatedState, Given
@@ -20,15 +21,10 @@ from undertow.core.contracts import Measurement, Target, TrackingError
 from undertow.core.errors import BadInput
 from undertow.plants import double_integrator, linear_plant
 
-DT, TAU = 0.02, 0.3
-G, F, H = np.array([[2.0, 0.3], [0.5, 1.5]]), np.array([[-0.4, 0.1], [0.2, -0.6]]), np.array([[-0.5, 0.2], [0.1, -0.3]])
-LIMIT = 1.5
+TAU, LIMIT = 0.3, 1.5
 MODEL = linear_plant(G, F, H, limit=LIMIT).model()
 LAGGED = MODEL._replace(actuators=LaggedActuator(MODEL.actuators, TAU, 2))
-X, V = np.array([0.3, -0.2]), np.array([0.4, -0.7])
-Y = Measurement(X, V)
 GOAL = Target(np.array([1.4, -0.5]), np.array([0.2, -0.1]), np.array([0.1, -0.4]))
-DRIFT = F @ X + H @ V
 OWN, FORCE, APPLIED = np.array([0.3, -0.8]), np.array([0.5, 0.4]), np.array([1.5, -0.6])
 K_P, K_I, K_D, RATE = 4.0, 1.5, 2.0, 7.0
 
@@ -265,9 +261,9 @@ def test_samples_of_a_log_are_held_or_joined():
     rows = np.array([[0.0, 1.0, -1.0], [0.1, 2.0, 3.0], [0.2, 0.0, 5.0], [0.4, 4.0, 1.0]])
     held, joined = replay(MODEL, rows), replay(MODEL, rows, interpolation="linear")
     start = held.init(Y, GOAL)
-    told = jax.jit(jax.vmap(lambda t: [law.command(start._replace(time=t), Y, GOAL)[0] for law in (held, joined)]))
+    commands = jax.jit(jax.vmap(lambda t: [law.command(start._replace(time=t), Y, GOAL)[0] for law in (held, joined)]))
     times = np.array([-0.1, 0.0, 0.0985, 0.0995, 0.15, 0.3, 0.9])
-    steps, lines = told(times)
+    steps, lines = commands(times)
     np.testing.assert_array_equal(steps, rows[[0, 0, 0, 1, 1, 2, 3], 1:])
     expected = [np.interp(times, rows[:, 0], column) for column in rows[:, 1:].T]
     np.testing.assert_allclose(lines, np.transpose(expected), atol=1e-12)
