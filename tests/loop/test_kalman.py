@@ -262,8 +262,8 @@ def test_readings_of_every_sensor_of_any_age():
         )
         state = updated(own, state, np.asarray(0.01), received)
     assert np.abs(state.position - truth.position[-1, :3]).max() < 0.1
-    told = jax.jit(lambda state: (own.diagnostics(state), own.measurement(state)))(state)
-    is_as_recorded("kalman: readings of every sensor", (state, told))
+    read = jax.jit(lambda state: (own.diagnostics(state), own.measurement(state)))(state)
+    is_as_recorded("kalman: readings of every sensor", (state, read))
 
 
 def test_an_angle_may_have_turned_once():

@@ -158,10 +158,10 @@ def observed(sensor, motion, first, step, key, state):
 
     def advance(state, k):
         truth = motion.at(k * step)
-        told, state = sensor.measure(path, state, k * step, truth)
-        apart = told.position - truth.position
+        measured, state = sensor.measure(path, state, k * step, truth)
+        apart = measured.position - truth.position
         apart = apart.at[3:].set(wrap_angle(apart[3:]))
-        return state, jnp.concatenate([apart, told.velocity - truth.velocity])
+        return state, jnp.concatenate([apart, measured.velocity - truth.velocity])
 
     return jax.lax.scan(advance, state, first + jnp.arange(BLOCK, dtype=float))
 

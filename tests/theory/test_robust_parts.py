@@ -310,7 +310,7 @@ def ways(body):
     goal = lambda t: Target(*(m * 0.5**k for k, m in enumerate(motion(0.5 * t + 1.0))))
     wanted = lambda t: coordinates.tracking_error(seen(t), goal(t)).rate + coordinates.velocity(seen(t))
 
-    def told(t):
+    def kinematics(t):
         eta, rate, bend = motion(t)
         y = measurement_of_outputs(eta, rate)
         return {
@@ -322,7 +322,7 @@ def ways(body):
         }
 
     times = 0.1, 0.7, 1.9
-    found = jax.jit(jax.vmap(told))(jnp.asarray(times))
+    found = jax.jit(jax.vmap(kinematics))(jnp.asarray(times))
     return {t: jax.tree.map(lambda leaf, place=place: np.asarray(leaf)[place], found) for place, t in enumerate(times)}
 
 

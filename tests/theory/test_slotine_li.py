@@ -47,7 +47,7 @@ MODELS = {
 }
 
 
-class Told(NamedTuple):
+class Regressor(NamedTuple):
     """What the parametrization of a model says at one motion."""
 
     nominal: Any  # acceleration that belongs to the force of the nominal parameters
@@ -57,13 +57,13 @@ class Told(NamedTuple):
 
 
 @eqx.filter_jit
-def told(model, motion, parameters):
+def regressor_of(model, motion, parameters):
     coordinates, dynamics, (one, other) = model.coordinates, model.dynamics, parameters
     position, rate, wanted, velocity, acceleration = motion
     y = coordinates.measurement(position, rate)
     force = lambda parameters: dynamics.generalized_force(y, parameters, velocity, acceleration)
     nominal = dynamics.generalized_force(y, dynamics.parametrization().nominal, coordinates.velocity(y), wanted)
-    return Told(
+    return Regressor(
         dynamics.accelerated_by(y, nominal),
         wanted - dynamics.drift(y),
         (force(one), force(other), force(0.3 * one + 0.7 * other)),
@@ -82,7 +82,7 @@ def regressor(request):
     motion = [rng.uniform(-0.7, 0.7, n), rng.uniform(-0.7, 0.7, n), *rng.normal(size=(3, n))]
     spread = [np.asarray(structure.most) * rng.uniform(-1, 1, structure.nominal.size) for _ in range(2)]
     parameters = [np.asarray(structure.nominal) + one for one in spread]
-    return request.param, told(model, *jax.tree.map(jnp.asarray, (motion, parameters)))
+    return request.param, regressor_of(model, *jax.tree.map(jnp.asarray, (motion, parameters)))
 
 
 def test_nominal_regressor_is_the_model(regressor):
