@@ -25,6 +25,7 @@ from undertow.supervision.supervisor import supervisor
 from undertow.supervision.transition_log import transitions
 
 T = 0.02
+BLOCK = 50  # steps of a call, at most: a call takes longer than a step
 
 
 class Tampering(NamedTuple):
@@ -115,7 +116,7 @@ class Stepped:
         mover = ut.controllers.pid(plant.model(), sampling_time=T)
         self.parts = (plant, mover, supervised)
         # With the parts inside, a call takes a third of the time that it takes with the parts as arguments.
-        self.compiled = jax.jit(functools.partial(_step, self.parts))
+        self.compiled = jax.jit(functools.partial(_steps, self.parts))
         # All outputs move: a reading that keeps its bits is stuck.
         start = plant.initial_state(0.01 * np.arange(6), np.array([0.3, 0, 0, 0, 0, 0]))
         # As NumPy arrays: what JAX knows of the types of its own would be another program.
@@ -141,16 +142,23 @@ class Stepped:
         return [(int(state), code_of(reason)) for state, reason in self.states]
 
     def step(self, how: Tampering = UNTOUCHED):
-        how = Tampering(*(np.asarray(part, dtype=float) for part in how))
-        self.now, found = self.compiled(np.asarray(self.k * T), (*self.now, self.first), how)
-        output, state, reason = map(np.asarray, found)
-        self.k += 1
-        self.outputs.append(output)
-        self.states.append((State(int(state)), reason_of(int(reason))))
+        self.steps(T, how)
 
     def steps(self, seconds: float, how=UNTOUCHED):
-        for k in range(round(seconds / T)):
-            self.step(how(k) if callable(how) else how)
+        ahead = [how(k) if callable(how) else how for k in range(round(seconds / T))]
+        for first in range(0, len(ahead), BLOCK):
+            self._block(ahead[first : first + BLOCK])
+
+    def _block(self, ahead: list[Tampering]):
+        count = len(ahead)
+        padded = ahead + [UNTOUCHED] * (BLOCK - count)
+        rows = jax.tree.map(lambda *values: np.array(values, dtype=float), *padded)
+        times = T * (self.k + np.arange(BLOCK))
+        self.now, found = self.compiled(np.asarray(count), times, (*self.now, self.first), rows)
+        outputs, states, reasons = (np.asarray(values)[:count] for values in found)
+        self.k += count
+        self.outputs.extend(outputs)
+        self.states.extend((State(int(state)), reason_of(int(reason))) for state, reason in zip(states, reasons, strict=True))
 
 
 @eqx.filter_jit
@@ -171,9 +179,24 @@ def _target(t, how):
     return Target(speed * t + how.target, speed, jnp.zeros(6))
 
 
-def _step(parts, t, now, how):
+def _steps(parts, count, times, now, rows):
+    """As many steps as are counted, each with its row of tampering: states of the end, and what each step gave."""
+    *begun, first = now
+    none = jnp.zeros(BLOCK, dtype=int)
+    found = (jnp.zeros((BLOCK, *parts[2].watch.high.shape)), none, none)
+
+    def one(i, carried):
+        now, found = carried
+        how = jax.tree.map(lambda row: row[i], rows)
+        now, given = _step(parts, times[i], first, now, how)
+        return now, jax.tree.map(lambda values, value: values.at[i].set(value), found, given)
+
+    return jax.lax.fori_loop(0, count, one, (tuple(begun), found))
+
+
+def _step(parts, t, first, now, how):
     plant, mover, supervised = parts
-    x, moving, z, first = now
+    x, moving, z = now
     r, truth = _target(t, how), _reporting(plant.output(t, x))
     read = with_outputs(
         truth, truth.position * how.scale_position + how.add_position, truth.velocity + how.add_velocity
