@@ -1,6 +1,7 @@
 """Every target and every mode, by the methods of the faults themselves: altered while present, bit for bit as it was
 before and afterwards. A mode never sees its target: every pair of both would find the same."""
 
+import dataclasses
 import functools
 
 import equinox as eqx
@@ -9,11 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow import sensors
 from undertow.core.contracts import Measurement, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.faults.kinds import list_kinds
 from undertow.faults.quantities import quantities_of
 from undertow.navigation.from_sensors import Received
+from undertow.navigation.kalman import kalman
 from undertow.scenario.build import build
 from undertow.scenario.faulted import faulted
 from undertow.scenario.schema import Fault
@@ -21,6 +24,7 @@ from undertow.thrusters.thruster import PropellerReport
 
 DT, FIRST, STOP, STEPS = 0.01, 3, 8, 11
 SENSORS = ["imu", "dvl", "depth", "compass", "position_fix", "propeller_speed"]
+TIMES = DT * np.arange(STEPS)
 KINDS = list_kinds()
 # Severities with which a short fault is sure to show.
 SHOWN = {"intermittent": 1.0, "overrun": 2.0, "dropped_step": 2.0, "duplicated_step": 2.0, "sag": 0.9}
@@ -28,15 +32,15 @@ SHOWN = {"intermittent": 1.0, "overrun": 2.0, "dropped_step": 2.0, "duplicated_s
 
 @functools.cache
 def loop():
-    return build(
+    healthy = build(
         {
             "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "fidelity": "shaft", "supply": 16}},
             "controller": "pid",
             "reference": {"kind": "setpoint", "position": [1, 0, 1, 0, 0, 0.5]},
-            "navigation": {"kind": "kalman", "sensors": SENSORS},
             "loop": {"dt": DT},
         }
     ).closed_loop
+    return dataclasses.replace(healthy, navigation=kalman([getattr(sensors, name)() for name in SENSORS]))
 
 
 @functools.cache
@@ -84,121 +88,153 @@ def altered(steps):
     assert not any(steps[:FIRST]) and not any(steps[STOP:]) and any(steps[FIRST:STOP])
 
 
+def row(k, tree):
+    """One instant of a series."""
+    return jax.tree.map(lambda leaf: leaf[k], tree)
+
+
+@eqx.filter_jit
+def read_through(faults, readings):
+    """Measurements as the faults leave them, and whether one is active, of a vehicle whose input is 0."""
+    rest, limits = jnp.zeros(8), (-jnp.ones(8), jnp.ones(8))
+    realization = faults.realize(jax.random.PRNGKey(1))
+
+    def step(state, instant):
+        t, y = instant
+        found, state = faults.measurement(realization, state, t, y)
+        _, state = faults.input(realization, state, t, rest, limits)
+        return state, (found, faults.active(realization, t))
+
+    start = faults.init(realization, row(0, readings), rest)
+    return jax.lax.scan(step, start, (jnp.asarray(TIMES), readings))[1]
+
+
 @kinds_of("position", "attitude", "velocity", "angular_rate", "depth", "propeller_speed")
 def test_quantity(kind):
-    faults = with_fault(kind).faults
-    realization = faults.realize(jax.random.PRNGKey(1))
-    state, differs = faults.init(realization, measured(0), jnp.zeros(8)), []
-    for k in range(STEPS):
-        t, y = jnp.asarray(k * DT), measured(k)
-        found, state = faults.measurement(realization, state, t, y)
-        _, state = faults.input(realization, state, t, jnp.zeros(8), (-jnp.ones(8), jnp.ones(8)))
-        differs.append(not same(found, y))
-        for name, quantity in quantities_of(y).items():
-            other = {"position": ("depth",), "depth": ("position",)}.get(kind.target, ())
-            if name != kind.target and name not in other:
-                assert np.allclose(quantity.read(found), quantity.read(y), rtol=0, atol=1e-12), name
-        assert int(faults.active(realization, t)) == (FIRST <= k < STOP)
-    altered(differs)
+    readings = MEASURED
+    found, active = jax.tree.map(np.asarray, read_through(with_fault(kind).faults, readings))
+    altered([not same(row(k, found), row(k, readings)) for k in range(STEPS)])
+    others = {"position": ("depth",), "depth": ("position",)}.get(kind.target, ())
+    for name, quantity in quantities_of(readings).items():
+        if name != kind.target and name not in others:
+            read = jax.vmap(quantity.read)
+            np.testing.assert_allclose(read(found), read(readings), rtol=0, atol=1e-12, err_msg=name)
+    np.testing.assert_array_equal(active, [FIRST <= k < STOP for k in range(STEPS)])
+
+
+@eqx.filter_jit
+def delivered(faults, received):
+    """What the sensors deliver, as the faults leave it."""
+    key = jax.random.PRNGKey(2)
+    step = lambda state, instant: faults.received(key, state, *instant)[::-1]
+    return jax.lax.scan(step, faults.init([one.reading[0] for one in received]), (jnp.asarray(TIMES), received))[1]
 
 
 @kinds_of("sensor")
 def test_sensor(kind):
-    navigation = with_fault(kind).navigation
     place = [f"sensor {name}" for name in SENSORS].index(kind.target)
-    widths, key = (8, 3, 1, 1, 2, 8), jax.random.PRNGKey(2)
-    received = lambda k: tuple(
-        Received(0.3 + 0.07 * k + jnp.arange(width, dtype=float), jnp.asarray(k % 2 == 1), 0.0) for width in widths
+    ks = np.arange(STEPS)
+    received = tuple(
+        Received(0.3 + 0.07 * ks[:, None] + np.arange(width, dtype=float), ks % 2 == 1, np.zeros(STEPS))
+        for width in (8, 3, 1, 1, 2, 8)
     )
-    faults = navigation.faults
-    state, differs = faults.init([one.reading for one in received(0)]), []
-    for k in range(STEPS):
-        found, state = faults.received(key, state, jnp.asarray(k * DT), received(k))
-        others = [(a, b) for i, (a, b) in enumerate(zip(found, received(k), strict=True)) if i != place]
-        assert all(same(a, b) for a, b in others)
-        differs.append(not same(found[place], received(k)[place]))
-    altered(differs)
+    found = jax.tree.map(np.asarray, delivered(with_fault(kind).navigation.faults, received))
+    for index in range(len(SENSORS)):
+        if index != place:
+            assert same(found[index], received[index]), SENSORS[index]
+    altered([not same(row(k, found[place]), row(k, received[place])) for k in range(STEPS)])
 
 
 def test_a_lagging_sensor_follows_by_implicit_euler():
     """dv/dt = (reading - v) / tau from the onset on, with the time since the last control step."""
     (kind,) = [kind for kind in KINDS if (kind.target, kind.mode) == ("sensor dvl", "slow")]
-    navigation = with_fault(kind).navigation
     place, tau = SENSORS.index("dvl"), 0.5
-    readings = [np.array([0.3, -0.2, 0.1]) * (k + 1) for k in range(STEPS)]
-    silent = [Received(jnp.zeros(width), jnp.asarray(False), 0.0) for width in (8, 3, 1, 1, 2, 8)]
-    received = lambda k: (
-        *silent[:place],
-        silent[place]._replace(reading=jnp.asarray(readings[k])),
-        *silent[place + 1 :],
-    )
-    state, lagging = navigation.faults.init([one.reading for one in received(0)]), readings[0]
+    readings = np.outer(np.arange(STEPS) + 1, [0.3, -0.2, 0.1])
+    received = [
+        Received(np.zeros((STEPS, width)), np.zeros(STEPS, bool), np.zeros(STEPS)) for width in (8, 3, 1, 1, 2, 8)
+    ]
+    received[place] = received[place]._replace(reading=readings)
+    found = delivered(with_fault(kind).navigation.faults, tuple(received))[place].reading
+    lagging = readings[0]
     for k in range(STEPS):
-        found, state = navigation.faults.received(jax.random.PRNGKey(2), state, jnp.asarray(k * DT), received(k))
         share = DT / (DT + tau) if FIRST <= k < STOP else 1.0
         lagging = lagging + share * (readings[k] - lagging)
-        np.testing.assert_allclose(found[place].reading, lagging, rtol=1e-9)
+        np.testing.assert_allclose(found[k], lagging, rtol=1e-9)
+
+
+MEASURED = jax.tree.map(np.asarray, jax.vmap(measured)(np.arange(float(STEPS))))
+POSE = Pose(np.array([0.5, 0.2, 1.0]), row(0, MEASURED.body).rotation, np.array([0.3, 0.1, 0.0]))
+INPUTS = 3 + 0.3 * np.arange(STEPS)[:, None] + 0.5 * np.arange(8.0)
+
+
+@eqx.filter_jit
+def actuated(faults, none):
+    """Health of the measurement, acting inputs and loads of the faults, of a vehicle without other loads."""
+    high = jnp.full(8, 16.0)
+    realization = faults.realize(jax.random.PRNGKey(1))
+
+    def step(state, instant):
+        t, y, u = instant
+        y, state = faults.measurement(realization, state, t, y)
+        acting, state = faults.input(realization, state, t, u, (-high, high))
+        return state, (y.health, acting, faults.load(realization, t, POSE, none))
+
+    start = faults.init(realization, row(0, MEASURED), jnp.zeros(8))
+    return jax.lax.scan(step, start, (jnp.asarray(TIMES), MEASURED, jnp.asarray(INPUTS)))[1]
 
 
 @kinds_of("thruster", "bus")
 def test_input(kind):
-    faults = with_fault(kind).faults
+    faulty = with_fault(kind)
+    health, acting, load = jax.tree.map(np.asarray, actuated(faulty.faults, faulty.plant.no_load()))
+    failing = slice(1, 2) if kind.target == "thruster" else slice(0, 8)
+    healthy = np.delete(np.arange(8), failing)
+    thrust = np.ones((STEPS, 8)) if load.scaling is None else load.scaling.thrust * np.ones((STEPS, 8))
+    assert (health == 1).all() and (np.abs(acting) <= 16.0).all()
+    np.testing.assert_array_equal(acting[:, healthy], INPUTS[:, healthy])
+    assert (thrust[:, healthy] == 1).all()
+    altered([(acting[k] != INPUTS[k]).any() or (thrust[k] != 1).any() for k in range(STEPS)])
+
+
+@eqx.filter_jit
+def accelerations(plant, faults):
+    """With the loads of the faults at all times, and without load."""
     realization = faults.realize(jax.random.PRNGKey(1))
-    high, failing = jnp.full(8, 16.0), slice(1, 2) if kind.target == "thruster" else slice(0, 8)
-    state, differs = faults.init(realization, measured(0), jnp.zeros(8)), []
-    for k in range(STEPS):
-        t, u = jnp.asarray(k * DT), 3 + 0.3 * k + 0.5 * jnp.arange(8.0)
-        y, state = faults.measurement(realization, state, t, measured(k))
-        acting, state = faults.input(realization, state, t, u, (-high, high))
-        load = faults.load(realization, t, POSE, loop().plant.no_load())
-        assert same(y.health, jnp.ones(8)) and (jnp.abs(acting) <= high).all()
-        healthy = np.delete(np.arange(8), failing)
-        assert np.array_equal(acting[healthy], u[healthy])
-        thrust = np.ones(8) if load.scaling is None else np.asarray(load.scaling.thrust)
-        assert (thrust[healthy] == 1).all()
-        differs.append(not np.array_equal(acting, u) or (thrust != 1).any())
-    altered(differs)
-
-
-POSE = Pose(jnp.asarray([0.5, 0.2, 1.0]), measured(0).body.rotation, jnp.asarray([0.3, 0.1, 0.0]))
+    x, u, none = plant.initial_state(*row(0, MEASURED)[:2]), jnp.full(8, 2.0), plant.no_load()
+    loaded = lambda t: plant.acceleration(t, x, u, faults.load(realization, t, POSE, none))
+    return jax.vmap(loaded)(jnp.asarray(TIMES)), plant.acceleration(jnp.zeros(()), x, u, none)
 
 
 @kinds_of("plant")
 def test_plant(kind):
     faulty = with_fault(kind)
-    plant, faults = faulty.plant, faulty.faults
-    realization = faults.realize(jax.random.PRNGKey(1))
-    x, u = plant.initial_state(measured(0).position, measured(0).velocity), jnp.full(8, 2.0)
-    moved = lambda t: plant.acceleration(
-        jnp.asarray(t), x, u, faults.load(realization, jnp.asarray(t), POSE, plant.no_load())
-    )
-    free = moved(0.0)
-    assert np.allclose(free, plant.acceleration(jnp.zeros(()), x, u, plant.no_load()), rtol=1e-9, atol=1e-12)
-    changed = [not np.array_equal(moved(k * DT), free) for k in range(STEPS)]
-    altered(changed)
+    found, free = map(np.asarray, accelerations(faulty.plant, faulty.faults))
+    np.testing.assert_allclose(found[0], free, rtol=1e-9, atol=1e-12)
+    altered([not np.array_equal(acceleration, found[0]) for acceleration in found])
 
 
 @eqx.filter_jit
-def stepped(law, z, y, r):
-    """Input of a control step, and the state after it."""
-    u, _ = law.command(z, y, r)
-    return u, law.advance(z, y, r, u, jnp.asarray(DT))
+def controlled(law, readings):
+    """Inputs, and states of the law after each control step."""
+    r = Target(jnp.ones(1), jnp.zeros(1), jnp.zeros(1))
+
+    def step(z, y):
+        u, _ = law.command(z, y, r)
+        z = law.advance(z, y, r, u, jnp.asarray(DT))
+        return z, (u, z)
+
+    return jax.lax.scan(step, law.init(row(0, readings), r), readings)[1]
 
 
 @kinds_of("computation")
 def test_computation(kind):
-    law, clean = with_fault(kind, small_loop).controller, small_loop().controller
-    r = Target(jnp.ones(1), jnp.zeros(1), jnp.zeros(1))
-    readings = [Measurement(jnp.asarray([0.3 + 0.1 * k]), jnp.asarray([0.4 - 0.05 * k])) for k in range(STEPS)]
-    z, own, differs, inputs = law.init(readings[0], r), clean.init(readings[0], r), [], []
-    for y in readings:
-        u, z = stepped(law, z, y, r)
-        expected, own = stepped(clean, own, y, r)
-        inputs.append(not np.array_equal(u, expected))
-        differs.append(not same(z.law, own))
-    assert not any(inputs[:FIRST]) and not any(differs[:FIRST])
-    assert any(inputs[FIRST:]) or any(differs[FIRST:])
-    assert float(z.time) == pytest.approx(STEPS * DT) and int(z.counts[0]) == STOP - FIRST
+    ks = np.arange(float(STEPS))[:, None]
+    readings = Measurement(0.3 + 0.1 * ks, 0.4 - 0.05 * ks)
+    inputs, states = controlled(with_fault(kind, small_loop).controller, readings)
+    expected, own = controlled(small_loop().controller, readings)
+    differs = [not same(row(k, (inputs, states.law)), row(k, (expected, own))) for k in range(STEPS)]
+    assert not any(differs[:FIRST]) and any(differs[FIRST:])
+    assert float(states.time[-1]) == pytest.approx(STEPS * DT) and int(states.counts[0][-1]) == STOP - FIRST
 
 
 def test_there_are_at_least_a_hundred_kinds_and_no_two_alike():

@@ -158,7 +158,9 @@ class Stepped:
         outputs, states, reasons = (np.asarray(values)[:count] for values in found)
         self.k += count
         self.outputs.extend(outputs)
-        self.states.extend((State(int(state)), reason_of(int(reason))) for state, reason in zip(states, reasons, strict=True))
+        self.states.extend(
+            (State(int(state)), reason_of(int(reason))) for state, reason in zip(states, reasons, strict=True)
+        )
 
 
 @eqx.filter_jit
