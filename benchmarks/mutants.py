@@ -43,6 +43,8 @@ LEFT_OUT = re.compile(r"Variable|RemoveDecorator|BitOr|ExceptionReplacer")
 # What a test of the whole program prints for a test that failed.
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 SECONDS = 1800
+# Exit codes of pytest: all passed, and none selected.
+NO_FAILURE = (0, 5)
 
 
 class Mutant(NamedTuple):
@@ -129,22 +131,30 @@ class Copy:
             path = self.project / mutant.path
             path.write_text(mutant.code(path.read_text()))
         try:
-            return self._failures()
+            near = self._near(mutants)
+            return (self._failures(near) if near else []) or self._failures([])
         finally:
             for path, original in originals.items():
                 path.write_text(original)
 
-    def _failures(self) -> list[str]:
+    def _near(self, mutants: list[Mutant]) -> list[str]:
+        """Files of tests that import one of the changed modules: they run first, as they are likely to fail."""
+        modules = [mutant.path.removesuffix(".py").replace("/", ".") for mutant in mutants]
+        files = sorted((self.project / "tests").rglob("test_*.py"))
+        near = [file for file in files if any(module in file.read_text() for module in modules)]
+        return [str(file.relative_to(self.project)) for file in near]
+
+    def _failures(self, files: list[str]) -> list[str]:
         environment = os.environ | {"UNDERTOW_CACHE": str(self.caches), "PYTHONPATH": str(self.project)}
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *self.tests.split()]
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *self.tests.split(), *files]
         try:
             ended = subprocess.run(
                 command, cwd=self.project, env=environment, capture_output=True, text=True, timeout=SECONDS
             )
         except subprocess.TimeoutExpired:
             return [f"no end within {SECONDS} s"]
-        found = FAILED.findall(ended.stdout)
-        return found if found or ended.returncode == 0 else [f"pytest ended with {ended.returncode}"]
+        failed = FAILED.findall(ended.stdout)
+        return failed if failed or ended.returncode in NO_FAILURE else [f"pytest ended with {ended.returncode}"]
 
 
 def described(number: int, mutant: Mutant) -> list[str]:
