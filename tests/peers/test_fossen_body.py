@@ -39,6 +39,9 @@ def terms(peer):
     plant = hybrid_vehicle(peer.vehicle, paper_table3("shaft"))
     # The file's accelerations were computed with its own thruster matrix, rounded to 8 decimals.
     plant = eqx.tree_at(lambda p: p.thruster_matrix, plant, jnp.asarray(peer.file["thruster_matrix"]))
+    # Under one name, as the numbers of one vehicle: one program for all.
+    structure = jax.tree.structure(hybrid_vehicle(odin(), paper_table3("shaft")))
+    plant = jax.tree.unflatten(structure, jax.tree.leaves(plant))
     return _terms(plant, peer.cases["eta"], peer.cases["nu"], peer.cases["thrust"])
 
 

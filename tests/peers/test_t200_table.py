@@ -8,7 +8,6 @@ import importlib.util
 from pathlib import Path
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -41,8 +40,7 @@ def steady(thruster, volts):
 def misfit(thruster, name):
     """Rms over all rows of speed (rad/s), current from the supply (A) and thrust (N); and the rows."""
     supply, pwm, *measured = table(name)
-    volts = jnp.asarray((pwm - 1500) / 400 * supply)
-    speed, power, thrust = map(np.asarray, steady(thruster, volts))
+    speed, power, thrust = map(np.asarray, steady(thruster, (pwm - 1500) / 400 * supply))
     modelled = speed, power / supply, thrust
     rms = [float(np.sqrt(np.mean((m - t) ** 2))) for m, t in zip(modelled, measured, strict=True)]
     return rms, len(pwm)
@@ -79,9 +77,10 @@ def test_the_dead_zone_that_passes_the_whole_voltage_meets_the_table_better(part
 def test_dead_band_in_pulses_and_direction(part, name):
     """Whatever the supply: the last pulse without thrust, to two rows (8 us) of the table; rising; weaker in reverse."""
     thruster, (supply, pwm, _, _, thrust) = part("static"), table(name)
+    modelled_thrust = np.asarray(steady(thruster, (pwm - 1500) / 400 * supply)[2])
     for bus in np.unique(supply):
         rows = supply == bus
-        found = np.asarray(steady(thruster, (pwm[rows] - 1500) / 400 * bus)[2])
+        found = modelled_thrust[rows]
         bands = [pwm[rows][of == 0.0] for of in (found, thrust[rows])]
         assert abs(bands[0].min() - bands[1].min()) <= 8 and abs(bands[0].max() - bands[1].max()) <= 8, bus
         rising = np.diff(found[np.argsort(pwm[rows])])

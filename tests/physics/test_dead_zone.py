@@ -104,7 +104,8 @@ def test_slope_and_precision(kind):
     slopes = jax.jit(jax.vmap(jax.grad(lambda volts: thruster.terminal(volts))))(np.array([-4.0, -1.0, 1.0, 4.0]))
     np.testing.assert_array_equal(slopes, [1.0, 0.0, 0.0, 1.0])
     with runtime.in_precision("float32"):
-        found = with_zone("static", kind).terminal(jnp.asarray(np.asarray(VOLTS)))
+        single = with_zone("static", kind)
+        found = jax.jit(lambda volts: single.terminal(volts))(np.asarray(VOLTS, dtype=np.float32))
     assert found.dtype == jnp.float32
     np.testing.assert_allclose(found, TURNS[kind], rtol=0, atol=2e-7)
 
@@ -164,36 +165,36 @@ def test_drive_of_a_motor(name, kind):
     """Its command aims where it was told to; its prediction turns as the true motor; its range ends at the supply."""
     thruster, rate = with_zone(name, kind), 40.0
     drive = thruster.actuator_model(4, False)
-    state = jax.tree.map(lambda leaf: jnp.asarray([20.0, -30.0, 5.0, 0.5]), drive.init())
-    wanted = jnp.asarray([9.0, -7.0, 15.0, -4.0])
+    resting = drive.init()
+    state = jax.tree.map(lambda leaf: np.array([20.0, -30.0, 5.0, 0.5]), resting)
+    wanted = np.array([9.0, -7.0, 15.0, -4.0])
+    turning = SUPPLY - (ZONE if kind == "subtract" else 0.0)
 
     @jax.jit
-    def aim(state):
+    def aim(state, wanted):
         volts = drive.command(state, wanted, rate)
-        return volts, drive.target_of(state, volts, rate)
+        ends = thruster.motor.thrust(jnp.array([-1.0, 1.0]) * turning / thruster.motor.k1 / 10)
+        return volts, drive.target_of(state, volts, rate), drive.range(resting, 10.0), ends
 
-    volts, target = map(np.asarray, aim(state))
+    volts, target, limits, ends = jax.tree.map(np.asarray, aim(state, wanted))
     heard = np.abs(volts) > ZONE
     assert heard.sum() >= (3 if kind == "pass" else 4)
     np.testing.assert_allclose(target[heard], wanted[heard], rtol=1e-9)
-    resting = drive.init()
-    for limit, side in zip(drive.range(resting, 10.0), (-1.0, 1.0), strict=True):
-        expected = thruster.motor.thrust(
-            side * (SUPPLY - (ZONE if kind == "subtract" else 0.0)) / thruster.motor.k1 / 10
-        )
+    for limit, expected in zip(limits, ends, strict=True):
         np.testing.assert_allclose(limit, np.full(4, expected), rtol=1e-12)
     assert drive.quasi_static().thruster.dead_zone_kind == kind
 
     if name == "shaft":
         return  # the drive knows of the inductance that this fidelity leaves out
-    truth, belief, dt, fine = thruster.initial_state(4), resting, 2e-3, 400
-    volts = jnp.asarray([1.0, -2.0, 4.0, -9.0])
-    turn = jax.jit(lambda y: jax.lax.fori_loop(
-        0, fine, lambda _, s: rk4(lambda t, x: thruster.dynamics(x, volts), 0.0, s, dt / fine), y
-    ))  # fmt: skip
-    advance = jax.jit(lambda belief: drive.advance(belief, volts, dt))
-    for _ in range(25):
-        truth, belief = turn(truth), advance(belief)
+    dt, fine = 2e-3, 400
+
+    @jax.jit
+    def turned(volts):
+        move = lambda _, x: rk4(lambda t, x: thruster.dynamics(x, volts), 0.0, x, dt / fine)
+        truth = jax.lax.fori_loop(0, 25 * fine, move, thruster.initial_state(4))
+        return truth, jax.lax.fori_loop(0, 25, lambda _, belief: drive.advance(belief, volts, dt), resting)
+
+    truth, belief = jax.tree.map(np.asarray, turned(np.array([1.0, -2.0, 4.0, -9.0])))
     assert truth.speed[0] == belief.speed[0] == 0.0
     np.testing.assert_allclose(belief.speed[1:], truth.speed[1:], rtol=0.03)
 

@@ -44,19 +44,19 @@ def test_outputs_and_pose_lead_to_each_other():
 
 def test_turning_is_the_derivative_of_the_attitude():
     """Body rates by the quaternion's kinematics, their rate by automatic differentiation; pitch passes 90 degrees."""
-    way = lambda t: jnp.stack([0.7 * jnp.sin(2 * t), 1.1 + t, 0.4 - 0.9 * t**2])
-    rate = jax.jacfwd(way)
-    found = lambda t: turning_from_euler(way(t), rate(t), jax.jacfwd(rate)(t))
+    way = lambda t: np.array([0.7 * np.sin(2 * t), 1.1 + t, 0.4 - 0.9 * t**2])
+    rate = lambda t: np.array([1.4 * np.cos(2 * t), 1.0, -1.8 * t])
+    bend = lambda t: np.array([-2.8 * np.sin(2 * t), 0.0, -1.8])
 
     @jax.jit
-    def both(t):
-        attitude, omega, turning = found(t)
-        same, by_quaternion = jax.jvp(lambda t: quaternion_from_euler(way(t)), (t,), (jnp.ones_like(t),))
-        omega_rate = jax.jacfwd(lambda t: found(t)[1])(t)
-        return (attitude, omega, turning), same, quaternion_rate(attitude, omega), by_quaternion, omega_rate
+    def both(angles, rate, bend):
+        found = lambda angles, rate: turning_from_euler(angles, rate, bend)
+        (attitude, omega, turning), (_, omega_rate, _) = jax.jvp(found, (angles, rate), (rate, bend))
+        same, by_quaternion = jax.jvp(quaternion_from_euler, (angles,), (rate,))
+        return attitude, turning, same, quaternion_rate(attitude, omega), by_quaternion, omega_rate
 
     for t in (0.0, 0.3, float(np.pi / 2 - 1.1), 0.9):
-        (attitude, _, turning), same, rate_of_attitude, by_quaternion, omega_rate = both(t)
+        attitude, turning, same, rate_of_attitude, by_quaternion, omega_rate = both(way(t), rate(t), bend(t))
         np.testing.assert_allclose(attitude, same, atol=1e-15)
         np.testing.assert_allclose(rate_of_attitude, by_quaternion, atol=1e-12)
         np.testing.assert_allclose(turning, omega_rate, atol=1e-12)

@@ -91,34 +91,45 @@ def water_of(disturbance, key, t, position):
     return disturbance.at(disturbance.realize(key), t, at(position), CALM).water
 
 
+@eqx.filter_jit
+def flow_of(sea, key, t):
+    """Acceleration of the water, and derivatives of its velocity by time and by place."""
+    path = sea.realize(key)
+
+    def velocity(t, position):
+        water = sea.at(path, t, at(position), CALM).water
+        return water.velocity, water.acceleration
+
+    slopes, acceleration = jax.jacfwd(velocity, (0, 1), has_aux=True)(t, jnp.array([3.0, -2.0, 1.0]))
+    return acceleration, *slopes
+
+
 def test_wave_acceleration_is_the_rate_of_the_velocity():
     sea = waves(spreading=0.3)
-    key, position = jax.random.PRNGKey(5), jnp.array([3.0, -2.0, 1.0])
-    water = lambda t: water_of(sea, key, t, position)
-    both = jax.jit(lambda t: (water(t).acceleration, jax.jacfwd(lambda t: water(t).velocity)(t)))
     for t in (0.0, 7.3, 100.0):
-        np.testing.assert_allclose(*both(t), rtol=0, atol=1e-12)
+        acceleration, by_time, _ = flow_of(sea, jax.random.PRNGKey(5), np.asarray(t))
+        np.testing.assert_allclose(acceleration, by_time, rtol=0, atol=1e-12)
 
 
 def test_waves_are_incompressible_and_free_of_rotation():
-    sea = waves(spreading=0.5)
-    flow = lambda p: water_of(sea, jax.random.PRNGKey(1), 4.0, p).velocity
-    gradient = jax.jit(jax.jacfwd(flow))(jnp.array([3.0, -2.0, 1.0]))
+    gradient = np.asarray(flow_of(waves(spreading=0.5), jax.random.PRNGKey(1), np.asarray(4.0))[2])
     assert abs(np.trace(gradient)) < 1e-12 and np.abs(gradient).max() > 1e-3
     np.testing.assert_allclose(gradient, gradient.T, rtol=0, atol=1e-12)
 
 
 @eqx.filter_jit
-def velocities(sea, keys, times):
-    return jax.vmap(lambda k: jax.vmap(lambda t: water_of(sea, k, t, jnp.zeros(3)).velocity)(times))(keys)
+def velocities(sea, key, times):
+    """Of 400 seas, one row for each."""
+    paths = jax.vmap(sea.realize)(jax.random.split(key, 400))
+    velocity = lambda path, t: sea.at(path, t, at(jnp.zeros(3)), CALM).water.velocity
+    return jax.vmap(lambda path: jax.vmap(lambda t: velocity(path, t))(times))(paths)
 
 
 @pytest.mark.parametrize("depth", [3.0, pytest.param(0.0, marks=pytest.mark.full)])
 def test_variance_of_orbital_velocity(depth):
     """Over 400 seas: the integral of omega^2 S(omega) e^(-2 k z), S scaled to (H_s / 4)^2; at the surface its H_s."""
     sea = waves(height=0.5, period=5.0, depth=depth)
-    keys = jax.random.split(jax.random.PRNGKey(2), 400)
-    velocity = velocities(sea, keys, np.linspace(0.0, 50.0, 20))
+    velocity = velocities(sea, jax.random.PRNGKey(2), np.linspace(0.0, 50.0, 20))
     omega = np.linspace(0.4, 8.0, 20_000) * 2 * np.pi / 5
     energy = np.array(jax.jit(spectrum)(omega, 5.0, 3.3))
     energy *= (0.5 / 4) ** 2 / np.trapezoid(energy, omega)
@@ -140,15 +151,15 @@ def test_wandering_current_has_its_variance_and_correlation():
 
 def test_wandering_current_is_its_samples_and_linear_between():
     process = gauss_markov_current(span=10.0, step=0.5)
-    key = jax.random.PRNGKey(4)
-    path = np.asarray(eqx.filter_jit(process.realize)(key)) + [0.3, 0.0, 0.0]
-    flow = jax.jit(lambda t: water_of(process, key, t, np.zeros(3)))
+    drawn = np.asarray(jax.jit(lambda key: process.realize(key))(jax.random.PRNGKey(4)))
+    path = drawn + [0.3, 0.0, 0.0]
+    flow = jax.jit(lambda drawn, t: process.at(drawn, t, at(np.zeros(3)), CALM).water)
     for t, expected, slope in (
         (2.0, path[4], (path[5] - path[4]) / 0.5),
         (2.25, path[4:6].mean(0), (path[5] - path[4]) / 0.5),
         (99.0, path[-1], np.zeros(3)),
     ):
-        water = flow(t)
+        water = flow(drawn, t)
         np.testing.assert_allclose(water.velocity, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(water.acceleration, slope, rtol=0, atol=1e-12)
     assert process.jumps(1.2) == (0.5, 1.0)
@@ -166,7 +177,8 @@ def test_sheared_current(down, north):
 
 
 def test_currents_add_and_each_member_has_its_own_randomness():
-    two = Together((gauss_markov_current(), gauss_markov_current(), current((0.0, 0.2, 0.0))))
+    wandering = gauss_markov_current(span=10.0)
+    two = Together((wandering, wandering, current((0.0, 0.2, 0.0))))
 
     @jax.jit
     def draw(key):

@@ -60,20 +60,21 @@ def test_a_model_told_the_truth_gives_the_acceleration(name):
     dynamics, rng = plant.model().dynamics, np.random.default_rng(1)
 
     @jax.jit
-    def evaluate(x, u, load):
-        y = plant.output(0.0, x)
+    @jax.vmap
+    def evaluate(x, u, acceleration):
+        y, load = plant.output(0.0, x), plant.no_load()._replace(acceleration=acceleration)
         rates = plant.dynamics(0.0, x, u, load)
         _, second = jax.jvp(lambda x: plant.output(0.0, x).velocity, (x,), (rates,))
-        reached = dynamics.gain(y) @ dynamics.invert(y, dynamics.gain(y) @ u)
-        return plant.acceleration(0.0, x, u, load), second, dynamics.drift(y), dynamics.gain(y) @ u, reached
+        push = dynamics.gain(y) @ u
+        reached = dynamics.gain(y) @ dynamics.invert(y, push)
+        return plant.acceleration(0.0, x, u, load), second, dynamics.drift(y), push, reached
 
-    for seed in range(20):
-        u = jnp.asarray(rng.uniform(0.1, 2.0, plant.inputs()))
-        load = plant.no_load()._replace(acceleration=jnp.asarray(rng.normal(size=len(plant.outputs))))
-        found, second, drift, push, reached = evaluate(start(plant, seed), u, load)
-        np.testing.assert_allclose(found, drift + push + load.acceleration, rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(second, found, rtol=1e-14, err_msg="the state moves as `acceleration` says")
-        np.testing.assert_allclose(reached, push, rtol=1e-12, atol=1e-12)
+    states = jax.tree.map(lambda *each: np.stack(each), *(start(plant, seed) for seed in range(20)))
+    u, loads = rng.uniform(0.1, 2.0, (20, plant.inputs())), rng.normal(size=(20, len(plant.outputs)))
+    found, second, drift, push, reached = map(np.asarray, evaluate(states, u, loads))
+    np.testing.assert_allclose(found, drift + push + loads, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(second, found, rtol=1e-14, err_msg="the state moves as `acceleration` says")
+    np.testing.assert_allclose(reached, push, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.full
@@ -290,12 +291,12 @@ def test_arm_moves_by_lagrange():
     links = plant.links
     still = jnp.zeros(2)
     lagrangian = lambda q, rate: energy_of_arm(links, q, rate) - 2 * energy_of_arm(links, q, still)
-    by_rate = jax.grad(lagrangian, argnums=1)
+    slopes = lambda q, rate: jax.grad(lagrangian, (1, 0))(q, rate)
 
     @jax.jit
     def both(q, rate):
-        forces = jax.grad(lagrangian)(q, rate) - jax.jacfwd(by_rate)(q, rate) @ rate
-        mass = jax.jacfwd(by_rate, argnums=1)(q, rate)
+        (by_place, mass), slope = jax.jacfwd(slopes, (0, 1), has_aux=True)(q, rate)
+        forces = slope - by_place @ rate
         weights = jax.grad(energy_of_arm, argnums=1)(links, q, still), links.weight(q)
         return forces, mass, links.drift(Measurement(q, rate)), weights
 

@@ -1,5 +1,7 @@
 """Loads that do not depend on the motion, and thrusters that fail, against their formulas in NumPy."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -27,15 +29,18 @@ def test_sinusoid_table_and_wrench_are_their_formulas_and_add_up():
     np.testing.assert_array_equal(found.wrench, np.tile([5.0, -3.0], (TIMES.size, 1)))
 
 
+@functools.cache
+def draws():
+    """2000 realizations of the suite."""
+    draw = jax.jit(lambda key: jax.vmap(SUITE.realize)(jax.random.split(key, 2000)))
+    return jax.tree.map(np.asarray, draw(jax.random.PRNGKey(4)))
+
+
 def test_random_suite_is_three_sinusoids_and_a_level():
     """sqrt(2/3) sin each, so that their rms is the amplitude; the levels change every 2 s, the last of five stays."""
-
-    @jax.jit
-    def draw(key):
-        realization = SUITE.realize(key)
-        return realization, jax.vmap(lambda t: SUITE.at(realization, t, None, CALM).acceleration)(TIMES)
-
-    (rates, phases, levels), found = jax.tree.map(np.asarray, draw(jax.random.PRNGKey(3)))
+    rates, phases, levels = drawn = jax.tree.map(lambda leaf: leaf[3], draws())
+    values = jax.jit(jax.vmap(lambda drawn, t: SUITE.at(drawn, t, None, CALM).acceleration, (None, 0)))
+    found = values(drawn, TIMES)
     assert levels.shape == (5, 2)
     swing = np.sqrt(2 / 3) * np.sin(rates * TIMES[:, None, None] + phases).sum(-1)
     index = np.clip(np.floor(TIMES / 2), 0, 4).astype(int)
@@ -45,8 +50,7 @@ def test_random_suite_is_three_sinusoids_and_a_level():
 
 def test_random_suite_has_its_distributions():
     """Logarithms of frequencies and phases uniform in their ranges, levels normal: mean and spread of 2000 draws."""
-    draws = jax.jit(jax.vmap(SUITE.realize))(jax.random.split(jax.random.PRNGKey(4), 2000))
-    rates, phases, levels = map(np.asarray, draws)
+    rates, phases, levels = draws()
     assert rates.min() >= 0.3 and rates.max() <= 10.0 and phases.min() >= 0 and phases.max() <= 2 * np.pi
     for values, low, high in ((np.log(rates), np.log(0.3), np.log(10.0)), (phases, 0.0, 2 * np.pi)):
         np.testing.assert_allclose(values.mean(), (low + high) / 2, atol=0.02 * (high - low))

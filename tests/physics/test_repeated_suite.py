@@ -1,5 +1,6 @@
 """Suite U2, for long runs: U1 of t mod 20 s."""
 
+import equinox as eqx
 import jax
 import numpy as np
 import pytest
@@ -12,8 +13,12 @@ PLANT = double_integrator(6)
 
 
 def signals(load, times):
-    at = lambda t: load.at((), t, None, PLANT.no_load()).acceleration
-    return np.asarray(jax.jit(jax.vmap(at))(np.asarray(times)))
+    return np.asarray(_signals(load, np.asarray(times)))
+
+
+@eqx.filter_jit
+def _signals(load, times):
+    return jax.vmap(lambda t: load.at((), t, None, PLANT.no_load()).acceleration)(times)
 
 
 def test_u2_is_u1_of_the_time_in_its_period():

@@ -91,6 +91,16 @@ def _call(name, thruster, *arguments):
     return getattr(thruster, name)(*arguments)
 
 
+def effects(thruster, state, volts):
+    """Thrust, current and powers of a thruster."""
+    return jax.tree.map(np.asarray, _effects(thruster, state, volts))
+
+
+@eqx.filter_jit
+def _effects(thruster, state, volts):
+    return thruster.thrust(state, volts), thruster.current(state, volts), thruster.powers(state, volts)
+
+
 # ---------------------------------------------------------------------------------------------- both directions
 
 
@@ -106,17 +116,23 @@ def test_each_direction_has_its_own_coefficients():
 @pytest.mark.parametrize("name", EVERY_MOTOR)
 def test_steady_speed_solves_eq_13_in_both_directions(name):
     motor = MOTORS[name]
-    speed = call("steady_speed", motor, VOLTS)
-    np.testing.assert_allclose(motor.k2 * speed + motor.k3 * call("torque", motor, speed), VOLTS, rtol=1e-12)
-    back = motor.resistance * call("steady_current", motor, speed) + motor.back_emf_constant * speed
+
+    @jax.jit
+    def voltages(volts):
+        speed = motor.steady_speed(volts)
+        back = motor.resistance * motor.steady_current(speed) + motor.back_emf_constant * speed
+        return motor.k2 * speed + motor.k3 * motor.torque(speed), back
+
+    sides, back = voltages(VOLTS)
+    np.testing.assert_allclose(sides, VOLTS, rtol=1e-12)
     np.testing.assert_allclose(back, VOLTS, rtol=1e-12, err_msg="and Ohm's law")
 
 
 @pytest.mark.parametrize("name", EVERY_MOTOR)
 def test_thrust_and_speed_are_inverse(name):
-    speed = np.linspace(-300, 300, 61)
-    found = call("speed_at", MOTORS[name], call("thrust", MOTORS[name], speed))
-    np.testing.assert_allclose(found, speed, rtol=1e-13)
+    motor, speed = MOTORS[name], np.linspace(-300, 300, 61)
+    there_and_back = jax.jit(lambda speed: motor.speed_at(motor.thrust(speed)))
+    np.testing.assert_allclose(there_and_back(speed), speed, rtol=1e-13)
 
 
 @pytest.mark.full
@@ -142,10 +158,10 @@ def test_dynamic_rungs_settle_on_the_static_one(name, fidelity):
     motor, static = MOTORS[name], with_fidelity(MOTORS[name], "static")
     thruster = with_fidelity(motor, fidelity)
     state = simulate(thruster, held(VOLTS), 6.0, 2e-4)
-    for of in ("thrust", "current"):
-        np.testing.assert_allclose(call(of, thruster, state, VOLTS), call(of, static, (), VOLTS), rtol=1e-8)
-    for found, expected in zip(call("powers", thruster, state, VOLTS), call("powers", static, (), VOLTS), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-9)
+    *found, powers = effects(thruster, state, VOLTS)
+    *expected, expected_powers = effects(static, (), VOLTS)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    np.testing.assert_allclose(powers, expected_powers, rtol=1e-7, atol=1e-9)
 
 
 def test_ideal_rung_is_the_static_one_without_speed_term_in_both_directions():
@@ -154,8 +170,7 @@ def test_ideal_rung_is_the_static_one_without_speed_term_in_both_directions():
         lambda m: [getattr(m, name) for name in constants], UNEVEN, list(map(jnp.asarray, constants.values()))
     )
     ideal, static = with_fidelity(motor, "ideal"), with_fidelity(motor, "static")
-    for of in ("thrust", "current"):
-        np.testing.assert_allclose(call(of, ideal, (), VOLTS), call(of, static, (), VOLTS), rtol=1e-5)
+    np.testing.assert_allclose(effects(ideal, (), VOLTS)[:2], effects(static, (), VOLTS)[:2], rtol=1e-5)
 
 
 def test_speed_term_and_thrust_add_up_in_reverse_too():
@@ -170,7 +185,7 @@ def test_speed_term_and_thrust_add_up_in_reverse_too():
     alpha = thruster.voltage_gain()
     total = alpha * VOLTS + thruster.speed_term(report) - alpha * UNEVEN.inductance * rates.current
     np.testing.assert_allclose(
-        call("thrust", thruster, state, VOLTS), total, rtol=0, atol=1e-11 * np.abs(alpha * VOLTS).max()
+        effects(thruster, state, VOLTS)[0], total, rtol=0, atol=1e-11 * np.abs(alpha * VOLTS).max()
     )
 
 
@@ -183,11 +198,11 @@ def test_dead_zone_of_real_thrusters(make, fidelity):
     thruster = make(fidelity)
     inside = np.array([-1.2, -0.6, 0.0, 0.6, 1.2])
     state = thruster.initial_state(5)
-    np.testing.assert_array_equal(call("thrust", thruster, state, inside), 0.0)
-    for rate in jax.tree.leaves(call("dynamics", thruster, state, inside)):
-        np.testing.assert_array_equal(rate, 0.0)
+    thrust_and_rates = jax.jit(lambda state, volts: (thruster.thrust(state, volts), thruster.dynamics(state, volts)))
+    for nothing in jax.tree.leaves(thrust_and_rates(state, inside)):
+        np.testing.assert_array_equal(nothing, 0.0)
     just = np.resize([-1.21, 1.21], 5)
-    outside = call("thrust", thruster, simulate(thruster, held(just), 0.2, 1e-4), just)
+    outside, _ = thrust_and_rates(simulate(thruster, held(just), 0.2, 1e-4), just)
     assert outside[0] < 0 < outside[1]
 
 
@@ -274,9 +289,10 @@ def test_first_order_draws_the_current_of_its_steady_state():
     thruster = first_order(current_per_thrust=0.1, dead_zone=1.0)
     volts = np.array([-5.0, -0.5, 0.5, 5.0])
     moving = thruster.initial_state(4)._replace(thrust=np.array([30.0, 30.0, -30.0, -30.0]))
-    current = call("current", thruster, moving, volts)
+    both = jax.jit(lambda state, volts: (thruster.current(state, volts), thruster.terminal(volts)))
+    current, terminal = map(np.asarray, both(moving, volts))
     np.testing.assert_allclose(current, [-5.45, 0.0, 0.0, 5.45])
-    assert (call("terminal", thruster, volts) * current >= 0).all(), "nothing comes back"
+    assert (terminal * current >= 0).all(), "nothing comes back"
 
 
 def test_first_order_says_what_is_missing_or_wrong():
@@ -312,9 +328,12 @@ def bench():
     """Settled thrust, torque and speed over those measured, and the settled thrust, by command."""
     thruster, volts = axial_flow(), BENCH[:, 0]
     state = simulate(thruster, held(volts), 30.0, 2e-3)
-    assert all(np.abs(rate).max() < 1e-6 for rate in call("dynamics", thruster, state, volts))
-    thrust = call("thrust", thruster, state, volts)
-    ratios = np.stack([thrust, call("torque", thruster, state), state.speed]) / BENCH[:, 1:].T
+    settled = jax.jit(
+        lambda state, volts: (thruster.dynamics(state, volts), thruster.thrust(state, volts), thruster.torque(state))
+    )
+    rates, thrust, torque = jax.tree.map(np.asarray, settled(state, volts))
+    assert all(np.abs(rate).max() < 1e-6 for rate in rates)
+    ratios = np.stack([thrust, torque, state.speed]) / BENCH[:, 1:].T
     return {float(v): (*ratios[:, i], thrust[i]) for i, v in enumerate(volts)}
 
 

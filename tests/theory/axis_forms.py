@@ -35,7 +35,7 @@ def peak_gains(law: RCAF) -> tuple[float, float]:
     assert growth.max() < 0
     modes = vectors * np.linalg.solve(vectors, np.array([0.0, 0.0, 0.0, 1.0]))
     end = 40 / np.abs(growth).min()
-    times = np.concatenate([[0.0], np.geomspace(1e-4 / abs(values).max(), end, 200_000)])
+    times = np.concatenate([[0.0], np.geomspace(1e-4 / abs(values).max(), end, 20_000)])
     impulse = np.abs((np.exp(np.outer(times, values)) @ modes[[0, 3]].T).real)
     e, d_til = np.trapezoid(impulse, times, axis=0)
     return float(e), float(d_til)
@@ -221,7 +221,7 @@ def critical_lag(law: RCAF) -> float:
     """Actuator lag, s, beyond which the whole loop is unstable; infinite if none below 100 s is. Section 3.9."""
     matrix = motor_loop.lag_matrix(law, 1.0)  # of which a lag divides the actuator's row, the last one
     unstable = lambda lag: motor_loop.rightmost(np.vstack([matrix[:-1], matrix[-1:] / lag])).real > 0
-    return first_crossing(unstable, np.geomspace(1e-6, 1e2, 1601))
+    return first_crossing(unstable, np.geomspace(1e-6, 1e2, 401))
 
 
 def critical_observer_lag(law: RCAF) -> float:

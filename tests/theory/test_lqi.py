@@ -1,5 +1,6 @@
 """LQI: gains against the Riccati equation, closed-loop response against the matrix exponential, no error under loads."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def test_gain_is_that_of_the_riccati_equation(seed):
 def test_gains_without_lag_are_those_of_the_continuous_regulator():
     """Spectral factorisation: K_q = rho w^3, K_v^2 = 2 K_e + (sigma w)^2 and K_e^2 = w^4 + 2 K_q K_v."""
     w, rho, sigma = 2.0, 0.3, 1.5
-    q, e, v, a = np.asarray(lqi_gains(*map(jnp.asarray, (w, rho, sigma, 0.0, 1e-5))))
+    q, e, v, a = np.asarray(jax.jit(lqi_gains)(w, rho, sigma, 0.0, 1e-5))
     np.testing.assert_allclose(q, rho * w**3, rtol=1e-4)
     np.testing.assert_allclose(v**2, 2 * e + (sigma * w) ** 2, rtol=1e-4)
     np.testing.assert_allclose(e**2, w**4 + 2 * q * v, rtol=1e-4)

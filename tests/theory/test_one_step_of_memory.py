@@ -185,23 +185,23 @@ def remembered(inertia):
     return part, state
 
 
+@eqx.filter_jit
+def memory_step(part, z, seen, gains, free):
+    """Regressors, what the memory says of the state of `two_axes`, and the memory after a step."""
+    phi = part.regressors(Y, jnp.asarray(V), TrackingError(E, R, A), False)
+    rules = part.value(z, phi, seen.correction), part.inertia_ratio(z), part.probing(z, jnp.asarray(GAINS))
+    return phi, rules, part.advance(z, phi, seen, gains, free, jnp.asarray(DT))
+
+
 @pytest.mark.parametrize("with_inertia", [False, True])
 def test_one_step_of_the_memory(with_inertia):
     """Recursive least squares that forgets what is excited; the observer loses what the memory gains."""
     one = InertiaIdentification(AMPLITUDE, FREQUENCY, expected=jnp.asarray(EXPECTED), **PROBED)
     part, z = remembered(one if with_inertia else None)
     seen = Observed(*RNG.normal(size=(6, 2)) * 0.3)
-    gains, off = (np.array(0.2), np.array(1.9)), TrackingError(E, R, A)
-
-    @jax.jit
-    def step(z, free):
-        phi = part.regressors(Y, jnp.asarray(V), off, False)
-        rules = part.value(z, phi, seen.correction), part.inertia_ratio(z), part.probing(z, jnp.asarray(GAINS))
-        return phi, rules, part.advance(z, phi, seen, gains, free, jnp.asarray(DT))
-
+    gains = np.array(0.2), np.array(1.9)
     share = (V + R) / [0.5, 0.8]
     phi = np.concatenate([[1.0], A, share, share * np.abs(share)])
-    given = jax.tree.map(jnp.asarray, z)
     best, spread = best_share(z.evidence)
     trust, wrong = np.clip(best + spread, 0, 1), np.clip(np.abs(best - 1) - spread, 0, 1).max()
     assert 0 < trust.min() < 1
@@ -213,7 +213,7 @@ def test_one_step_of_the_memory(with_inertia):
         probing = moved[2] + GAINS[:, 0] * moved[0] + GAINS[:, 1] * moved[1]
     value = trust * (z.weights.T @ phi) + (1 - h) * seen.correction
     for free in (1.0, 0.0):
-        found_phi, rules, (after, lost) = step(given, free)
+        found_phi, rules, (after, lost) = memory_step(part, z, seen, gains, np.asarray(free))
         same(found_phi, phi)
         same(rules, (value, h, probing), rtol=1e-4)
         innovation = h * seen.rest - (1 - trust) * (z.weights.T @ z.lagged)
@@ -270,27 +270,25 @@ def test_the_law_uses_what_it_remembers():
     @eqx.filter_jit
     def step(z):
         u, signals = law.command(z, Y, GOAL)
-        phi = part.regressors(Y, jnp.asarray(V), TrackingError(E, R, A), False)
-        observer, h = law.estimator.estimate(z.estimator, jnp.asarray(V)), part.inertia_ratio(z.memory)
-        desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + part.probing(z.memory, jnp.asarray(GAINS))
-        rest = observer.uncertainty
-        correction = desired - A - rest
-        value = signals["memory_trust"] * (kept.weights.T @ phi) + (1 - h) * correction
-        # What differs from the desired acceleration acts on the inertia that was learnt.
-        known = u + (1 / h - 1) * (u + rest + value - desired)
-        observed = Observed(rest, eps, jnp.asarray(E), correction, jnp.asarray(-R), u - A)
-        gains = jnp.asarray(2 * double), jnp.asarray(double**2 / DT)
-        remembered, lost = part.advance(z.memory, phi, observed, gains, jnp.ones(()), jnp.asarray(DT))
-        alone = law.estimator.advance(z.estimator, observer, known, jnp.zeros(2), jnp.asarray(DT))
-        expected = value, rest + value, desired - rest - value, known + rest + value, h, remembered, lost, alone
-        return u, signals, law.advance(z, Y, GOAL, u, jnp.asarray(DT)), expected
+        observer = law.estimator.estimate(z.estimator, jnp.asarray(V))
+        # For its weights, in which the acceleration does not enter.
+        alone = law.estimator.advance(z.estimator, observer, u, jnp.zeros(2), jnp.asarray(DT))
+        return u, signals, law.advance(z, Y, GOAL, u, jnp.asarray(DT)), observer.uncertainty, alone
 
-    u, signals, after, expected = jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, z)))
-    value, estimate, force, acceleration, h, memory_after, lost, alone = expected
+    u, signals, after, rest, alone = jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, z)))
+    gains = np.array(2 * double), np.array(double**2 / DT)
+    of_memory = lambda *seen: jax.tree.map(np.asarray, memory_step(part, kept, Observed(*seen), gains, np.array(1.0)))
+    phi, (_, h, probing), _ = of_memory(*np.zeros((6, 2)))
+    desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + probing
+    correction = desired - A - rest
+    _, _, (memory_after, lost) = of_memory(rest, eps, E, correction, -R, u - A)
+    value = signals["memory_trust"] * (kept.weights.T @ phi) + (1 - h) * correction
+    # What differs from the desired acceleration acts on the inertia that was learnt.
+    known = u + (1 / h - 1) * (u + rest + value - desired)
     assert h.max() > 1
     assert np.abs(value).min() > 0.01
-    same((signals["memory"], signals["estimate"], u), (value, estimate, force))
+    same((signals["memory"], signals["estimate"], u), (value, rest + value, desired - rest - value))
     same(signals["memory_variance"], np.diagonal(kept.covariance) / RATE)
-    same(after.estimator.rates, [0.9, -0.4] + DT * acceleration - 2 * double * eps)
+    same(after.estimator.rates, [0.9, -0.4] + DT * (known + rest + value) - 2 * double * eps)
     same(after.memory, memory_after, rtol=1e-8)
     same(after.estimator.weights, alone.weights - lost[:, None])

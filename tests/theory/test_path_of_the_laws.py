@@ -64,15 +64,15 @@ def paths():
         for name in laws
     }
 
-    def one(law, z):
+    def one(name, law, z):
         target = law.actuation.filter.smoothed(z.filter, GOAL, MODEL.coordinates)
         u, signals = law.command(z, Y, GOAL)
         after = law.advance(z, Y, GOAL, jnp.asarray(APPLIED), jnp.asarray(DT))
         moved = law.actuation.filter.advance(z.filter, GOAL, MODEL.coordinates, jnp.ones(()), jnp.asarray(DT))
-        free = law.advance(z, Y, GOAL, 3 * u, jnp.asarray(DT)).filter
+        free = law.advance(z, Y, GOAL, 3 * u, jnp.asarray(DT)).filter if name == "steady" else None
         return target, u, signals, after, law.known_acceleration(z, Y, jnp.asarray(APPLIED)), moved, free
 
-    step = eqx.filter_jit(lambda states: {name: one(law, states[name]) for name, law in laws.items()})
+    step = eqx.filter_jit(lambda states: {name: one(name, law, states[name]) for name, law in laws.items()})
     return jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, states)))
 
 
@@ -109,9 +109,12 @@ def test_a_demand_beyond_the_limits(paths, name):
 
 
 def test_no_demand_is_attained_in_full():
-    np.testing.assert_array_equal(share_given(jnp.zeros(2), jnp.ones(2)), 1.0)
-    np.testing.assert_array_equal(share_given(jnp.ones(2), -jnp.ones(2)), 0.0)
-    np.testing.assert_allclose(share_given(jnp.array([1.0, 1.0]), jnp.array([0.7, -0.3])), 0.2)
+    share = jax.jit(jax.vmap(share_given))
+    nothing, opposite, part = share(
+        np.array([[0.0, 0.0], [1, 1], [1, 1]]), np.array([[1.0, 1.0], [-1, -1], [0.7, -0.3]])
+    )
+    assert (nothing, opposite) == (1.0, 0.0)
+    np.testing.assert_allclose(part, 0.2)
 
 
 def test_data_of_the_axes_of_a_model():
@@ -225,18 +228,22 @@ def test_a_network_acts_on_the_errors_and_its_last_action(tmp_path):
     seen = np.concatenate([[100.0, goal.position[1] - X[1]], [goal.velocity[0] - V[0], -20.0], before])
     hidden = np.tanh(arrays["weight_0"] @ seen + arrays["bias_0"])
     action = np.clip(arrays["weight_1"] @ hidden + arrays["bias_1"], -1, 1)
-    for scale, size in ((None, LIMIT), (4.0, 4.0)):
-        law = policy(MODEL, str(tmp_path / "net.npz"), scale=scale)
-        u, signals = law.command(jnp.asarray(before), Y, goal)
+    make = lambda **choices: policy(MODEL, str(tmp_path / "net.npz"), **choices)
+    limited, scaled, direct = make(scale=None), make(scale=4.0), make(action="input", scale=0.6)
+
+    @jax.jit
+    def evaluate(before):
+        commands = [law.command(before, Y, goal) for law in (limited, scaled, direct)]
+        return commands, scaled.advance(before, Y, goal, commands[1][0], DT)
+
+    (*by_action, (u, _)), after = evaluate(before)
+    for (given, signals), size in zip(by_action, (LIMIT, 4.0), strict=True):
         np.testing.assert_allclose(signals["action"], action, rtol=1e-12)
-        np.testing.assert_allclose(u, size * action, rtol=1e-12)
-    np.testing.assert_allclose(law.advance(jnp.asarray(before), Y, goal, u, DT), action)
-    np.testing.assert_array_equal(law.init(Y, goal), [0.0, 0.0])
-    law = policy(MODEL, str(tmp_path / "net.npz"), action="input", scale=0.6)
-    np.testing.assert_allclose(
-        law.command(jnp.asarray(before), Y, goal)[0], np.clip(arrays["weight_1"] @ hidden + arrays["bias_1"], -0.6, 0.6)
-    )
-    np.testing.assert_array_equal(law.interface.action_bounds(), [[-0.6, -0.6], [0.6, 0.6]])
+        np.testing.assert_allclose(given, size * action, rtol=1e-12)
+    np.testing.assert_allclose(after, action)
+    np.testing.assert_array_equal(scaled.init(Y, goal), [0.0, 0.0])
+    np.testing.assert_allclose(u, np.clip(arrays["weight_1"] @ hidden + arrays["bias_1"], -0.6, 0.6))
+    np.testing.assert_array_equal(direct.interface.action_bounds(), [[-0.6, -0.6], [0.6, 0.6]])
 
 
 @pytest.mark.parametrize(

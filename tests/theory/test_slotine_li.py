@@ -62,13 +62,14 @@ def regressor_of(model, motion, parameters):
     position, rate, wanted, velocity, acceleration = motion
     y = coordinates.measurement(position, rate)
     force = lambda parameters: dynamics.generalized_force(y, parameters, velocity, acceleration)
+    forces = jax.vmap(force)(jnp.stack([one, other, 0.3 * one + 0.7 * other]))
     nominal = dynamics.generalized_force(y, dynamics.parametrization().nominal, coordinates.velocity(y), wanted)
-    return Regressor(
-        dynamics.accelerated_by(y, nominal),
-        wanted - dynamics.drift(y),
-        (force(one), force(other), force(0.3 * one + 0.7 * other)),
-        jax.jacfwd(force)(one),
-    )
+    return Regressor(dynamics.accelerated_by(y, nominal), wanted - dynamics.drift(y), forces, jax.jacfwd(force)(one))
+
+
+@eqx.filter_jit
+def structure_of(dynamics):
+    return dynamics.parametrization()
 
 
 @pytest.fixture(
@@ -78,7 +79,7 @@ def regressor_of(model, motion, parameters):
 def regressor(request):
     """Name of a model, and what it says at a random motion."""
     model, rng = MODELS[request.param](), np.random.default_rng(1)
-    n, structure = len(model.coordinates.angles), model.dynamics.parametrization()
+    n, structure = len(model.coordinates.angles), structure_of(model.dynamics)
     motion = [rng.uniform(-0.7, 0.7, n), rng.uniform(-0.7, 0.7, n), *rng.normal(size=(3, n))]
     spread = [np.asarray(structure.most) * rng.uniform(-1, 1, structure.nominal.size) for _ in range(2)]
     parameters = [np.asarray(structure.nominal) + one for one in spread]
