@@ -49,7 +49,8 @@ def terms(peer):
 def _terms(plant, *cases):
     motor = plant.thruster.motor
 
-    def evaluate(eta, nu, thrust):
+    def evaluate(case):
+        eta, nu, thrust = case
         speed = jnp.sign(thrust) * jnp.sqrt(jnp.abs(thrust) / motor.thrust_coefficient)
         x = plant.initial_state(eta)._replace(nu=nu)
         x = x._replace(thrusters=x.thrusters._replace(speed=speed))
@@ -62,7 +63,7 @@ def _terms(plant, *cases):
             "nu_dot": plant.dynamics(jnp.zeros(()), x, jnp.zeros(8), Load(jnp.zeros(6), jnp.zeros(6))).nu,
         }
 
-    return jax.vmap(evaluate)(*cases)
+    return jax.lax.map(evaluate, cases)
 
 
 def test_there_are_fifty_states(peer):

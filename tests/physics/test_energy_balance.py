@@ -94,7 +94,8 @@ def test_power_of_the_loads_is_the_rate_of_energy():
     rng = np.random.default_rng(8)
     count = 300
 
-    def rates(q, nu, speed, tau):
+    def rates(case):
+        q, nu, speed, tau = case
         x = ODIN.initial_state()._replace(attitude=q / jnp.linalg.norm(q), nu=nu)
         x = x._replace(thrusters=x.thrusters._replace(speed=speed))
         rate = jax.jvp(
@@ -104,7 +105,7 @@ def test_power_of_the_loads_is_the_rate_of_energy():
         return rate, nu @ (tau + thrust - ODIN.body.damping(nu))
 
     draws = rng.normal(size=(count, 4)), rng.normal(size=(count, 6)), 20 * rng.normal(size=(count, 8))
-    found, expected = jax.jit(jax.vmap(rates))(*draws, 50 * rng.normal(size=(count, 6)))
+    found, expected = jax.jit(lambda *cases: jax.lax.map(rates, cases))(*draws, 50 * rng.normal(size=(count, 6)))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 

@@ -120,9 +120,12 @@ def test_waves_are_incompressible_and_free_of_rotation():
 @eqx.filter_jit
 def velocities(sea, key, times):
     """Of 400 seas, one row for each."""
-    paths = jax.vmap(sea.realize)(jax.random.split(key, 400))
-    velocity = lambda path, t: sea.at(path, t, at(jnp.zeros(3)), CALM).water.velocity
-    return jax.vmap(lambda path: jax.vmap(lambda t: velocity(path, t))(times))(paths)
+
+    def course(key):
+        path = sea.realize(key)
+        return jax.lax.map(lambda t: sea.at(path, t, at(jnp.zeros(3)), CALM).water.velocity, times)
+
+    return jax.lax.map(course, jax.random.split(key, 400))
 
 
 @pytest.mark.parametrize("depth", [3.0, pytest.param(0.0, marks=pytest.mark.full)])

@@ -104,7 +104,7 @@ def test_solution_gives_the_demanded_acceleration(name, loss):
         return forced_acceleration(dynamics, MOVING, u), forced_acceleration(dynamics, MOVING, affine)
 
     accelerations = np.random.default_rng(4).normal(size=(5, 6))
-    found, missing = jax.jit(jax.vmap(given))(accelerations)
+    found, missing = jax.jit(lambda accelerations: jax.lax.map(given, accelerations))(accelerations)
     np.testing.assert_allclose(found, accelerations, atol=1e-9)
     assert (np.abs(missing - accelerations).max(1) > 0.05).all()
 

@@ -32,7 +32,7 @@ def test_sinusoid_table_and_wrench_are_their_formulas_and_add_up():
 @functools.cache
 def draws():
     """2000 realizations of the suite."""
-    draw = jax.jit(lambda key: jax.vmap(SUITE.realize)(jax.random.split(key, 2000)))
+    draw = jax.jit(lambda key: jax.lax.map(SUITE.realize, jax.random.split(key, 2000)))
     return jax.tree.map(np.asarray, draw(jax.random.PRNGKey(4)))
 
 
@@ -66,7 +66,7 @@ def test_thrusters_fail_from_their_time_on():
     @jax.jit
     def shares(key):
         at = lambda t: chosen.at(chosen.realize(key), t, SOMEWHERE, CALM).scaling.thrust
-        return at(2.99), at(3.0), jax.vmap(drawn.realize)(jax.random.split(key, 300))
+        return at(2.99), at(3.0), jax.lax.map(drawn.realize, jax.random.split(key, 300))
 
     before, after, draws = map(np.asarray, shares(jax.random.PRNGKey(5)))
     np.testing.assert_array_equal(np.broadcast_to(before, 6), np.ones(6))

@@ -105,14 +105,14 @@ def test_one_step_of_the_identification_of_inertia():
     error, rate, nominal = np.array([0.02, -0.01]), np.array([0.03, 0.05]), np.array([0.2, -0.3])
     states = [inertia_state(since) for since in (1.0, 4.99, 4.99)]
 
-    @jax.jit
-    @jax.vmap
-    def step(z, free):
+    def step(case):
+        z, free = case
         identified = one.ratio(z), one.used(z), one.error(z), one.motion(z)
         return identified, one.advance(z, *map(jnp.asarray, (error, rate, nominal)), free, jnp.asarray(DT))
 
     frees = np.array([1.0, 1.0, 0.0])
-    identified, after = step(jax.tree.map(lambda *each: np.stack(each), *states), frees)
+    cases = jax.tree.map(lambda *each: np.stack(each), *states), frees
+    identified, after = jax.jit(lambda cases: jax.lax.map(step, cases))(cases)
     for place, (z, free) in enumerate(zip(states, frees, strict=True)):
         ratio, used, found_error, motion = (
             np.asarray(each)[..., place, :] for each in (*identified[:3], np.stack(identified[3]))

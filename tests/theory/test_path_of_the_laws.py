@@ -160,13 +160,12 @@ def test_one_step_of_nmpc():
     off, known = TrackingError(E, R, A), np.array([0.7, -1.1])
     given = Given(jnp.asarray(known), jnp.zeros(2), jnp.ones(()))
 
-    @jax.jit
-    @jax.vmap
     def step(z):
         return law.demand(z, Y, off)[0], law.adapt(z, Y, off, given, jnp.asarray(DT))
 
     states = begun, held, beyond, broken
-    demand, after = step(jax.tree.map(lambda *each: np.stack(each), *states))
+    stacked = jax.tree.map(lambda *each: np.stack(each), *states)
+    demand, after = jax.jit(lambda states: jax.lax.map(step, states))(stacked)
     gains = np.array([regulator_of_scipy(w, 0.1) for w in W])
     estimate = held.estimate + (1 - np.exp(-POLE * DT)) / DT * (V - held.predicted)
     alone = lambda estimate: A + gains[:, 0] * E + gains[:, 1] * R - estimate

@@ -316,7 +316,8 @@ def ways(body):
         velocity = coordinates.velocity(y)
         return velocity, coordinates.tracking_error(y, goal).rate + velocity
 
-    def kinematics(way, ahead):
+    def kinematics(case):
+        way, ahead = case
         eta, rate, bend, _ = way
         y, goal = measurement_of_outputs(eta, rate), Target(*ahead[:3])
         slope, wanted_slope = jax.jvp(rates, (eta, rate, goal), (rate, bend, Target(*ahead[1:])))[1]
@@ -329,7 +330,8 @@ def ways(body):
         }
 
     ahead = [motion(0.5 * t + 1.0) * 0.5 ** np.arange(4.0)[:, None] for t in times]
-    found = jax.jit(jax.vmap(kinematics))(np.stack([motion(t) for t in times]), np.stack(ahead))
+    cases = np.stack([motion(t) for t in times]), np.stack(ahead)
+    found = jax.jit(lambda cases: jax.lax.map(kinematics, cases))(cases)
     return {t: jax.tree.map(lambda leaf, place=place: np.asarray(leaf)[place], found) for place, t in enumerate(times)}
 
 
