@@ -4,7 +4,6 @@ import functools
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -77,9 +76,14 @@ def test_a_lost_thruster_gets_no_command_and_seven_of_eight_control_every_axis(f
 
 @functools.cache
 def stepped():
-    law, target = fault_tolerant(LAW, DT), Target(jnp.asarray([0.3, 0.0, 0.2, 0.0, 0.0, 0.1]), *jnp.zeros((2, 6)))
-    y = measurement_of_outputs(jnp.zeros(6), jnp.zeros(6))
-    return law, law.init(y, target), y, target
+    law, target = fault_tolerant(LAW, DT), Target(np.array([0.3, 0.0, 0.2, 0.0, 0.0, 0.1]), *np.zeros((2, 6)))
+
+    @jax.jit
+    def begun(position, velocity):
+        y = measurement_of_outputs(position, velocity)
+        return law.init(y, target), y
+
+    return law, *begun(np.zeros(6), np.zeros(6)), target
 
 
 @jax.jit
@@ -89,35 +93,41 @@ def commanded(z, y):
     return law.command(z, y, target)
 
 
+@jax.jit
+def restarted(z, y):
+    """State of the law where it begins anew with what it knew, and that of one that begins."""
+    law, _, _, target = stepped()
+    return law.restarted(law.knowledge(z), y, target), law.init(y, target)
+
+
 def knowing(z, lost):
     """The state of a law whose monitor has found some actuators lost."""
-    findings = z.monitor.findings._replace(lost=jnp.asarray(np.isin(np.arange(8), lost).astype(float)))
+    findings = z.monitor.findings._replace(lost=np.isin(np.arange(8), lost).astype(float))
     return z._replace(monitor=z.monitor._replace(findings=findings))
 
 
 @pytest.mark.full
 def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
     _, z, y, target = stepped()
-    failed = y._replace(health=jnp.ones(8).at[jnp.asarray([1, 4])].set(0.0))
-    u, signals = commanded(z, failed)
+    failed = y._replace(health=np.array([1.0, 0, 1, 1, 0, 1, 1, 1]))
+    u, signals = jax.tree.map(np.asarray, commanded(z, failed))
     np.testing.assert_array_equal(signals["lost_thrusters"], [0, 1, 0, 0, 1, 0, 0, 0])
-    assert u[1] == u[4] == 0.0 and (jnp.delete(u, jnp.asarray([1, 4])) != 0).all()
+    assert u[1] == u[4] == 0.0 and (np.delete(u, [1, 4]) != 0).all()
     over, healthy = commanded(z, y)
     np.testing.assert_allclose(over, jax.jit(lambda z: LAW.command(z, y, target)[0])(z.law), rtol=1e-12)
     assert not healthy["lost_thrusters"].any()
 
 
 def test_a_restarted_law_knows_what_is_lost():
-    law, z, y, target = stepped()
-    z = knowing(z, [2])
-    again = law.restarted(law.knowledge(z), y, target)
-    u, signals = commanded(again, y)
+    _, z, y, _ = stepped()
+    again, first = restarted(knowing(z, [2]), y)
+    u, signals = jax.tree.map(np.asarray, commanded(again, y))
     assert u[2] == 0.0 and signals["lost_thrusters"][2] == 1.0
-    first = law.init(y, target).law
-    assert all((a == b).all() for a, b in zip(jax.tree.leaves(again.law), jax.tree.leaves(first), strict=True))
+    for one, other in zip(jax.tree.leaves(again.law), jax.tree.leaves(first.law), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_axes_that_are_lost_are_announced():
     _, z, y, _ = stepped()
     _, signals = commanded(knowing(z, [1, 3, 4, 5, 6, 7]), y)
-    assert signals["lost_axes"].sum() >= 4
+    assert np.asarray(signals["lost_axes"]).sum() >= 4

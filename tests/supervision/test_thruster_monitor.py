@@ -31,7 +31,7 @@ def monitor_of(speed_sensor=False, **options):
 
 
 def at(nu, report=None):
-    return Measurement(jnp.zeros(6), nu, report, BodyMotion(jnp.asarray([1.0, 0.0, 0.0, 0.0]), jnp.eye(3), nu))
+    return Measurement(np.zeros(6), nu, report, BodyMotion(np.array([1.0, 0.0, 0.0, 0.0]), np.eye(3), nu))
 
 
 @functools.cache
@@ -72,7 +72,8 @@ CHANGING = np.stack([np.full(8, 0.5), [5.0, -6.0, 5.5, -7.0, 6.0, -5.0, 7.0, -6.
 def start():
     """State of the monitor and velocity at rest."""
     monitor, model = plain()
-    return jax.tree.map(np.asarray, (monitor.init(model, at(jnp.zeros(6))), jnp.zeros(6)))
+    rest = np.zeros(6)
+    return jax.tree.map(np.asarray, jax.jit(lambda nu: monitor.init(model, at(nu)))(rest)), rest
 
 
 @functools.cache
