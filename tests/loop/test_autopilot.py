@@ -1,5 +1,6 @@
 """The controller by itself: the bits of a simulation, formats, time, states, and what others do wrong."""
 
+import jax
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -112,12 +113,12 @@ def test_both_forms_of_a_motion_belong_together():
 
 def test_a_quaternion_that_was_integrated_is_taken_as_it_is():
     """So a controller has the bits of a simulation, whose quaternion departs a little from unit length."""
-    unit = np.asarray(quaternion_from_euler(np.array([0.3, -0.4, 1.2])))
+    unit = np.asarray(jax.jit(quaternion_from_euler)(np.array([0.3, -0.4, 1.2])))
+    measured = jax.jit(lambda motion: Format("quaternion", "body").measurement(motion, None))
     for longer, same in ((1 + 1e-11, True), (1 + 1e-6, False)):
-        motion = Motion(np.zeros(3), longer * unit, np.zeros(6))
-        measured = Format("quaternion", "body").measurement(motion, None)
-        assert measured.body is not None
-        found = np.asarray(measured.body.attitude)
+        body = measured(Motion(np.zeros(3), longer * unit, np.zeros(6))).body
+        assert body is not None
+        found = np.asarray(body.attitude)
         assert (found == longer * unit).all() == same
         np.testing.assert_allclose(np.linalg.norm(found), 1.0, rtol=1e-10)
 

@@ -1,5 +1,7 @@
 """Noise is a function of key and number of the sample alone; limits are respected, and the law learns from what was applied."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +23,11 @@ LIMIT, DT = 3.0, 1e-3
 
 def measured(key, samples, truth=0.0, dt=1e-3):
     """Measurements of a plant that stands still, one after the other."""
+    return jax.tree.map(np.asarray, _measured(key, samples, truth, dt))
+
+
+@functools.partial(jax.jit, static_argnames="samples")
+def _measured(key, samples, truth, dt):
     sensor = white_noise(0.1, 0.2)
     path, still = sensor.realize(key), Measurement(jnp.full(3, truth), jnp.full(3, truth))
 
@@ -37,12 +44,12 @@ def test_noise_depends_on_key_and_sample_only(key):
     np.testing.assert_array_equal(measured(key, 50, dt=4e-3).velocity, usual.velocity, err_msg="however fast")
     np.testing.assert_allclose(measured(key, 50, truth=7.0).position - 7.0, usual.position, atol=1e-14)
     other = measured(jax.random.fold_in(key, 1), 50)
-    assert (np.asarray(other.position) != np.asarray(usual.position)).all()
+    assert (other.position != usual.position).all()
 
 
 def test_noise_is_white_with_the_given_deviations(key):
     y = measured(key, 20_000)
-    for series, deviation in ((np.asarray(y.position), 0.1), (np.asarray(y.velocity), 0.2)):
+    for series, deviation in ((y.position, 0.1), (y.velocity, 0.2)):
         assert series.std(0) == pytest.approx(deviation, rel=0.03)
         assert np.abs(series.mean(0)).max() < 5 * deviation / np.sqrt(20_000)
         neighbours = (series[1:] * series[:-1]).mean(0) / deviation**2
@@ -70,9 +77,9 @@ def limited():
     plant = double_integrator(2, LIMIT)
     law = rcaf(plant.model(), sets=3)
     loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
-    samples = sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals
+    samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals)
     is_as_recorded("loop: two axes with limits", [samples[name][::50] for name in sorted(samples)])
-    return law, jax.tree.map(np.asarray, samples)
+    return law, samples
 
 
 def test_limits_are_respected(limited):

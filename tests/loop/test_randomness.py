@@ -2,6 +2,7 @@
 
 import inspect
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -39,6 +40,15 @@ class Keyed(AbstractDisturbance):
         return ()
 
 
+numbered_all = jax.jit(jax.vmap(numbered, (None, 0)))
+
+
+@eqx.filter_jit
+def realized(loop, key):
+    realization = loop.realize(key)
+    return realization.disturbance_realization, realization.navigation_realization
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
 def test_no_two_parts_share_a_key(seed):
     """Disturbances by nine, three of them in a group of their own, all sensors, and each of their samples."""
@@ -46,11 +56,9 @@ def test_no_two_parts_share_a_key(seed):
     sensors = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
     plant = double_integrator()
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, observer(sensors))
-    realization = loop.realize(jax.random.PRNGKey(seed))
-    keys = [*jax.tree.leaves(realization.disturbance_realization), *realization.navigation_realization]
-    samples = [
-        numbered(key, jnp.asarray(k)) for key in realization.navigation_realization for k in (-1, 0, 1, 2, 3, 4, 5)
-    ]
+    of_disturbances, of_sensors = realized(loop, jax.random.PRNGKey(seed))
+    keys = [*jax.tree.leaves(of_disturbances), *np.asarray(of_sensors)]
+    samples = np.concatenate([numbered_all(key, np.array([-1, 0, 1, 2, 3, 4, 5])) for key in np.asarray(of_sensors)])
     assert len(keys) == 9 + len(sensors) and all(isinstance(one, AbstractSensor) for one in sensors)
     assert len({tuple(np.asarray(key).tolist()) for key in (*keys, *samples)}) == len(keys) + len(samples)
 
@@ -59,9 +67,9 @@ def test_numbers_that_differ_in_any_bit_have_other_keys():
     """In 64 bits also those 2^32 apart, which are one number to `jax.random.fold_in`."""
     key = jax.random.PRNGKey(0)
     numbers = [-1, 0, 1, 2**31 - 1, 2**31, 2**32 - 1, 2**32, 2**32 + 1, 2**33, 2**53, 2**62]
-    keys = {tuple(np.asarray(numbered(key, jnp.asarray(number))).tolist()) for number in numbers}
+    keys = set(map(tuple, np.asarray(numbered_all(key, np.array(numbers))).tolist()))
     assert len(keys) == len(numbers)
-    assert all((jax.random.fold_in(key, np.int64(2**32)) == jax.random.fold_in(key, 0)).tolist()), "the reason"
+    np.testing.assert_array_equal(jax.random.fold_in(key, np.int64(2**32)), jax.random.fold_in(key, 0), "the reason")
 
 
 def noise_of_a_run(duration, dt, simulate=sampled.simulate):
@@ -122,9 +130,10 @@ def test_single_precision_noise_outlives_its_clock():
     """Beyond 2^24 steps two instants are one in float32, but their noise is not: samples are counted."""
     with runtime.in_precision("float32"):
         sensor: AbstractNavigation = white_noise(DEVIATION, 0.0)
-        path, truth, state = sensor.realize(jax.random.PRNGKey(0)), Measurement(jnp.zeros(1), jnp.zeros(1)), 2**24
-        told = [sensor.measure(path, jnp.asarray(state + k), jnp.asarray(1e5), truth)[0].position[0] for k in range(9)]
-        assert len(set(map(float, told))) == 9
+        path, zero = sensor.realize(jax.random.PRNGKey(0)), np.zeros(1, dtype=np.float32)
+        measured = lambda state: sensor.measure(path, state, jnp.asarray(1e5), Measurement(zero, zero))[0]
+        told = jax.jit(jax.vmap(measured))(2**24 + np.arange(9)).position
+        assert len(set(np.asarray(told).ravel().tolist())) == 9
 
 
 REQUIRED = {"sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()]}

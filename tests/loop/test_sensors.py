@@ -112,8 +112,8 @@ def test_impossible_instruments(wrong, name):
 
 # The observer. A body swings in all six outputs, smoothly; its truth is a closed form.
 
-AMPLITUDE = jnp.array([1.0, 0.7, 0.4, 0.3, 0.2, 0.5])
-FREQUENCY = jnp.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])
+AMPLITUDE = np.array([1.0, 0.7, 0.4, 0.3, 0.2, 0.5])
+FREQUENCY = np.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])
 
 
 def swinging(t):

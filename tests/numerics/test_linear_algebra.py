@@ -23,9 +23,9 @@ RNG = np.random.default_rng(5)
 COUNT = 50
 SQUARE, WIDE, TALL = RNG.normal(size=(COUNT, 6, 6)), RNG.normal(size=(COUNT, 6, 8)), RNG.normal(size=(COUNT, 6, 4))
 WEAK = RNG.normal(size=(COUNT, 6, 3)) @ RNG.normal(size=(COUNT, 3, 8))  # rank 3
-ODIN = np.asarray(odin().body().inverse_mass_matrix @ odin().thruster_matrix())
+ODIN = np.asarray(odin().body().inverse_mass_matrix) @ np.asarray(odin().thruster_matrix())
 ANGLES = RNG.uniform(-1, 1, (COUNT, 3)) * np.array([np.pi, 1.3, np.pi])
-GAINS = np.asarray(jax.vmap(lambda a: jacobian(a) @ ODIN)(ANGLES)) * 17.11
+GAINS = np.asarray(jax.jit(jax.vmap(jacobian))(ANGLES)) @ ODIN * 17.11
 SHAPES = {"square": SQUARE, "wide": WIDE, "tall": TALL, "rank 3": WEAK, "odin": GAINS}
 FULL_RANK = ["square", "wide", "tall", "odin"]
 
@@ -33,6 +33,11 @@ FULL_RANK = ["square", "wide", "tall", "odin"]
 @functools.cache
 def each(function):
     return jax.jit(jax.vmap(function))
+
+
+@functools.cache
+def partial_inverses(rank):
+    return jax.jit(jax.vmap(lambda gain: partial_inverse(gain, jnp.ones(6), rank)))
 
 
 sharp = jax.jit(jax.vmap(regularised_sharp, in_axes=(0, None)))
@@ -142,14 +147,14 @@ def test_number_of_inputs_is_not_the_rank():
 
 @pytest.mark.parametrize("name", ["wide", "square", "odin"])
 def test_at_full_rank_a_partial_inverse_is_the_whole_one(name):
-    found = jax.jit(jax.vmap(lambda gain: partial_inverse(gain, jnp.ones(6), 6)))(SHAPES[name])
+    found = partial_inverses(6)(SHAPES[name])
     np.testing.assert_array_equal(found, each(pseudo_inverse)(SHAPES[name]))
 
 
 @pytest.mark.parametrize("name, rank", [("tall", 4), ("rank 3", 3)])
 def test_a_partial_inverse_serves_as_many_rows_as_the_rank_allows(name, rank):
     """Exactly, whatever is asked for in the others, and with the smallest input that does it."""
-    inverses = np.asarray(jax.jit(jax.vmap(lambda gain: partial_inverse(gain, jnp.ones(6), rank)))(SHAPES[name]))
+    inverses = np.asarray(partial_inverses(rank)(SHAPES[name]))
     for gain, inverse in zip(SHAPES[name], inverses, strict=True):
         given = gain @ inverse
         served = np.abs(given - np.eye(6)).max(axis=1) < 1e-9
