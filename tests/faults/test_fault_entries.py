@@ -257,7 +257,13 @@ def test_random_faults_follow_from_their_generator():
     made = lambda seed: random_faults(np.random.default_rng(seed), loop.plant, loop.navigation, 10.0, 60)
     assert made(1) == made(1) != made(2)
     assert json.loads(json.dumps(made(1))) == made(1)
-    assert len({(one["target"], one["mode"]) for seed in range(5) for one in made(seed)}) > 100
+    entries = [entry for seed in range(5) for entry in made(seed)]
+    assert len({(entry["target"], entry["mode"]) for entry in entries}) > 100
+    kinds = {(kind.target, kind.mode) for kind in list_kinds() if kind.can_be_announced}
+    announced = [
+        "announced" in entry for entry in entries if (entry["target"].rstrip(" 12345678"), entry["mode"]) in kinds
+    ]
+    assert len(announced) > 40 and np.mean(announced) == pytest.approx(1 / 3, abs=0.15)
 
 
 @pytest.mark.full

@@ -1,5 +1,7 @@
 """The continuous loop with fixed steps by the batch compiler: figures and endings of the one that XLA compiles."""
 
+import inspect
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -70,6 +72,9 @@ def test_arguments_are_those_of_the_other_compiler():
                 by(loop, **(HOW | wrong))
             sentences.append(str(refused.value))
         assert sentences[0] == sentences[1]
+    arguments = [inspect.signature(by).parameters for by in (simd_batch.integrate, continuous.simulate)]
+    for name in arguments[0]:
+        assert arguments[0][name].default == arguments[1][name].default, name
 
 
 @pytest.mark.full

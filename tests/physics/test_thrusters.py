@@ -325,14 +325,22 @@ BENCH = np.array(
 
 @pytest.fixture(scope="module")
 def bench():
-    """Settled thrust, torque and speed over those measured, and the settled thrust, by command."""
+    """Settled thrust, torque and speed over those measured, and the settled thrust, by command.
+
+    The thrust at which it settles is its steady thrust, and the command of that thrust is the one that was given.
+    """
     thruster, volts = axial_flow(), BENCH[:, 0]
     state = simulate(thruster, held(volts), 30.0, 2e-3)
-    settled = jax.jit(
-        lambda state, volts: (thruster.dynamics(state, volts), thruster.thrust(state, volts), thruster.torque(state))
-    )
-    rates, thrust, torque = jax.tree.map(np.asarray, settled(state, volts))
+
+    @jax.jit
+    def settled(state, volts):
+        thrust, steady = thruster.thrust(state, volts), thruster.steady_thrust(volts)
+        return thruster.dynamics(state, volts), thrust, thruster.torque(state), steady, thruster.steady_voltage(steady)
+
+    rates, thrust, torque, steady, command = jax.tree.map(np.asarray, settled(state, volts))
     assert all(np.abs(rate).max() < 1e-6 for rate in rates)
+    np.testing.assert_allclose(steady, thrust, rtol=1e-5)
+    np.testing.assert_allclose(command, volts, rtol=1e-9)
     ratios = np.stack([thrust, torque, state.speed]) / BENCH[:, 1:].T
     return {float(v): (*ratios[:, i], thrust[i]) for i, v in enumerate(volts)}
 
