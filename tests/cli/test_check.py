@@ -74,6 +74,11 @@ def test_bad_argument(refused, arguments, said):
     assert refused("check", *arguments).startswith(said)
 
 
+def test_a_path_with_colons(tmp_path):
+    (tmp_path / "10:30.py").write_text("def limit():\n    return 7\n")
+    assert catalogue.find("plants", "./10:30.py:limit", tmp_path)() == 7
+
+
 def test_file_that_is_neither(refused, tmp_path):
     (tmp_path / "x.yaml").write_text("masss: 3\n")
     said = "`x.yaml` must be a vehicle, scenario or campaign file, but is without a key of any. Did you mean `mass`?"

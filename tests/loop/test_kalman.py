@@ -171,6 +171,12 @@ def test_a_correction_is_that_of_the_textbook():
     gain = p @ slopes.T @ np.linalg.inv(slopes @ p @ slopes.T + noise * np.eye(3))
     correction, after = gain @ (reading - w.T @ velocity), (np.eye(15) - gain @ slopes) @ p
     is_as_recorded("kalman: half a second by an IMU", state)
+    # What one beam does not give changes nothing: as with a reading of the others alone.
+    partial = updated(own, state, np.zeros(()), with_reading(quiet, 1, np.where([True, False, True], reading, np.nan)))
+    others = slopes[[0, 2]]
+    gain_of_others = p @ others.T @ np.linalg.inv(others @ p @ others.T + noise * np.eye(2))
+    expected = (np.eye(15) - gain_of_others @ others) @ p
+    np.testing.assert_allclose(read(own, partial)[2], expected, atol=1e-9 * np.abs(p).max())
     state = updated(own, state, np.zeros(()), with_reading(quiet, 1, reading))
     np.testing.assert_allclose(read(own, state)[2], after, atol=1e-9 * np.abs(p).max())
     turned = Rotation.from_rotvec(np.array(correction[ATTITUDE])).as_matrix()

@@ -91,9 +91,10 @@ def test_noise_of_a_fast_sampled_observer():
 
 
 def test_angles_of_a_vehicle_are_compared_the_short_way_round():
-    """A yaw that passes pi goes on at its rate; the first reading is the true pose."""
+    """A yaw that passes pi goes on at its rate, and positions have no shorter way; the first reading is the true pose."""
     filter_ = pose_only(bandwidth=25.0, sampling_time=T)
     times, poses = T * np.arange(150), np.tile([1.0, 2, 3, 0, 0, 0], (150, 1))
+    poses[50:, :3] += [4.0, -5.0, 6.0]
     poses[:, 5] = np.mod(3.0 + 0.5 * times + np.pi, 2 * np.pi) - np.pi
 
     @jax.jit
@@ -104,6 +105,7 @@ def test_angles_of_a_vehicle_are_compared_the_short_way_round():
 
     y = measured(times, poses)
     np.testing.assert_allclose(np.asarray(y.position)[0], poses[0], atol=1e-15)
+    np.testing.assert_allclose(np.asarray(y.position)[-1, :3], poses[-1, :3], atol=1e-6)
     assert np.asarray(y.velocity)[-1, 5] == pytest.approx(0.5, abs=1e-3)
     assert y.body is not None and np.asarray(y.body.nu)[-1, 5] == pytest.approx(0.5, abs=1e-3)
 

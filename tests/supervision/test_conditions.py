@@ -293,9 +293,12 @@ def test_a_condition_leads_to_its_state_in_its_time(make, name):
     assert not entry.value <= entry.limit
     if make is on_axes:
         is_as_recorded(f"supervisor: {name}", (run.outputs, run.states_and_reasons(), run.z))
+    reached = run.states.index(run.states[-1])
     run.steps(5.0)
     if math.isfinite(line.recovers_after):
         assert run.states[-1] == (State.ACTIVE, "")
+        left = [state for state, _ in run.states].index(State.ACTIVE, reached)
+        assert (left - reached) * T > line.recovers_after - 1.01 * T
     else:
         assert run.states[-1][1] == name
 

@@ -129,6 +129,12 @@ def test_two_thrusters_that_are_off_at_once_are_both_found():
     assert found.sum() >= 24  # the others accelerate the vehicle as another pair does
 
 
+def test_two_thrusters_that_fail_together_are_both_found():
+    fails = np.isin(np.arange(8), (0, 5))
+    state, _ = later(healthy(), 50, ~fails)
+    np.testing.assert_array_equal(state.lost, fails.astype(float))
+
+
 def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
     fails = np.arange(8) == 2
     state, nu = later(healthy(), 50, ~fails)

@@ -1,11 +1,13 @@
 """The rule that chooses bandwidths: its margins and its predicted cost against exact matrices of the sampled loop."""
 
+import functools
 import itertools
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 from scipy.linalg import expm, solve_discrete_lyapunov
 
 from undertow.controllers import bandwidths
@@ -23,6 +25,8 @@ AXES = [
     for lag in (0.0, 0.03, 0.1, 0.3)
     for delay, noise, authority in ((0.0, 0.0, 5.0), (0.1, 0.0, 5.0), (0.0, 0.01, 5.0), (0.0, 0.0, np.inf))
 ]
+
+chosen_for = functools.cache(robust_bandwidths)
 
 
 def plant_matrices(axis, lag_factor, added):
@@ -77,10 +81,14 @@ def loop(axis, chosen, lag_factor=1.0, added=0.0, steps=0):
 @pytest.mark.parametrize("axis", [axis for axis in AXES if axis.delay < 100 * axis.sampling_time], ids=str)
 def test_no_margin_is_broken(axis):
     """Spectral radius of the sampled loop with every lag, added lag and delay that the rule promises to survive."""
-    chosen = robust_bandwidths(axis)
+    chosen = chosen_for(axis)
     for factor, added, steps, _ in MARGINS:
         matrix, *_ = loop(axis, chosen, factor, added, int(steps))
         assert np.abs(np.linalg.eigvals(matrix)).max() < 1, (factor, added, steps)
+
+
+def test_the_rule_chooses_what_it_chose_when_it_was_recorded():
+    is_as_recorded("bandwidths of the robust law", [tuple(chosen_for(axis)) for axis in AXES])
 
 
 def test_the_margins_are_those_that_are_stated():

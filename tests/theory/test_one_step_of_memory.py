@@ -253,7 +253,10 @@ def test_one_step_of_the_memory(with_inertia):
 
 
 def test_the_law_uses_what_it_remembers():
-    """Command and estimator of preset `learning` with an inertia that is known: on what the memory itself gives."""
+    """Command and estimator of preset `learning` with an inertia that is known: on what the memory itself gives.
+
+    Where limits leave less than what was commanded, the memory learns nothing.
+    """
     law = rcaf(
         double_integrator(2).model(), preset="learning", sampling_time=DT, bandwidth=6.0, feedback=GAINS, damping=1.0,
         reference_frequency=0.0, actuator_rate=9.0, regressor="linear", probing=[0.1, 0.2], weights_bound=50.0,
@@ -273,11 +276,15 @@ def test_the_law_uses_what_it_remembers():
         observer = law.estimator.estimate(z.estimator, jnp.asarray(V))
         # For its weights, in which the acceleration does not enter.
         alone = law.estimator.advance(z.estimator, observer, u, jnp.zeros(2), jnp.asarray(DT))
-        return u, signals, law.advance(z, Y, GOAL, u, jnp.asarray(DT)), observer.uncertainty, alone
+        advanced = jax.lax.map(lambda given: law.advance(z, Y, GOAL, given * u, jnp.asarray(DT)), jnp.array([1, 0.5]))
+        return u, signals, advanced, observer.uncertainty, alone
 
-    u, signals, after, rest, alone = jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, z)))
+    u, signals, advanced, rest, alone = jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, z)))
+    after, limited = (jax.tree.map(lambda leaf, row=row: leaf[row], advanced) for row in range(2))
     gains = np.array(2 * double), np.array(double**2 / DT)
-    of_memory = lambda *seen: jax.tree.map(np.asarray, memory_step(part, kept, Observed(*seen), gains, np.array(1.0)))
+    of_memory = lambda *seen, free=1.0: jax.tree.map(
+        np.asarray, memory_step(part, kept, Observed(*seen), gains, np.array(free))
+    )
     phi, (_, h, probing), _ = of_memory(*np.zeros((6, 2)))
     desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + probing
     correction = desired - A - rest
@@ -292,3 +299,5 @@ def test_the_law_uses_what_it_remembers():
     same(after.estimator.rates, [0.9, -0.4] + DT * (known + rest + value) - 2 * double * eps)
     same(after.memory, memory_after, rtol=1e-8)
     same(after.estimator.weights, alone.weights - lost[:, None])
+    still, _ = of_memory(rest, eps, E, correction, -R, u / 2 - A, free=0.0)[2]
+    same(limited.memory, still, rtol=1e-8)
