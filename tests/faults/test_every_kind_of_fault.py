@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from recorded import is_as_recorded
 
 from undertow import sensors
 from undertow.core.contracts import Measurement, Pose, Target
@@ -243,3 +244,5 @@ def test_there_are_at_least_a_hundred_kinds_and_no_two_alike():
         if kind.default is not None:
             assert kind.lowest <= kind.default <= kind.highest, kind
             assert kind.meaning not in ("", "none")
+    severities = [(kind.default, kind.lowest, kind.highest) for kind in KINDS if kind.default is not None]
+    is_as_recorded("severities of faults", severities)

@@ -259,6 +259,8 @@ def test_random_faults_follow_from_their_generator():
     assert json.loads(json.dumps(made(1))) == made(1)
     entries = [entry for seed in range(5) for entry in made(seed)]
     assert len({(entry["target"], entry["mode"]) for entry in entries}) > 100
+    assert all(0 <= entry["onset"] <= 8.0 for entry in entries)
+    assert all(0.2 <= entry.get("duration", 1.0) <= 5.0 for entry in entries)
     kinds = {(kind.target, kind.mode) for kind in list_kinds() if kind.can_be_announced}
     announced = [
         "announced" in entry for entry in entries if (entry["target"].rstrip(" 12345678"), entry["mode"]) in kinds
