@@ -317,6 +317,8 @@ def test_the_table_of_the_documentation_has_a_line_for_each_condition():
     assert [line[0] for line in lines] == list(NAMES)
     assert {len(line) for line in lines} == {len(HEAD)}
     assert lines[NAMES.index("saturated")][3:6] == ("1 s", "never", "1 s")
+    times = [(line.degraded_after, line.safe_after, line.recovers_after) for line in CONDITIONS]
+    is_as_recorded("times of the supervisor's conditions", times)
 
 
 @pytest.mark.parametrize("reason", ["", *NAMES, "operator", "memory_damaged"])
