@@ -53,10 +53,17 @@ STRICT = ("numerics", "physics", "conformance")
 jaxtyping.config.update("jaxtyping_disable", True)
 
 
-def pytest_configure(config):
-    """Annotations are checked in the full set: to prepare for it takes as long as a hundred quick tests."""
-    if "full" in config.getoption("-m"):
+def pytest_addoption(pluginmanager):
+    """Annotations are checked in the full set: to prepare for it takes as long as a hundred quick tests.
+
+    Of all hooks only this one comes before the `conftest.py` of a folder is imported, which imports what is checked.
+    """
+    expression = pluginmanager.get_plugin("pytestconfig").known_args_namespace.markexpr
+    if "full" in expression:
         install_import_hook([f"undertow.{room}" for room in CHECKED], "beartype.beartype")
+
+
+def pytest_configure(config):
     if config.getoption("-m") != "slow":
         compile_quickly()
     share_lowering_context()
