@@ -4,8 +4,6 @@ import pytest
 from good_scenario import SCENARIO, SMALL
 from messages import named
 
-pytestmark = pytest.mark.full
-
 GOOD = """
 import undertow as ut
 
@@ -22,6 +20,7 @@ def scenario(tmp_path, part="./my_rov.py:my_rov", code=GOOD):
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("kind: odin, mass: 125", f"kind: {part}"))
 
 
+@pytest.mark.full
 def test_part_from_a_file_runs(undertow, tmp_path):
     scenario(tmp_path)
     plant = "{vehicle: ./my_rov.py:my_rov, thruster: {kind: paper_table3, fidelity: ideal}, ledger: false}"
@@ -89,6 +88,7 @@ def my_bytes():
 """
 
 
+@pytest.mark.full
 def test_a_part_that_simd_lacks_is_reported_once_with_the_reason(undertow, tmp_path):
     (tmp_path / "my_bytes.py").write_text(BYTES)
     (tmp_path / "s.yaml").write_text(SMALL.replace("kind: sinusoid, amplitude: 1", "kind: ./my_bytes.py:my_bytes"))

@@ -368,6 +368,30 @@ def test_what_sensors_cannot_observe(sensors, unseen):
     assert unobservable(sensed(sensors)) == unseen
 
 
+def test_deviations_grow_as_integrals_where_nothing_is_sensed():
+    """Velocities and gyro biases are integrated once, white noise of the acceleration twice; a fix takes most of it."""
+    initial, noise, duration = np.zeros(15), np.zeros(15), 4.0
+    initial[POSITION], initial[VELOCITY] = [0.1, 0.2, 0.3], [0.05, 0.0, 0.02]
+    initial[GYRO_BIAS] = [0.0, 0.0, 0.01]
+    noise[VELOCITY] = [0.0, 0.03, 0.0]
+    found = deviations([], initial, noise, duration)
+    expected = {
+        "north": np.hypot(0.1, 0.05 * duration),
+        "east": np.sqrt(0.2**2 + 0.03 * duration**3 / 3),
+        "down": np.hypot(0.3, 0.02 * duration),
+        "yaw": 0.01 * duration,
+    }
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=0.01), name
+    slopes = np.zeros((1, 15))
+    slopes[0, POSITION] = [1.0, 0.0, 0.0]
+    # 100 readings of 0.1 m are one of 0.01 m; at rest without velocity errors they are averaged.
+    fixed = deviations(
+        [Sensed(slopes, np.array([0.01]), duration / 100)], initial * (np.arange(15) > 11), noise, duration
+    )
+    assert fixed["north"] == pytest.approx(1 / np.sqrt(1 / 0.1**2 + 100 / 0.01), rel=0.01)
+
+
 @pytest.mark.full
 @UNSEEN
 def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):

@@ -120,6 +120,14 @@ def test_the_predicted_cost_is_that_of_the_lyapunov_equation(axis):
     np.testing.assert_allclose(bandwidths._cost(axis, frequency, law, held, open_loop), expected, rtol=0.05)
 
 
+def test_values_between_frequencies_are_linear_in_the_logarithm():
+    frequency = np.geomspace(0.1, 10.0, 7)
+    for point, seen in ((0.05, 0.1), (0.1, 0.1), (0.37, 0.37), (1.0, 1.0), (10.0, 10.0), (20.0, 10.0)):
+        values = np.stack([np.log(frequency), 3 - 2 * np.log(frequency)])
+        found = bandwidths._at(point, frequency, values)
+        np.testing.assert_allclose(found, [np.log(seen), 3 - 2 * np.log(seen)], atol=1e-12)
+
+
 def test_noise_and_delay_slow_a_law_and_limits_price_its_chattering():
     base = AXES[4]
     noise = [robust_bandwidths(base._replace(velocity_noise=sigma)) for sigma in (0.0, 1e-3, 1e-2, 1e-1)]

@@ -1,0 +1,83 @@
+"""What is said of values that a method returns in another form than its contract has."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.core.errors import BadInput
+from undertow.core.returned import check_command, check_state, difference, form, not_two
+
+
+class Law:
+    """A law that answers anything."""
+
+    def command(self):
+        pass
+
+    def advance(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        (None, "nothing"),
+        (jnp.zeros((2, 3)), "an array of shape (2, 3)"),
+        ((1, 2, 3), "3 values"),
+        ((1,), "one value"),
+        ([1], "a list"),
+    ],
+    ids=str,
+)
+def test_forms(value, says):
+    assert form(value).startswith(says)
+
+
+def test_two_values():
+    assert not_two("command", (1, 2), "both") == ""
+    assert "two values, both" in not_two("command", (1, 2, 3), "both")
+    assert "a list" in not_two("command", [1, 2], "both")
+
+
+@pytest.mark.parametrize(
+    ("value", "model", "says"),
+    [
+        (jnp.zeros(2), np.ones(2), ""),
+        (1.0, jnp.zeros(()), ""),
+        (None, jnp.zeros(2), "nothing"),
+        ([0.0], jnp.zeros(2), "a list, not an array"),
+        ({"a": 0.0}, {"a": 0.0, "b": 1.0}, "a tree of 1 arrays, not of 2"),
+        ({"a": 0.0}, {"b": 0.0}, "or with other names"),
+        ({"a": jnp.zeros(3)}, {"a": jnp.zeros(2)}, "of shape (3,) instead of (2,) in `['a']`"),
+    ],
+    ids=str,
+)
+def test_differences(value, model, says):
+    found = difference(value, model)
+    assert says in found and bool(found) == bool(says)
+
+
+def test_types_count_where_they_are_asked_for():
+    whole, real = jnp.zeros(2, dtype=int), jnp.zeros(2)
+    assert difference(whole, real) == ""
+    assert difference(whole, real, types=True) == "of type int64 instead of float64"
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (jnp.zeros(2), "two values"),
+        ((jnp.zeros(3), {}), r"shape \(2,\)"),
+        ((jnp.zeros(2), 1.0), "signals as a mapping"),
+    ],
+)
+def test_answers_that_are_no_command(answer, says):
+    check_command(Law(), (jnp.zeros(2), {}), 2)
+    with pytest.raises(BadInput, match=says):
+        check_command(Law(), answer, 2)
+
+
+def test_a_state_that_changes_its_form():
+    check_state(Law(), {"a": jnp.zeros(2)}, {"a": jnp.ones(2)})
+    with pytest.raises(BadInput, match=r"`Law.advance` must .* of shape \(1,\) instead of \(2,\)"):
+        check_state(Law(), {"a": jnp.zeros(1)}, {"a": jnp.ones(2)})
