@@ -30,7 +30,7 @@ def soak(
         float | None, typer.Option(metavar="M", help="Begin nothing further after this time. Default: no limit.")
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Default: from the clock; it is printed.")] = None,
-    short: Annotated[bool, typer.Option("--short", help="A little of inputs, hours and controls: three minutes.")] = False,
+    short: Annotated[bool, typer.Option("--short", help="A little of each, in three minutes.")] = False,
     replay: Annotated[
         str | None,
         typer.Option(metavar="WHAT", help="Repeat failures alone: a file soak.json, or an identity from one."),
