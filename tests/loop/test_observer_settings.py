@@ -1,10 +1,13 @@
-"""Settings of the observer with constant gains: every blend is a share, above 0 and at most 1."""
+"""The observer with constant gains: every blend is a share, above 0 and at most 1; and what it knows at the start."""
 
+import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
+from undertow.core.measurement import measurement_of_outputs
 from undertow.navigation.observer import observer
 from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.thrusters.thruster import PropellerReport
 
 SENSORS = (imu, dvl, depth, compass, position_fix, propeller_speed)
 BLENDS = ("imu", "dvl", "compass", "depth", "fix", "propeller")
@@ -22,3 +25,11 @@ def test_a_blend_that_is_no_share(name, blend):
 def test_a_blend_of_one_is_a_share(name):
     built = observer([sensor() for sensor in SENSORS], **{f"{name}_blend": 1.0})
     assert float(getattr(built.filter, f"{name}_blend")) == 1.0
+
+
+def test_propeller_speeds_are_known_only_by_their_sensor():
+    y = measurement_of_outputs(np.zeros(6), np.zeros(6), PropellerReport(np.arange(8.0), None))
+    without = observer([imu(), dvl()]).filter.start(y)
+    with_sensor = observer([imu(), dvl(), propeller_speed()]).filter.start(y)
+    assert without.actuator is None
+    np.testing.assert_array_equal(with_sensor.actuator.speed, np.arange(8.0))

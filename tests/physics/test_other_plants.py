@@ -410,3 +410,9 @@ def test_loads_act_as_they_say():
         change = np.asarray(under(x, u, push)) - under(x, u, 0 * push)
         mobility = plant.links.inverse_mass_matrix(x.position) if mobility is None else mobility
         np.testing.assert_allclose(change, -mobility @ push, rtol=1e-10, atol=1e-12)
+
+
+def test_power_of_the_arm_is_torque_times_rate():
+    plant = two_link_arm()
+    x = plant.initial_state(np.array([0.3, -0.4]), np.array([0.7, -1.1]))
+    np.testing.assert_allclose(plant.power(x, np.array([2.0, 3.0])), [1.4, -3.3])
