@@ -345,6 +345,29 @@ def bench():
     return {float(v): (*ratios[:, i], thrust[i]) for i, v in enumerate(volts)}
 
 
+def test_what_a_controller_knows_of_axial_flow_is_its_steady_curve():
+    """The range of the force is that of the largest command, and has no end where the command has none."""
+    volts = np.array([-2.5, 1.5, 3.0])
+
+    @eqx.filter_jit
+    def known(thruster):
+        curve = thruster.actuator_model(3, False)
+        force = curve.force((), volts)
+        return (
+            curve.range((), 1.0),
+            force,
+            curve.command((), force, 1.0),
+            thruster.steady_thrust(jnp.array([-5.0, 5.0])),
+        )
+
+    (low, high), force, command, ends = jax.tree.map(np.asarray, known(axial_flow(supply=5.0)))
+    np.testing.assert_allclose([low, high], ends)
+    np.testing.assert_allclose(command, volts, rtol=1e-9)
+    assert (np.sign(force) == np.sign(volts)).all()
+    (low, high), *_ = known(axial_flow(supply=np.inf))
+    assert (low, high) == (-np.inf, np.inf)
+
+
 def test_axial_flow_reproduces_its_own_bench_at_full_command(bench):
     for volts, measured in ((3.0, 11.69), (-3.0, -12.95)):
         ratio, torque, speed, thrust = bench[volts]
