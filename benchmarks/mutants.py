@@ -43,8 +43,7 @@ LEFT_OUT = re.compile(r"Variable|RemoveDecorator|BitOr|ExceptionReplacer")
 # What a test of the whole program prints for a test that failed.
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 SECONDS = 1800
-# Exit codes of pytest: all passed, and none selected.
-NO_FAILURE = (0, 5)
+NONE_SELECTED = 5  # exit code of pytest
 
 
 class Mutant(NamedTuple):
@@ -131,20 +130,21 @@ class Copy:
             path = self.project / mutant.path
             path.write_text(mutant.code(path.read_text()))
         try:
-            near = self._near(mutants)
+            # One test that fails is enough to kill one mutant; of several together all failures are wanted.
+            near = self._near(mutants[0]) if len(mutants) == 1 else []
             return (self._failures(near) if near else []) or self._failures([])
         finally:
             for path, original in originals.items():
                 path.write_text(original)
 
-    def _near(self, mutants: list[Mutant]) -> list[str]:
-        """Files of tests that import one of the changed modules: they run first, as they are likely to fail."""
-        modules = [mutant.path.removesuffix(".py").replace("/", ".") for mutant in mutants]
+    def _near(self, mutant: Mutant) -> list[str]:
+        """Files of tests that import the changed module: they run first, as they are likely to fail."""
+        module = mutant.path.removesuffix(".py").replace("/", ".")
         files = sorted((self.project / "tests").rglob("test_*.py"))
-        near = [file for file in files if any(module in file.read_text() for module in modules)]
-        return [str(file.relative_to(self.project)) for file in near]
+        return [str(file.relative_to(self.project)) for file in files if module in file.read_text()]
 
     def _failures(self, files: list[str]) -> list[str]:
+        """Tests of some files that fail, or of all where none is named; files may have none that is selected."""
         environment = os.environ | {"UNDERTOW_CACHE": str(self.caches), "PYTHONPATH": str(self.project)}
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *self.tests.split(), *files]
         try:
@@ -154,7 +154,8 @@ class Copy:
         except subprocess.TimeoutExpired:
             return [f"no end within {SECONDS} s"]
         failed = FAILED.findall(ended.stdout)
-        return failed if failed or ended.returncode in NO_FAILURE else [f"pytest ended with {ended.returncode}"]
+        passed = ended.returncode == 0 or (files and ended.returncode == NONE_SELECTED)
+        return failed if failed or passed else [f"pytest ended with {ended.returncode}"]
 
 
 def described(number: int, mutant: Mutant) -> list[str]:
