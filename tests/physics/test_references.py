@@ -60,35 +60,21 @@ def case(request):
 
 def at(reference, times):
     """Position, velocity and acceleration, one row per time."""
-    return _in_chunks(_at, reference, times)
+    return with_slopes(reference, times)[0]
 
 
 def with_slopes(reference, times):
     """The same, and their derivatives by automatic differentiation."""
-    return _in_chunks(_with_slopes, reference, times)
-
-
-def as_case(reference, times):
-    """As `at`, of a kind of reference whose slopes are asked for, too: one program for both."""
-    return with_slopes(reference, times)[0]
+    times = np.asarray(times, dtype=float)
+    parts = [_at(reference, np.resize(times[i : i + CHUNK], CHUNK)) for i in range(0, max(len(times), 1), CHUNK)]
+    return jax.tree.map(lambda *part: np.concatenate(part)[: len(times)], *parts)
 
 
 CHUNK = 1024  # as many times in every call: one program for each kind of reference
 
 
-def _in_chunks(function, reference, times):
-    times = np.asarray(times, dtype=float)
-    parts = [function(reference, np.resize(times[i : i + CHUNK], CHUNK)) for i in range(0, max(len(times), 1), CHUNK)]
-    return jax.tree.map(lambda *part: np.concatenate(part)[: len(times)], *parts)
-
-
 @eqx.filter_jit
 def _at(reference, times):
-    return jax.vmap(lambda t: list(reference.at(t)))(times)
-
-
-@eqx.filter_jit
-def _with_slopes(reference, times):
     return jax.vmap(lambda t: jax.jvp(lambda t: list(reference.at(t)), (t,), (jnp.ones_like(t),)))(times)
 
 
@@ -101,15 +87,14 @@ def test_derivatives_are_exact(case):
     np.testing.assert_allclose(slopes[1], acceleration, rtol=0, atol=1e-12)
     step = 1e-5
     for order, rate in enumerate((velocity, acceleration)):
-        later, earlier = as_case(reference, times + step), as_case(reference, times - step)
-        difference = (later[order] - earlier[order]) / (2 * step)
+        difference = (at(reference, times + step)[order] - at(reference, times - step)[order]) / (2 * step)
         np.testing.assert_allclose(difference, rate, rtol=0, atol=1e-8)
 
 
 def test_joints_are_smooth(case):
     """Position and velocity everywhere; acceleration too, but where it is said to jump."""
     name, reference, joints, _ = case
-    before, after = as_case(reference, joints - 1e-9), as_case(reference, joints + 1e-9)
+    before, after = at(reference, joints - 1e-9), at(reference, joints + 1e-9)
     for order in range(2):
         np.testing.assert_allclose(before[order], after[order], rtol=0, atol=1e-7)
     jumps = np.abs(before[2] - after[2]).max(1) if joints.size else np.zeros(0)
@@ -138,7 +123,7 @@ def test_gradients_are_finite(case):
 )
 def test_held_before_and_after(name):
     reference, joints, duration = CASES[name]
-    position, velocity, acceleration = as_case(reference, [-1e3, joints[0], joints[-1], duration, 1e6])
+    position, velocity, acceleration = at(reference, [-1e3, joints[0], joints[-1], duration, 1e6])
     np.testing.assert_allclose(position[0], position[1], rtol=0, atol=1e-14)
     np.testing.assert_allclose(position[3:], position[[2, 2]], rtol=0, atol=1e-14)
     assert not velocity[[0, 3, 4]].any() and not acceleration[[0, 3, 4]].any()
@@ -202,13 +187,13 @@ def test_settling_may_be_traced_and_zero():
 
 
 def test_circle_looks_where_it_goes():
-    position, velocity, _ = as_case(circle(heading="along"), np.linspace(0, 100, 41))
+    position, velocity, _ = at(circle(heading="along"), np.linspace(0, 100, 41))
     np.testing.assert_allclose(position[:, 5], np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0])), atol=1e-12)
     np.testing.assert_array_equal(at(circle(), [1.0, 70.0])[0][:, 3:], 0)
 
 
 def test_helix_after_one_turn():
-    position, velocity, _ = as_case(helix(3.0, 20.0, 0.1, 1.5, "along"), [0.0, 5.0, 20.0])
+    position, velocity, _ = at(helix(3.0, 20.0, 0.1, 1.5, "along"), [0.0, 5.0, 20.0])
     expected = [[0, 0, 1.5, 0, 0, 0], [3, 3, 2, 0, 0, np.pi / 2], [0, 0, 3.5, 0, 0, 2 * np.pi]]
     np.testing.assert_allclose(position, expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(velocity[:, :3], axis=1), np.hypot(2 * np.pi * 3 / 20, 0.1), rtol=1e-14)
@@ -219,7 +204,7 @@ def test_lissajous_closes():
     amplitude = (2.0, 1.0, 0.5, 0.3)
     reference = lissajous(amplitude, (0.1, 0.2, 0.3, 0.1), (0, 0, np.pi / 2, np.pi / 2), 4.0)
     turn = 2 * np.pi / 0.1
-    position, velocity, _ = as_case(reference, [0.0, turn / 4, turn])
+    position, velocity, _ = at(reference, [0.0, turn / 4, turn])
     np.testing.assert_allclose(position[0], [0, 0, 4.5, 0, 0, 0.3], rtol=0, atol=1e-14)
     np.testing.assert_allclose(position[1], [2, 0, 4.0, 0, 0, 0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(position[2], position[0], rtol=0, atol=1e-13)
@@ -228,7 +213,7 @@ def test_lissajous_closes():
 
 def test_sine_in_closed_form():
     times = np.array([0.0, 1.0, 7.3])
-    position, _, _ = as_case(CASES["sine"][0], times)
+    position, _, _ = at(CASES["sine"][0], times)
     np.testing.assert_allclose(position[:, 0], 1 + 2 * np.sin(0.4 * times + 0.3), rtol=1e-14)
     np.testing.assert_allclose(position[:, 1], -1 + 0.5 * np.sin(1.1 * times), rtol=1e-14)
     with pytest.raises(BadInput, match="`amplitude` must be one number, or 3 of them"):
@@ -278,7 +263,7 @@ def test_lawn_mower_looks_where_it_goes():
 
 
 def test_waypoints_are_visited_on_time():
-    position, velocity, _ = as_case(waypoints(SQUARE, 0.5, "along"), SQUARE_TIMES)
+    position, velocity, _ = at(waypoints(SQUARE, 0.5, "along"), SQUARE_TIMES)
     np.testing.assert_allclose(position[:, :3], SQUARE, rtol=0, atol=1e-13)
     np.testing.assert_allclose(position[:, 5], np.radians([0, 45, 135, 225, 270]), rtol=0, atol=1e-13)
     np.testing.assert_allclose(velocity[[0, -1]], 0, atol=1e-13)
@@ -297,7 +282,7 @@ def test_yaw_along_waypoints_is_continuous():
 
 
 def test_recorded_replays_its_rows():
-    position, velocity, _ = as_case(recorded(ROWS), ROWS[:, 0])
+    position, velocity, _ = at(recorded(ROWS), ROWS[:, 0])
     np.testing.assert_allclose(position, ROWS[:, 1:], rtol=0, atol=1e-14)
     np.testing.assert_allclose(velocity[[0, -1]], 0, atol=1e-14)
 
