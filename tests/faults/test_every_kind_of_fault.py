@@ -25,6 +25,7 @@ from undertow.thrusters.thruster import PropellerReport
 
 DT, FIRST, STOP, STEPS = 0.01, 3, 8, 11
 SENSORS = ["imu", "dvl", "depth", "compass", "position_fix", "propeller_speed"]
+WIDTHS = (8, 3, 1, 1, 2, 8)  # of their readings
 TIMES = DT * np.arange(STEPS)
 KINDS = list_kinds()
 # Severities with which a short fault is sure to show.
@@ -94,6 +95,11 @@ def row(k, tree):
     return jax.tree.map(lambda leaf: leaf[k], tree)
 
 
+MEASURED = jax.tree.map(np.asarray, jax.jit(jax.vmap(measured))(np.arange(float(STEPS))))
+POSE = Pose(np.array([0.5, 0.2, 1.0]), row(0, MEASURED.body).rotation, np.array([0.3, 0.1, 0.0]))
+INPUTS = 3 + 0.3 * np.arange(STEPS)[:, None] + 0.5 * np.arange(8.0)
+
+
 @eqx.filter_jit
 def read_through(faults, readings):
     """Measurements as the faults leave them, and whether one is active, of a vehicle whose input is 0."""
@@ -112,14 +118,13 @@ def read_through(faults, readings):
 
 @kinds_of("position", "attitude", "velocity", "angular_rate", "depth", "propeller_speed")
 def test_quantity(kind):
-    readings = MEASURED
-    found, active = jax.tree.map(np.asarray, read_through(with_fault(kind).faults, readings))
-    altered([not same(row(k, found), row(k, readings)) for k in range(STEPS)])
+    found, active = jax.tree.map(np.asarray, read_through(with_fault(kind).faults, MEASURED))
+    altered([not same(row(k, found), row(k, MEASURED)) for k in range(STEPS)])
     others = {"position": ("depth",), "depth": ("position",)}.get(kind.target, ())
-    for name, quantity in quantities_of(readings).items():
+    for name, quantity in quantities_of(MEASURED).items():
         if name != kind.target and name not in others:
             read = jax.vmap(quantity.read)
-            np.testing.assert_allclose(read(found), read(readings), rtol=0, atol=1e-12, err_msg=name)
+            np.testing.assert_allclose(read(found), read(MEASURED), rtol=0, atol=1e-12, err_msg=name)
     np.testing.assert_array_equal(active, [FIRST <= k < STOP for k in range(STEPS)])
 
 
@@ -137,7 +142,7 @@ def test_sensor(kind):
     ks = np.arange(STEPS)
     received = tuple(
         Received(0.3 + 0.07 * ks[:, None] + np.arange(width, dtype=float), ks % 2 == 1, np.zeros(STEPS))
-        for width in (8, 3, 1, 1, 2, 8)
+        for width in WIDTHS
     )
     found = jax.tree.map(np.asarray, delivered(with_fault(kind).navigation.faults, received))
     for index in range(len(SENSORS)):
@@ -151,9 +156,7 @@ def test_a_lagging_sensor_follows_by_implicit_euler():
     (kind,) = [kind for kind in KINDS if (kind.target, kind.mode) == ("sensor dvl", "slow")]
     place, tau = SENSORS.index("dvl"), 0.5
     readings = np.outer(np.arange(STEPS) + 1, [0.3, -0.2, 0.1])
-    received = [
-        Received(np.zeros((STEPS, width)), np.zeros(STEPS, bool), np.zeros(STEPS)) for width in (8, 3, 1, 1, 2, 8)
-    ]
+    received = [Received(np.zeros((STEPS, width)), np.zeros(STEPS, bool), np.zeros(STEPS)) for width in WIDTHS]
     received[place] = received[place]._replace(reading=readings)
     found = delivered(with_fault(kind).navigation.faults, tuple(received))[place].reading
     lagging = readings[0]
@@ -161,11 +164,6 @@ def test_a_lagging_sensor_follows_by_implicit_euler():
         share = DT / (DT + tau) if FIRST <= k < STOP else 1.0
         lagging = lagging + share * (readings[k] - lagging)
         np.testing.assert_allclose(found[k], lagging, rtol=1e-9)
-
-
-MEASURED = jax.tree.map(np.asarray, jax.vmap(measured)(np.arange(float(STEPS))))
-POSE = Pose(np.array([0.5, 0.2, 1.0]), row(0, MEASURED.body).rotation, np.array([0.3, 0.1, 0.0]))
-INPUTS = 3 + 0.3 * np.arange(STEPS)[:, None] + 0.5 * np.arange(8.0)
 
 
 @eqx.filter_jit

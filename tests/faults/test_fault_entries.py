@@ -26,8 +26,6 @@ BASE = {
 }
 KALMAN = {"navigation": {"kind": "kalman", "sensors": ["imu", "dvl", "depth"]}}
 OFF = {"target": "thruster 1", "mode": "off"}
-
-
 PARTS = PartCache()  # made once for all tests
 
 

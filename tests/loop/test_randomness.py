@@ -132,8 +132,8 @@ def test_single_precision_noise_outlives_its_clock():
         sensor: AbstractNavigation = white_noise(DEVIATION, 0.0)
         path, zero = sensor.realize(jax.random.PRNGKey(0)), np.zeros(1, dtype=np.float32)
         measured = lambda state: sensor.measure(path, state, jnp.asarray(1e5), Measurement(zero, zero))[0]
-        told = jax.jit(jax.vmap(measured))(2**24 + np.arange(9)).position
-        assert len(set(np.asarray(told).ravel().tolist())) == 9
+        positions = jax.jit(jax.vmap(measured))(2**24 + np.arange(9)).position
+        assert len(set(np.asarray(positions).ravel().tolist())) == 9
 
 
 REQUIRED = {"sensors": lambda: [imu(), dvl(), depth(), position_fix(), compass()]}
