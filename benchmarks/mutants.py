@@ -130,7 +130,7 @@ class Copy:
             path = self.project / mutant.path
             path.write_text(mutant.code(path.read_text()))
         try:
-            # One test that fails is enough to kill one mutant; of several together all failures are wanted.
+            # One test that fails is enough to kill one mutant; of several together all failures count.
             near = self._near(mutants[0]) if len(mutants) == 1 else []
             return (self._failures(near) if near else []) or self._failures([])
         finally:
