@@ -8,6 +8,7 @@ import pytest
 from undertow.analysis.metrics import measure
 from undertow.controllers.decentralised import decentralised
 from undertow.controllers.rcaf import rcaf
+from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.composite_model import composite_model, parts_of
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
@@ -135,19 +136,79 @@ def test_a_plant_of_one_part_has_one_law():
 
 
 def test_composite_of_different_plants():
-    """Blocks of a plant with 2 outputs and one with 6; the inverse of each is its own."""
+    """Plants with 2 and 6 outputs: blocks of G, and of all else the numbers of each alone."""
     arm, rov = two_link_arm().model(), hybrid_vehicle(bluerov2_heavy(), t200()).model()
     both = composite_model((arm, rov), (2, 8))
     demanded = np.linspace(1, -1, 8)
+    places = slice(0, 2), slice(2, None)
 
     @jax.jit
-    def attained(position, velocity):
+    def of_coordinates(position, velocity):
         y = both.coordinates.measurement(position, velocity)
-        return both.dynamics.gain(y) @ both.dynamics.invert(y, demanded)
+        r = Target(demanded, demanded / 2, demanded / 4)
+        own = [
+            (one, one.coordinates, one.coordinates.measurement(position[k], velocity[k]), Target(*(a[k] for a in r)), k)
+            for one, k in zip((arm, rov), places, strict=True)
+        ]
+        coordinates = both.coordinates
+        joined = {
+            "error": tuple(coordinates.tracking_error(y, r)),
+            "velocity": coordinates.velocity(y),
+            "acceleration": coordinates.acceleration(y, demanded),
+            "output_velocity": coordinates.output_velocity(y, demanded),
+            "drift": both.dynamics.drift(y),
+        }
+        alone = [
+            {
+                "error": tuple(c.tracking_error(y, r)),
+                "velocity": c.velocity(y),
+                "acceleration": c.acceleration(y, demanded[k]),
+                "output_velocity": c.output_velocity(y, demanded[k]),
+                "drift": one.dynamics.drift(y),
+            }
+            for one, c, y, r, k in own
+        ]
+        return both.dynamics.gain(y) @ both.dynamics.invert(y, demanded), joined, alone
 
-    found = attained(np.linspace(-0.5, 0.7, 8), np.linspace(0.3, -0.2, 8))
-    np.testing.assert_allclose(found, demanded, atol=1e-10)
+    attained, joined, alone = of_coordinates(np.linspace(-0.5, 0.7, 8), np.linspace(0.3, -0.2, 8))
+    np.testing.assert_allclose(attained, demanded, atol=1e-10)
+    for found, *parts in zip(*map(jax.tree.leaves, (joined, *alone)), strict=True):
+        np.testing.assert_allclose(found, np.concatenate(parts), rtol=1e-13)
     assert [count for count in parts_of(both)[1]] == [2, 8] and both.coordinates.axes == ()
+
+
+def test_composite_of_different_actuators():
+    """Eight T200 and two actuators with a lag of 0.4 s: every number is that of each alone."""
+    lagged = LaggedActuator(DirectActuator(3.0, -2.0, 2.5), 0.4, 2)
+    models = hybrid_vehicle(bluerov2_heavy(), t200()).model(), two_link_arm().model()._replace(actuators=lagged)
+    parts, both = [one.actuators for one in models], composite_model(models, (8, 2)).actuators
+    assert float(both.time_constant()) == 0.4
+    unknown = models[1]._replace(actuators=DirectActuator(at_once=False))
+    assert composite_model((models[0], unknown), (8, 2)).actuators.time_constant() is None
+    u, force = np.linspace(-0.9, 0.9, 10), np.linspace(-20.0, 20.0, 10)
+    places = slice(0, 8), slice(8, None)
+
+    @jax.jit
+    def steps(u, force):
+        def of(one, u, force):
+            state = one.update_from_report(one.advance(one.init(), u, 0.05), None)
+            rate = jnp.asarray(3.0)
+            low, high = (jnp.broadcast_to(end, u.shape) for end in one.range(state, rate))
+            return {
+                "range": (low, high),
+                "force": one.force(state, u),
+                "command": one.command(state, force, rate),
+                "target": one.target_of(state, u, rate),
+                "still": one.quasi_static().force(one.quasi_static().init(), u),
+            }
+
+        bandwidths = [one.max_bandwidth(0.05) for one in (both, *parts)]
+        return of(both, u, force), [of(one, u[k], force[k]) for one, k in zip(parts, places, strict=True)], bandwidths
+
+    joined, alone, (bandwidth, *own) = steps(u, force)
+    for found, *values in zip(*map(jax.tree.leaves, (joined, *alone)), strict=True):
+        np.testing.assert_allclose(found, np.concatenate(values), rtol=1e-12)
+    assert float(bandwidth) == min(map(float, own)) < max(map(float, own))
 
 
 def scenario(**changes):

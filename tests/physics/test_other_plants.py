@@ -254,6 +254,14 @@ def test_levitation_plant_moves_by_the_same_equations():
     np.testing.assert_array_equal(saturated, 1.0)
 
 
+@pytest.mark.parametrize(("height", "status"), [(-1e-6, "OUT_OF_RANGE"), (0.0459, "OK"), (0.0461, "OUT_OF_RANGE")])
+def test_levitation_ends_at_either_coil(height, status):
+    plant = magnetic_levitation()
+    assert float(plant.rig.travel) == pytest.approx(0.1 - 0.054)
+    x = start(plant)._replace(z=np.array([height]))
+    assert int(plant.status(x)) == int(Status[status])
+
+
 def test_levitation_allocates_to_the_coil_that_pulls_the_wanted_way():
     plant = magnetic_levitation(fidelity="ideal")
     dynamics = plant.model().dynamics

@@ -14,6 +14,7 @@ from undertow import vehicles
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.core.param import parameters
+from undertow.vehicles.vehicle import Vehicle
 
 # Mass (kg), smallest and largest eigenvalue of M, (B - W) / W (%), righting moment (N m/rad), smallest eigenvalue of
 # the symmetric part of D at unit speed; to the digits given. From the printed numbers, by other code than undertow's.
@@ -214,3 +215,44 @@ def test_npsauv2_cross_flow_is_the_integral_over_the_hull(axis, coefficient, pow
 def test_npsauv2_refuses_to_cruise_backwards():
     with pytest.raises(BadInput, match="speed"):
         vehicles.npsauv2(speed=-1.0)
+
+
+def test_thrusters_are_named_by_where_they_stand():
+    names = vehicles.bluerov2_heavy().thruster_names()
+    assert names[:2] == ("T1 bow starboard", "T2 bow port") and names[-1] == "T8 vertical stern port"
+    assert vehicles.remus100().thruster_names() == ("T1 stern",)
+    assert vehicles.npsauv2().thruster_names() == ("T1 stern",)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("inertia", lambda one: one[:2], "be a 3 x 3 matrix, but is of shape (2, 3)"),
+        ("added_mass", lambda one: one[0], "be a 6 x 6 matrix, but is of shape (6,)"),
+        ("linear_damping", lambda one: one * np.nan, "be a finite number"),
+        ("added_mass", lambda one: -one, "leave M = M_RB + M_A positive definite"),
+        ("inertia", lambda one: one - 2 * np.diag(np.diag(one)), "That of the rigid body, M_RB, is not by itself"),
+        ("added_mass", lambda one: one + np.eye(6, k=1), "be symmetric, but is off by 1"),
+        ("thruster_positions", lambda one: one[1:], "have one row (x, y, z) per thruster, like thruster_directions"),
+        ("thruster_directions", lambda one: 1.01 * one, "have length 1, but is 1.01 long"),
+        ("mass", lambda one: 0 * one, "be positive"),
+        ("buoyancy", lambda one: -one, "be positive"),
+        ("r_g", lambda one: one[:2], "have 3 entries (forward, starboard, down), but is 2 long"),
+        ("r_b", lambda one: one + np.inf, "be a finite number"),
+    ],
+)
+def test_no_body_is_like_that(name, change, says):
+    rov = vehicles.bluerov2_heavy("wu2018")
+    given = {field: getattr(rov, field) for field in rov.__dataclass_fields__}
+    with pytest.raises(BadInput) as caught:
+        Vehicle(**(given | {name: change(np.asarray(given[name]))}))
+    assert str(caught.value).startswith(f"`{name}") and says in str(caught.value)
+
+
+def test_thrusters_are_left_out_by_their_numbers():
+    rov = vehicles.bluerov2_heavy()
+    some = rov.with_thrusters((8, 2))
+    np.testing.assert_array_equal(some.thruster_matrix(), np.asarray(rov.thruster_matrix())[:, [7, 1]])
+    for wrong, says in (((0,), "be numbers from 1 to 8"), ((1, 9), "but is 9"), ((1, 1), "different"), ((), "one or")):
+        with pytest.raises(BadInput, match=says):
+            rov.with_thrusters(wrong)

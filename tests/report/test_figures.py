@@ -228,12 +228,6 @@ def test_sweep_draws_points_and_theory():
     assert "rad/s" in panel.get_xlabel()
 
 
-def test_thrusters_are_named_by_where_they_stand():
-    names = vehicles.bluerov2_heavy().thruster_names()
-    assert names[:2] == ("T1 bow starboard", "T2 bow port") and names[-1] == "T8 vertical stern port"
-    assert vehicles.remus100().thruster_names() == ("T1 stern",)
-
-
 def test_signals_of_a_law_in_body_axes_have_their_names(make_run):
     """Its estimate is along surge, sway, ..., while position and error are north, east, ..."""
     run = make_run()
