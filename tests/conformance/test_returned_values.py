@@ -6,6 +6,8 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.core.returned import check_command, check_state, difference, form, not_two
+from undertow.core.signals import Signal, check_declared
+from undertow.faults.mode import Altered, altered_by
 
 
 class Law:
@@ -81,3 +83,53 @@ def test_a_state_that_changes_its_form():
     check_state(Law(), {"a": jnp.zeros(2)}, {"a": jnp.ones(2)})
     with pytest.raises(BadInput, match=r"`Law.advance` must .* of shape \(1,\) instead of \(2,\)"):
         check_state(Law(), {"a": jnp.zeros(1)}, {"a": jnp.ones(2)})
+
+
+class Mode:
+    """A fault that alters a signal to what it is told."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def apply(self, memory, moment, value):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (jnp.zeros(2), "the altered signal and the memory"),
+        ((jnp.zeros(3), jnp.zeros(2)), "must return an Altered first, but returns"),
+        ((Altered(jnp.zeros(2), True), jnp.zeros(2)), r"must return a signal of shape \(3,\)"),
+        ((Altered(jnp.zeros(3), True), jnp.zeros(1)), "must return the memory in the form that `init` gives it"),
+    ],
+)
+def test_answers_that_are_no_altered_signal(answer, says):
+    value = jnp.zeros(3)
+    right = (Altered(value, True), jnp.zeros(2))
+    assert altered_by(Mode(right), jnp.zeros(2), None, value) is right
+    with pytest.raises(BadInput, match=f"^Mode: `apply`.*{says}"):
+        altered_by(Mode(answer), jnp.zeros(2), None, value)
+
+
+class Declaring:
+    """A part that declares these signals."""
+
+    def __init__(self, declared):
+        self.signals = lambda: declared
+
+
+@pytest.mark.parametrize(
+    ("declared", "given", "says"),
+    [
+        (None, {}, "`Declaring.signals` must return a mapping"),
+        ({"a": "m"}, {}, "`Declaring.signals` must return a mapping"),
+        ({}, {"a": 1.0}, "`Declaring.command` gives a signal `a`, which `Declaring.signals` does not declare"),
+        ({"a": Signal((), "m", "a")}, {}, "declares a signal `a`, which `Declaring.command` does not give"),
+    ],
+)
+def test_signals_that_are_not_those_declared(declared, given, says):
+    part = Declaring({"a": Signal((), "m", "a")})
+    check_declared(part, {"a": 1.0}, "command")
+    with pytest.raises(BadInput, match=says):
+        check_declared(Declaring(declared), given, "command")

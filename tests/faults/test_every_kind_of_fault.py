@@ -62,11 +62,15 @@ def with_fault(kind, healthy=loop):
 
 
 def kinds_of(*targets):
-    """Kinds with these targets in which each target and each mode is met; the first of each target is a quick test."""
+    """Kinds with these targets in which each target and each mode is met; the first of each target is a quick test.
+
+    So is one whose fault acts on the thrust rather than the input, and one in which a step is computed twice.
+    """
     chosen, seen = [], set()
     for kind in KINDS:
         if kind.target.startswith(targets) and not {kind.target, kind.mode} <= seen:
-            chosen.append(pytest.param(kind, marks=pytest.mark.full if kind.target in seen else ()))
+            quick = kind.target not in seen or kind.mode in ("one_sided", "duplicated_step")
+            chosen.append(pytest.param(kind, marks=() if quick else pytest.mark.full))
             seen |= {kind.target, kind.mode}
     return pytest.mark.parametrize("kind", chosen, ids=lambda kind: f"{kind.target}-{kind.mode}".replace(" ", "_"))
 

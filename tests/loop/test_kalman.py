@@ -392,8 +392,15 @@ def test_deviations_grow_as_integrals_where_nothing_is_sensed():
     assert fixed["north"] == pytest.approx(1 / np.sqrt(1 / 0.1**2 + 100 / 0.01), rel=0.01)
 
 
-@pytest.mark.full
-@UNSEEN
+@pytest.mark.parametrize(
+    ("sensors", "unseen"),
+    [
+        ([imu(), dvl(), depth(), position_fix(), compass()], []),
+        ([imu(), dvl(), depth(), position_fix()], ["yaw"]),
+        pytest.param([imu(), dvl(), depth(), compass()], ["north", "east"], marks=pytest.mark.full),
+        pytest.param([imu()], ["north", "east", "down", "yaw"], marks=pytest.mark.full),
+    ],
+)
 def test_what_sensors_cannot_observe_is_said_in_words(sensors, unseen):
     said = kalman(sensors).advice(60.0)
     assert len(said) == bool(unseen)

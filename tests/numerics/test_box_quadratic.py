@@ -83,6 +83,22 @@ def test_a_variable_may_be_held():
     assert float(found[2]) == 0.7
 
 
+def test_slope_along_one_direction_of_everything():
+    """Against a small change of all that is given; some variables are at a bound, others inside."""
+    rng = np.random.default_rng(3)
+    given = (rng.uniform(0.5, 2.0, 6), rng.normal(size=(3, 6)), np.array([9.0, -9.0, 0.3, 0.2, -0.1, 0.4]))
+    given = tuple(map(jnp.asarray, (*given, np.full(6, -0.8), np.full(6, 0.9))))
+    direction = tuple(jnp.asarray(rng.normal(size=one.shape)) for one in given)
+    x, slope = jax.jit(lambda a, b: jax.jvp(box_minimum, a, b))(given, direction)
+    near = [solve(*(one + step * way for one, way in zip(given, direction, strict=True))) for step in (1e-6, -1e-6)]
+    np.testing.assert_allclose(slope, (np.asarray(near[0]) - near[1]) / 2e-6, rtol=1e-5, atol=1e-7)
+    np.testing.assert_array_equal(x, solve(*given))
+    at_low, at_high = np.asarray(x) == given[3], np.asarray(x) == given[4]
+    assert at_low.any() and at_high.any() and not (at_low | at_high).all()
+    np.testing.assert_array_equal(np.asarray(slope)[at_low], np.asarray(direction[3])[at_low])
+    np.testing.assert_array_equal(np.asarray(slope)[at_high], np.asarray(direction[4])[at_high])
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("mode", [jax.jacfwd, jax.jacrev])
 def test_derivatives_are_those_of_small_changes(mode):

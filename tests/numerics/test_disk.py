@@ -12,7 +12,10 @@ def test_one_at_a_time_in_either_of_two_names(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "out", target_is_directory=True)
     with disk.alone(tmp_path / "out"):
         for path in (tmp_path / "out", tmp_path / "link"):
-            with pytest.raises(disk.InUse, match=r"^`--out` must be a folder that nothing else writes to"), disk.alone(path):
+            with (
+                pytest.raises(disk.InUse, match=r"^`--out` must be a folder that nothing else writes to"),
+                disk.alone(path),
+            ):
                 pass
         with disk.alone(tmp_path / "another"):
             pass
@@ -66,6 +69,8 @@ def test_everything_in_a_folder_is_on_the_disk(tmp_path, monkeypatch):
     (tmp_path / "a" / "b").mkdir(parents=True)
     (tmp_path / "a" / "b" / "c.txt").write_text("c")
     settled, fsync = [], os.fsync
-    monkeypatch.setattr(disk.os, "fsync", lambda handle: settled.append(os.readlink(f"/proc/self/fd/{handle}")) or fsync(handle))
+    monkeypatch.setattr(
+        disk.os, "fsync", lambda handle: settled.append(os.readlink(f"/proc/self/fd/{handle}")) or fsync(handle)
+    )
     disk.settle(tmp_path / "a")
     assert [one.removeprefix(f"{tmp_path}/") for one in settled] == ["a/b/c.txt", "a/b", "a"]

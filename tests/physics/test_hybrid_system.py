@@ -7,8 +7,11 @@ import pytest
 from textbook import coriolis_matrix, jacobian
 
 from undertow.core.contracts import Load
+from undertow.core.status import Status
+from undertow.numerics.rotations import Kinematics
 from undertow.plants import hybrid_vehicle
 from undertow.thrusters import paper_table3
+from undertow.thrusters.thruster import PropellerReport
 from undertow.vehicles import Vehicle, odin
 
 RNG = np.random.default_rng(2)
@@ -149,6 +152,45 @@ def test_rank_of_gain_is_the_rank_of_the_thruster_matrix(numbers, rank):
     singular = np.linalg.svd(CODE[:, :, columns], compute_uv=False)
     assert ((singular > 1e-10 * singular[:, :1]).sum(1) == rank).all()
     assert plant.rank() == rank
+
+
+def test_status_of_a_vehicle():
+    """Euler angles exist but near pitch 90 degrees; nothing is farther than 1 km or faster than 1 km/s."""
+    start = NOMINAL.initial_state(jnp.asarray([1.0, 2.0, 3.0, 0.4, 0.0, 0.5]))
+    turned = lambda pitch: NOMINAL.initial_state(jnp.asarray([1.0, 2.0, 3.0, 0.0, pitch, 0.0]))
+    fast = start.nu.at[2].set(-1.1e3)
+    cases = {
+        "OK": [start, turned(np.pi / 2 - 2e-3), start._replace(nu=start.nu.at[2].set(-9e2))],
+        "PITCH_SINGULAR": [turned(np.pi / 2 - 5e-4), turned(-np.pi / 2 + 5e-4)],
+        "DIVERGED": [
+            start._replace(nu=fast),
+            start._replace(position=start.position * 1e3),
+            turned(np.pi / 2)._replace(nu=fast),
+        ],
+    }
+    status = jax.jit(lambda x: NOMINAL.status(x))
+    for name, states in cases.items():
+        assert [int(status(x)) for x in states] == [int(Status[name])] * len(states), name
+
+
+def test_a_known_speed_of_the_propellers_adds_its_term_to_the_model():
+    """phi of Eq. (15) for each thruster, as thrust; the rate of the speed is in it."""
+    without, known = (NOMINAL.model(speed_sensor=on).dynamics for on in (False, True))
+    speed, rate = np.linspace(-30.0, 40.0, 8), np.linspace(5.0, -6.0, 8)
+    x = NOMINAL.initial_state(POSE[0], VELOCITY[0])
+    motor = NOMINAL.thruster.motor
+
+    @jax.jit
+    def difference(x):
+        y = NOMINAL.output(0.0, x)._replace(actuator=PropellerReport(speed, rate))
+        kinematics = Kinematics(y.body.rotation)
+        phi = -motor.voltage_gain * (motor.k1 * rate + motor.k2 * speed)
+        return known.drift(y) - without.drift(y), kinematics.to_world(
+            NOMINAL.body.accelerate(NOMINAL.thruster_matrix @ phi)
+        )
+
+    found, expected = difference(x)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 @pytest.mark.full

@@ -14,7 +14,9 @@ from undertow.core.errors import BadInput
 from undertow.disturbances.adding import Together
 from undertow.disturbances.parameter_error import parameter_error
 from undertow.disturbances.payload import payload
+from undertow.disturbances.sheared_current import sheared_current
 from undertow.disturbances.tether import tether
+from undertow.disturbances.waves import waves
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
@@ -140,8 +142,21 @@ def test_tether():
         (lambda: payload(start=2.0, stop=1.0), "`stop` must be later than start (2 s), but is 1 s"),
         (lambda: parameter_error(mass=(1.2, 0.8)), r"`mass` must be \(lowest, highest\), but is \[1.2, 0.8\]"),
         (lambda: parameter_error(mass=(0.0, 0.8)), r"`mass\[0\]` must be positive, but is 0"),
+        (
+            lambda: sheared_current(depths=(0.0,)),
+            r"`depths` must be a list of two or more depths, but is of shape \(1,\)",
+        ),
+        (lambda: sheared_current(velocities=((1.0, 0.0),)), r"have 2 rows .* one per depth, but is of shape \(1, 2\)"),
+        (lambda: sheared_current(depths=(5.0, 5.0)), r"`depths` must increase, but is \[5.0, 5.0\]"),
+        (lambda: waves(components=0), "`components` must be 1 or more, but is 0"),
     ],
 )
 def test_bad_input(make, said):
     with pytest.raises(BadInput, match=said.replace("(2 s)", r"\(2 s\)")):
         make()
+
+
+def test_jumps_of_several_disturbances_are_those_of_each():
+    both = Together((payload(start=1.0, stop=4.0), payload(start=4.0, stop=6.0), waves(), tether()))
+    assert both.jumps(10.0) == (1.0, 4.0, 6.0) and both.jumps(5.0) == (1.0, 4.0) and both.jumps(4.0) == (1.0,)
+    assert parameter_error().jumps(10.0) == ()

@@ -6,7 +6,6 @@ import pytest
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
-from undertow import vehicles
 from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
 from undertow.report.figures.paper import effort, uncertainty
 from undertow.reproduction.thruster_response import thruster_response

@@ -11,7 +11,6 @@ from undertow.controllers import rcaf
 from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.inertia import InertiaIdentification
 from undertow.controllers.robust.memory import Observed, memory
-from undertow.core.errors import BadInput
 from undertow.disturbances import none
 from undertow.estimation.fuzzy_system import gaussian_sets
 from undertow.loop import simd_batch
@@ -160,16 +159,6 @@ def test_the_command_does_not_jump_when_the_inertia_changes():
     assert np.abs(law.inertia_ratio(after) - law.inertia_ratio(state)).min() > 1e-4
     before = law.value(state, phi, beside - rest) + rest
     np.testing.assert_allclose(law.value(after, phi, beside - rest + lost) + rest - lost, before, rtol=1e-12)
-
-
-def test_bad_probing_is_refused():
-    model = hybrid_vehicle(bluerov2_heavy(), t200()).model(rate_term=True)
-    for value in (-0.1, float("nan"), [0.1, 0.1]):
-        with pytest.raises(BadInput, match="probing"):
-            rcaf(model, preset="learning", sampling_time=DT, probing=value)
-    law = rcaf(model, preset="learning", sampling_time=DT, probing=0.0)
-    assert law.memory.inertia is None
-    assert "inertia" not in law.signals()
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ from undertow.controllers.robust.estimator import Estimator
 from undertow.controllers.robust.knowledge import load_knowledge, save_knowledge
 from undertow.controllers.robust.memory import Observed, memory
 from undertow.core.contracts import Target, TrackingError
-from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances import none, sinusoid
 from undertow.estimation.fuzzy_system import gaussian_sets
@@ -181,19 +180,6 @@ def test_knowledge_is_saved_and_the_next_run_begins_with_it(dive, tmp_path):
     found = simd_batch.simulate(again, duration=60.0, dt=DT, record_every=5)
     np.testing.assert_array_equal(found.signals["memory_weights"][0], weights)
     np.testing.assert_allclose(found.signals["memory_variance"][0], variance, rtol=1e-12)
-
-
-def test_bad_options_are_refused(tmp_path):
-    model, wrong = double_integrator(1).model(), tmp_path / "wrong.npz"
-    np.savez(wrong, weights=np.zeros((3, 1)), variance=np.ones(3))
-    made = lambda **options: rcaf(model, preset="learning", **options)
-    for name, value in {"rules": 4, "regressor": "cubic", "horizon": 0.0, "learning_rate": -1.0, "speeds": 0.0}.items():
-        with pytest.raises(BadInput, match=name):
-            made(**{name: value})
-    with pytest.raises(BadInput, match="knowledge"):
-        made(knowledge=str(tmp_path / "missing.npz"))
-    with pytest.raises(BadInput, match="knowledge"):
-        made(knowledge=str(wrong))
 
 
 @pytest.mark.slow

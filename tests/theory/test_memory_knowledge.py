@@ -140,6 +140,38 @@ def dives(tmp_path_factory):
     return found
 
 
+def test_bad_options_of_the_memory_are_refused(tmp_path):
+    model, wrong = double_integrator(1).model(), tmp_path / "wrong.npz"
+    np.savez(wrong, weights=np.zeros((3, 1)), variance=np.ones(3))
+    made = lambda **options: rcaf(model, preset="learning", **options)
+    for name, value in {"rules": 4, "regressor": "cubic", "horizon": 0.0, "learning_rate": -1.0, "speeds": 0.0}.items():
+        with pytest.raises(BadInput, match=name):
+            made(**{name: value})
+    with pytest.raises(BadInput, match="knowledge"):
+        made(knowledge=str(tmp_path / "missing.npz"))
+    with pytest.raises(BadInput, match="knowledge"):
+        made(knowledge=str(wrong))
+
+
+def test_bad_probing_is_refused():
+    model = hybrid_vehicle(bluerov2_heavy(), t200()).model(rate_term=True)
+    for value in (-0.1, float("nan"), [0.1, 0.1]):
+        with pytest.raises(BadInput, match="probing"):
+            rcaf(model, preset="learning", sampling_time=DT, probing=value)
+    law = rcaf(model, preset="learning", sampling_time=DT, probing=0.0)
+    assert law.memory.inertia is None
+    assert "inertia" not in law.signals()
+
+
+def test_the_strongest_weights_of_each_axis_are_listed():
+    weights, variance = np.array([[0.1, -3.0], [-2.0, 0.5], [1.0, 1.0]]), np.array([0.04, 0.09, 0.16])
+    found = strongest(weights, variance, ["a", "b", "c"], ["x", "y"], count=2)
+    assert [(one.axis, one.regressor, one.weight) for one in found] == [
+        ("x", "b", -2.0), ("x", "c", 1.0), ("y", "a", -3.0), ("y", "c", 1.0)
+    ]  # fmt: skip
+    assert [one.variance for one in found] == [0.09, 0.16, 0.04, 0.16]
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("name", ["robust", "learning", "turned"])
 def test_the_estimation_error_is_within_the_bound_of_what_the_memory_does_not_explain(dives, name):
