@@ -23,6 +23,10 @@ from jaxtyping import install_import_hook
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
+# What JAX traces it keeps: to look for garbage after every 700 new objects, as Python does by default, takes a tenth of
+# the quick set and finds little.
+gc.set_threshold(50_000)
+
 # Parts of the full set; those of the second line need other programs, or minutes.
 IN_THE_FULL_SET = {"full", "docs", "compiler", "interop", "soak"}
 BY_THEMSELVES = {"slow", "slurm", "ssh", "dds"}
