@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from undertow.navigation.drift import drift_advice, drifts
-from undertow.navigation.observability import Sensed, deviations, drift_sentences, unobservable
+from undertow.navigation.observability import Sensed, drift_sentences, unobservable
 from undertow.sensors.compass import compass
 from undertow.sensors.depth import depth
 from undertow.sensors.dvl import dvl
@@ -65,24 +65,6 @@ def test_a_reading_tells_of_its_derivatives_too():
     assert unobservable([sensed(14)]) == ["north", "east", "roll", "pitch", "yaw"]
     assert unobservable([]) == ["north", "east", "down", "roll", "pitch", "yaw"]
     assert unobservable([sensed(12, 13, 14), sensed(0, 1, 2)]) == []
-
-
-def test_deviation_of_what_nobody_sees():
-    """Without sensors: an initial velocity v0 of sigma moves by sigma T, white noise q by sqrt(q T^3 / 3)."""
-    initial, noise = np.zeros(15), np.zeros(15)
-    initial[8], initial[14], noise[7] = 0.2, 0.3, 0.01
-    found = deviations([], initial, noise, 20.0)
-    assert found["down"] == pytest.approx(np.hypot(0.3, 0.2 * 20), rel=1e-9)
-    assert found["east"] == pytest.approx(np.sqrt(0.01 * 20**3 / 3), rel=2e-3)
-    assert found["north"] == found["yaw"] == 0
-
-
-def test_deviation_of_what_is_read_is_that_of_the_mean():
-    """N readings of a constant of unknown size: sigma / sqrt(N); the steps of the analysis divide no reading."""
-    initial = np.zeros(15)
-    initial[14] = 1e3
-    found = deviations([sensed(14)], initial, np.zeros(15), 50.0)
-    assert found["down"] == pytest.approx(0.1 / np.sqrt(50.0 / 0.5), rel=1e-4)
 
 
 def test_the_sentence_of_the_filter():

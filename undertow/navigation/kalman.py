@@ -7,6 +7,7 @@ readings (its algorithm without process noise over the delay).
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -187,17 +188,22 @@ class Kalman(AbstractFilter):
         return {"navigation_deviation": jnp.sqrt(variances), "rejected_readings": state.rejected}
 
     def advice(self, duration):
+        # One program: by itself each of its hundred operations would be compiled.
+        sensed, initial, noise = jax.tree.map(np.asarray, eqx.filter_jit(Kalman._at_rest)(self))
+        return drift_sentences([Sensed(*one) for one in sensed], initial, noise, duration)
+
+    def _at_rest(self) -> tuple[list[tuple[Array, Array, Array]], Array, Array]:
+        """Of a vehicle at rest and level: slopes, variance and period of each sensor, deviations at first, noise."""
         level = self.start(measurement_of_outputs(jnp.zeros(6), jnp.zeros(6)))
         sensed = []
         for sensor in self.sensors:
             if not isinstance(sensor, PropellerSpeed):
-                slopes = np.asarray(_expected(level, sensor, 0.0)[1])
-                variance = np.asarray(self.variance(sensor, len(slopes)))
-                sensed.append(Sensed(slopes, variance, float(sensor.sampling.period)))
+                slopes = _expected(level, sensor, 0.0)[1]
+                sensed.append((slopes, self.variance(sensor, len(slopes)), jnp.asarray(sensor.sampling.period)))
         of_rates, of_force = self.inertial_noise(next(one for one in self.sensors if isinstance(one, IMU)))
-        one = np.ones(3)
-        noise = np.concatenate([of_rates, self.gyro_drift**2 * one, of_force, self.force_drift**2 * one, 0 * one])
-        return drift_sentences(sensed, np.asarray(self.initial_deviations()), noise, duration)
+        one = jnp.ones(3)
+        drifts = [of_rates, self.gyro_drift**2 * one, of_force, self.force_drift**2 * one, 0 * one]
+        return sensed, self.initial_deviations(), jnp.concatenate(drifts)
 
     def initial_deviations(self) -> Float[Array, "15"]:
         """Standard deviations of the errors at the start."""
