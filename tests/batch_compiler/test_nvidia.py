@@ -50,5 +50,13 @@ def test_remainders_stay_on_the_processor(gpu):
         nvidia.Kernel("  %x = frem <1 x double> %a, %b", Driver(gpu))
 
 
-def test_no_gpu_here():
-    assert jax.default_backend() != "gpu" and nvidia.gpu() is None
+def test_a_gpu_is_used_where_jax_sees_one_and_its_driver_loads(monkeypatch):
+    """On any machine, with or without a GPU."""
+
+    def missing():
+        raise OSError("libcuda.so.1: cannot open shared object file")
+
+    for backend, driver, found in (("cpu", object, False), ("gpu", missing, False), ("gpu", object, True)):
+        monkeypatch.setattr(jax, "default_backend", lambda backend=backend: backend)
+        monkeypatch.setattr(nvidia, "Driver", driver)
+        assert (nvidia.gpu() is not None) == found, (backend, found)
