@@ -31,7 +31,8 @@ from undertow.faults.mode import AbstractFault
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.navigation.perfect import perfect
-from undertow.scenario import execute
+from undertow.scenario import execute, factory
+from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.faulted import faulted
 from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
@@ -128,7 +129,7 @@ def _shown(value: float | None, unit: str) -> str:
 
 def simulate(
     plant: AbstractPlant,
-    controller: AbstractController,
+    controller: AbstractController | str | Mapping[str, Any],
     reference: AbstractReference,
     *,
     disturbance: AbstractDisturbance | Sequence[AbstractDisturbance] | None = None,
@@ -147,7 +148,8 @@ def simulate(
 
     Args:
         plant: what is controlled.
-        controller: the law, made from `plant.model()`.
+        controller: the law, made from `plant.model()`; or its name or a mapping, as under `controller` of a scenario:
+            `"robust"`, `{"kind": "pid", "bandwidth": 2.0}`.
         reference: what to follow.
         disturbance: what the surroundings do; several as a list, None for nothing.
         navigation: filter that estimates position and velocity from measurements; None for the true ones.
@@ -166,21 +168,34 @@ def simulate(
     """
     if isinstance(disturbance, list | tuple):
         disturbance = Together(tuple(disturbance))
-    roles = {
-        "plant": (plant, AbstractPlant),
-        "controller": (controller, AbstractController),
-        "reference": (reference, AbstractReference),
-        "disturbance": (none() if disturbance is None else disturbance, AbstractDisturbance),
-        "navigation": (perfect() if navigation is None else navigation, AbstractNavigation),
-    }
-    for name, (part, contract) in roles.items():
+    acting: Any = none() if disturbance is None else disturbance
+    navigation = perfect() if navigation is None else navigation
+    named = isinstance(controller, str | Mapping)
+    for name, part, contract in (
+        ("plant", plant, AbstractPlant),
+        ("controller", controller, str | Mapping if named else AbstractController),
+        ("reference", reference, AbstractReference),
+        ("disturbance", acting, AbstractDisturbance),
+        ("navigation", navigation, AbstractNavigation),
+    ):
         if not isinstance(part, contract):
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
     checks.choice("precision", precision, ("float64", "float32"))
     with runtime.in_precision(precision):
-        closed_loop = ClosedLoop(*(part for part, _ in roles.values()))
+        law = _named_law(controller, plant, navigation, dt) if named else controller
+        closed_loop = ClosedLoop(plant, law, reference, acting, navigation)
         closed_loop = in_present_precision(_with_faults(closed_loop, faults, dt))
         return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
+
+
+def _named_law(
+    controller: str | Mapping[str, Any], plant: AbstractPlant, navigation: AbstractNavigation, dt: float
+) -> AbstractController:
+    """The law that a scenario with this `controller` has."""
+    noise = np.asarray(velocity_noise_of(navigation, dt), dtype=float).tolist()
+    with within("controller"):
+        context = {"sampling_time": dt, "velocity_noise": noise}
+        return factory.make("controllers", controller, Path(), (plant.model(),), context)[0]
 
 
 def _with_faults(

@@ -8,6 +8,7 @@ import pytest
 from undertow.analysis.metrics import MEANINGS
 from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.core import catalogue
+from undertow.core.errors import BadInput
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
@@ -40,6 +41,25 @@ def test_every_option_has_a_meaning(kind, name):
 def test_list_shows_everything(undertow):
     out = undertow("list").out
     assert all(name in out for _, name in PARTS)
+
+
+def test_presets_are_found_by_their_names(undertow):
+    """In `list`, in `describe` and as `controller` of a scenario: one name for a law."""
+    rows = {row["name"]: row for row in json.loads(undertow("list", "controllers", "--json").out)}
+    for preset, law in {
+        "robust": "rcaf",
+        "learning": "rcaf",
+        "paper": "rcaf",
+        "px4": "cascade",
+        "placed": "cascade",
+    }.items():
+        assert rows[preset]["description"].startswith(f"Preset of `{law}`: ")
+        (described,) = describing.describe(preset)
+        assert (described.name, described.options[0].default) == (law, preset)
+        assert catalogue.spelled_out("controllers", {"kind": preset}) == {"kind": law, "preset": preset}
+    assert not set(catalogue.presets("controllers")) & set(catalogue.names("controllers"))
+    with pytest.raises(BadInput, match="`preset` must be left out, because `robust` is a preset of `rcaf`"):
+        catalogue.spelled_out("controllers", {"kind": "robust", "preset": "paper"})
 
 
 def test_parameters_come_with_unit_symbol_and_source(undertow):

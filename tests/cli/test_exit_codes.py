@@ -134,6 +134,18 @@ def test_bad_input_as_a_process(tmp_path):
     assert os.listdir(tmp_path) == ["s.yaml"]
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("command", ["list", "describe robust", "describe scenario --json-schema"])
+def test_a_reader_that_ends_early_is_no_error(command):
+    """As `undertow list | head -1`: the exit code of the signal, and nothing on stderr."""
+    code = [sys.executable, "-m", "undertow.cli.main", *command.split()]
+    with subprocess.Popen(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141
+
+
 SWALLOWED = """
 try:
     signal.raise_signal(signal.SIGINT)

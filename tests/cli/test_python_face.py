@@ -42,6 +42,27 @@ def test_python_and_scenario_agree_bit_for_bit(parts, tmp_path):
     assert run.dataset.attrs["content_hash"] == from_file.dataset.attrs["content_hash"]
 
 
+@pytest.mark.parametrize("law", ["robust", "pid", {"kind": "robust", "tracking": 1.5}])
+def test_a_law_by_its_name_is_that_of_a_scenario(law):
+    """Its gains follow from the sampling time and the noise of the navigation."""
+    noise = {"position": 0.001, "velocity": 0.01}
+    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(supply=16.0))
+    navigation = ut.navigation.white_noise(**noise)
+    goal = [1.0, 0, 0, 0, 0, 0.5]
+    run = ut.simulate(
+        plant, law, ut.references.setpoint(goal), navigation=navigation, dt=0.02, duration=0.2, record=0.1
+    )
+    scenario = {
+        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16.0}},
+        "controller": law,
+        "reference": {"kind": "setpoint", "position": goal},
+        "navigation": {"kind": "white_noise", **noise},
+        "loop": {"dt": 0.02, "duration": 0.2, "record": 0.1},
+    }
+    expected = ut.simulate_scenario(scenario)
+    assert run.dataset.attrs["content_hash"] == expected.dataset.attrs["content_hash"]
+
+
 def test_scenario_as_data():
     reference = {"kind": "setpoint", "position": [1] * 6}
     run = ut.simulate_scenario({"controller": "pid", "reference": reference, "loop": {"duration": 0.02}})

@@ -17,7 +17,7 @@ from undertow.core.signals import Signal
 from undertow.faults.kinds import list_kinds, severity_cells
 from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
-from undertow.scenario.describing import summary, text_of
+from undertow.scenario.describing import text_of
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.schema import Scenario, keys
 
@@ -102,16 +102,16 @@ def list_parts(kind: str | None, as_json: bool = False) -> None:
     shown_kinds = (kind,) if kind else catalogue.KINDS
     if as_json:
         rows = [
-            {"kind": shown, "name": name, "description": summary(part)}
+            {"kind": shown, "name": name, "description": sentence}
             for shown in shown_kinds
-            for name, part in sorted(catalogue.names(shown).items())
+            for name, sentence in describing.listed(shown)
         ]
         print(json.dumps(rows, indent=1))
         return
     table = Table("kind", "name", "description")
     for shown in shown_kinds:
-        for name, part in sorted(catalogue.names(shown).items()):
-            table.add_row(shown, name, Text(summary(part)))
+        for name, sentence in describing.listed(shown):
+            table.add_row(shown, name, Text(sentence))
         table.add_section()
     console = wide_console()
     console.print(table)

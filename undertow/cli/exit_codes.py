@@ -1,6 +1,7 @@
 """Exit codes, and one line on stderr for an error."""
 
 import os
+import select
 import signal
 import sys
 import traceback
@@ -19,6 +20,7 @@ INTERNAL_ERROR = 3
 FILES_FAILED = 4
 INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
 _BY_SIGNAL = 128  # and the number of the signal
+NOBODY_READS = _BY_SIGNAL + signal.SIGPIPE
 
 # What Python code of a user may end with, beside exceptions.
 _OF_PLUG_INS = (SystemExit, GeneratorExit)
@@ -31,6 +33,7 @@ MEANINGS = {
     INTERNAL_ERROR: "Internal error: please report it, with the output of `undertow --traceback ...`.",
     FILES_FAILED: "Files could not be read or written.",
     INTERRUPTED: "Interrupted by Ctrl-C.",
+    NOBODY_READS: "Nobody reads the output any more, as after `undertow list | head -3`; nothing is said.",
     _BY_SIGNAL
     + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
 }
@@ -45,11 +48,26 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _BY_SIGNAL + interrupted_by()
     except (Exception, *_OF_PLUG_INS) as error:
+        # Typer makes SystemExit of it.
+        if isinstance(error.__context__, BrokenPipeError) and _nobody_reads():
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python writes as it ends
+            return NOBODY_READS
         if os.environ.get("UNDERTOW_TRACEBACK") and not isinstance(error, typer.TyperException):
             traceback.print_exc()
         code, sentence = _explain(error)
         complain(sentence)
         return code
+
+
+def _nobody_reads() -> bool:
+    """Whether the reader of stdout has ended."""
+    try:
+        stdout = sys.stdout.fileno()
+    except OSError:  # no file
+        return False
+    poll = select.poll()
+    poll.register(stdout, 0)
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def complain(sentence: str) -> None:

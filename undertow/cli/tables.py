@@ -27,7 +27,14 @@ def terminal_table(rows: RunTable) -> Table:
     return table
 
 
+class _Output(Console):
+    """Console on stdout that leaves it to the command what happens where nobody reads any more."""
+
+    def on_broken_pipe(self) -> None:
+        raise  # what Rich has caught, and would end the process for
+
+
 def wide_console() -> Console:
     """Console on stdout; in a pipe its lines are wide enough for every table."""
-    console = Console(soft_wrap=False)
-    return console if console.is_terminal else Console(width=160)
+    console = _Output(soft_wrap=False)
+    return console if console.is_terminal else _Output(width=160)

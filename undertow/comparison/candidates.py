@@ -157,12 +157,9 @@ def _named(entry: str) -> dict[str, Any]:
     if _CODE in entry:
         catalogue.find("controllers", entry, Path(), "--controllers")
         return {"kind": factory.portable_name(entry, Path())}
-    parts = catalogue.names("controllers")
-    presets = {preset: kind for kind, function in parts.items() for preset in factory.presets_of(function)}
-    if entry in presets:
-        return {"kind": presets[entry], "preset": entry}
-    if entry in parts:
-        return {"kind": entry}
+    presets, parts = catalogue.presets("controllers"), catalogue.names("controllers")
+    if entry in presets or entry in parts:
+        return catalogue.spelled_out("controllers", {"kind": entry})
     hint = f"Name the function as well: {entry}:FUNCTION" if entry.endswith(".py") else ""
     known = [*presets, *parts, OWN]
     must = "name presets, controllers, ./file.py:function or scenario files"

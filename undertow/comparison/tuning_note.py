@@ -62,7 +62,7 @@ def _given(
     """
     kind = part["kind"]
     function = catalogue.find("controllers", kind, folder)
-    presets = factory.presets_of(function)
+    presets = catalogue.presets_of(function)
     preset = part.get("preset", next(iter(presets))) if presets else None
     defaults = inspect.signature(presets[preset] if preset else function).parameters
     known = law_of(kind, preset, law)

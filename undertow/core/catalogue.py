@@ -12,7 +12,7 @@ import importlib.metadata
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -89,6 +89,31 @@ def names(kind: str) -> dict[str, Part]:
     return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 
+def presets_of(part: Part) -> Mapping[str, Part]:
+    """Presets of a part, each with its own options; most parts have none."""
+    return getattr(part, "presets", {})
+
+
+def presets(kind: str) -> dict[str, str]:
+    """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
+    return {preset: name for name, part in names(kind).items() for preset in presets_of(part)}
+
+
+def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:
+    """A part that is named by a preset, as the part with that preset: `robust` is `{kind: rcaf, preset: robust}`.
+
+    Raises:
+        BadInput: it has a preset besides.
+    """
+    name = description.get("kind")
+    part = presets(kind).get(name) if isinstance(name, str) else None
+    if part is None:
+        return dict(description)
+    if "preset" in description:
+        raise BadInput("preset", f"be left out, because `{name}` is a preset of `{part}`", description["preset"])
+    return {**description, "kind": part, "preset": name}
+
+
 @functools.cache
 def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
     # Cached, because it reads a file of every installed package: too slow for each trial of a campaign.
@@ -114,7 +139,7 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
         raise BadInput(what, "name a file and a function in it", "a file alone" if what == name else name, hint=hint)
     parts = names(kind)
     if name not in parts:
-        hint = did_you_mean(name, parts) if parts else "Name a file of your own: ./file.py:function"
+        hint = did_you_mean(name, [*presets(kind), *parts]) if parts else "Name a file of your own: ./file.py:function"
         other = next((one for one in KINDS if one != kind and name in names(one)), None) if parts else None
         hint = f"`{name}` is one of the {other}: give it at `{KEY_OF[other]}`" if other else hint
         hint = f"Did you mean `{_OTHER_WORDS[name.lower()]}`?" if _OTHER_WORDS.get(name.lower()) in parts else hint

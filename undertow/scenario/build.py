@@ -20,6 +20,7 @@ from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
     AbstractInformedNavigation,
+    AbstractNavigation,
     AbstractReference,
 )
 from undertow.core.errors import Advice, BadInput, advice, within
@@ -210,9 +211,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("model"):
         model, resolved["model"] = part_cache.part("model", scenario.model, (plant,), known)
     navigation = make("navigation")
-    noise = isinstance(navigation, AbstractInformedNavigation) and _velocity_noise(
-        navigation, as_array(scenario.loop.dt)
-    )
+    noise = velocity_noise_of(navigation, scenario.loop.dt)
     check_noise(navigation, noise, plant, own_parts(scenario, text.folder))
     context["velocity_noise"] = np.asarray(noise, dtype=float).tolist()
     controller = make("controller", (model,))
@@ -258,6 +257,11 @@ def _required(built: Built) -> tuple[Requirement, ...]:
     bounds = {name: one.below for name, one in given.items() if one.below is not None}
     found = requirements_of(formulas, bounds, built.closed_loop, built.known_metrics(), built.scenario.loop.duration)
     return tuple(sorted(found, key=lambda one: list(given).index(one.name)))
+
+
+def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:
+    """Standard deviation of the measured velocities at each step of dt (s), for gains; zero where it is not known."""
+    return _velocity_noise(navigation, as_array(dt)) if isinstance(navigation, AbstractInformedNavigation) else 0.0
 
 
 @eqx.filter_jit

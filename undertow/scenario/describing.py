@@ -60,10 +60,11 @@ def describe(name: str) -> tuple[Description, ...]:
     given, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
     known = {kind: catalogue.names(kind) for kind in kinds}
-    named = [(kind, known[kind][short]) for kind in kinds if short in known[kind]]
-    found = tuple(one for kind, part in named for one in _presets(kind, short, part))
+    named = [(kind, catalogue.presets(kind).get(short, short)) for kind in kinds]
+    named = [(kind, part) for kind, part in named if part in known[kind]]
+    found = tuple(one for kind, part in named for one in _presets(kind, part, known[kind][part], short))
     if not found:
-        every = {part for parts_of_kind in known.values() for part in parts_of_kind}
+        every = {name for kind in kinds for name in (*known[kind], *catalogue.presets(kind))}
         raise BadInput(
             "NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "campaign", "metrics", "signals"})
         )
@@ -75,13 +76,25 @@ def summary(part: Any) -> str:
     return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
 
 
-def _presets(kind: str, name: str, part: Any) -> tuple[Description, ...]:
-    """The part, or each of its presets."""
-    presets = factory.presets_of(part)
+def listed(kind: str) -> list[tuple[str, str]]:
+    """Names of the parts of a kind and of their presets, each with a sentence, in alphabetical order."""
+    parts = catalogue.names(kind)
+    found = [(name, summary(part)) for name, part in parts.items()]
+    for preset, name in catalogue.presets(kind).items():
+        sentence = summary(catalogue.presets_of(parts[name])[preset])
+        found.append((preset, f"Preset of `{name}`: {sentence[:1].lower()}{sentence[1:]}"))
+    return sorted(found)
+
+
+def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, ...]:
+    """The part, or each of its presets, or the one of the name `short`."""
+    presets = catalogue.presets_of(part)
     if not presets:
         return (_describe(kind, name, part),)
     each = []
     for preset, function in presets.items():
+        if short not in (name, preset):
+            continue
         found = _describe(kind, name, function, {"kind": name, "preset": preset})
         chosen = Option("preset", preset, f"one of {', '.join(presets)}.")
         each.append(found._replace(options=(chosen, *found.options)))

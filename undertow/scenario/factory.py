@@ -84,7 +84,7 @@ def make(
     Raises:
         BadInput: the description is invalid; key names start at the part.
     """
-    options: dict[str, Any] = {"kind": description} if isinstance(description, str) else dict(description)
+    options = catalogue.spelled_out(kind, {"kind": description} if isinstance(description, str) else description)
     name = options.pop("kind", None)
     if not isinstance(name, str):
         raise BadInput("kind", f"name one of the {kind}", name)
@@ -110,11 +110,6 @@ def make(
         del resolved[argument]
     part = adjust(part, changes, tuple(own)) if changes else part
     return part, {"kind": portable_name(name, folder), **preset, **resolved, **changes, **table}
-
-
-def presets_of(function: Callable[..., Any]) -> Mapping[str, Callable[..., Any]]:
-    """Presets of a part, each with its own options; most parts have none."""
-    return getattr(function, "presets", {})
 
 
 def call(
@@ -257,7 +252,7 @@ def contract_like(thing: Any) -> tuple[str, list[str]]:
 
 def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
     """The function of the preset in the options, by default the first; and its name."""
-    presets = presets_of(function)
+    presets = catalogue.presets_of(function)
     if not presets:
         return function, {}
     name = options.pop("preset", next(iter(presets)))

@@ -65,7 +65,7 @@ def _names(kind: str) -> list[dict[str, Any]]:
 
 def _options(kind: str, part: Any) -> dict[str, Any]:
     """Options of a part, those of all its presets."""
-    presets = factory.presets_of(part)
+    presets = catalogue.presets_of(part)
     found: dict[str, Any] = {"preset": {"enum": list(presets)}} if presets else {}
     for function in presets.values() or (part,):
         for option in describing.options_of(kind, function):

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
+from undertow.core import catalogue
 from undertow.core.errors import BadInput, joined, known_key
 from undertow.scenario.reading import Text, wrong_file
 from undertow.scenario.synonyms import hint_for
@@ -24,6 +25,15 @@ def _named(default: str | None = None) -> BeforeValidator:
         return {"kind": default, **value} if default and isinstance(value, dict) else value
 
     return BeforeValidator(complete)
+
+
+def _law(value: Any) -> Any:
+    """A law by its name or that of a preset, or a mapping; `rcaf` unless it says otherwise."""
+    if not isinstance(value, str | dict):
+        return value
+    return catalogue.spelled_out(
+        "controllers", {"kind": value} if isinstance(value, str) else {"kind": "rcaf", **value}
+    )
 
 
 _YES, _NO = ("true", "yes", "on"), ("false", "no", "off", "none")
@@ -251,7 +261,7 @@ class Scenario(Strict):
     model: dict[str, Any] = Field(
         default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
     )
-    controller: Annotated[Part, _named("rcaf")] = Field(Part(kind="rcaf"), description="the control law")
+    controller: Annotated[Part, BeforeValidator(_law)] = Field(Part(kind="rcaf"), description="the control law")
     reference: NamedPart = Field(description="the desired motion")
     disturbance: OneOrMore = Field(Part(kind="none"), description="the disturbance; several as a list")
     navigation: NamedPart = Field(

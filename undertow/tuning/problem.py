@@ -12,7 +12,6 @@ import numpy as np
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean, within
-from undertow.scenario import factory
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text
 from undertow.tuning import tunable_parameters as tunable_parameters
@@ -115,7 +114,7 @@ def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractControl
     options = dict(built.resolved["controller"])
     function = catalogue.find("controllers", options.pop("kind"), text.folder)
     preset = options.pop("preset", None)
-    return (function if preset is None else factory.presets_of(function)[preset]), options
+    return (function if preset is None else catalogue.presets_of(function)[preset]), options
 
 
 def _parameters(
