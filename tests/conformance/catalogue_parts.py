@@ -8,8 +8,8 @@ import numpy as np
 
 from undertow.controllers.pid import pid
 from undertow.core import catalogue
+from undertow.core.catalogue import presets_of
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.scenario.factory import presets_of
 from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin

@@ -186,8 +186,13 @@ def test_names_of_parts_that_do_not_work(folder, name, says):
 
 
 def test_a_vehicle_file_is_no_plant(folder):
-    with pytest.raises(BadInput, match=r"`plant: \{vehicle: mine\.yaml\}`"):
+    hint = r"`plant: \{vehicle: mine\.yaml\}`"
+    with pytest.raises(BadInput, match=hint):
         find("plants", "mine.yaml", folder)
+    for kind, name in (("sensors", "mine.yaml"), ("plants", "mine")):
+        with pytest.raises(BadInput) as caught:
+            find(kind, name, folder)
+        assert "vehicle file" not in str(caught.value)
 
 
 def test_a_file_that_cannot_be_read_defines_nothing(folder):

@@ -13,9 +13,11 @@ from catalogue_parts import ALL, groups, make
 from recorded import FILE, is_as_recorded
 from use_of_parts import NUMBERS, numbers
 
+from undertow.core.param import tuning_ranges
+
 # Their programs take longest to compile, and tests of their own check what they compute.
 HEAVY = {("navigation", "kalman"), ("supervision", "supervisor"), ("controllers", "nmpc")}
-QUICK = ("faults", "sensors", "navigation")
+QUICK = ("faults", "sensors", "navigation", "power", "references", "thrusters")
 
 
 def values_of(pairs):
@@ -47,6 +49,13 @@ def test_parameters_are_those_that_were_recorded():
     """All numbers of every part and of what it is made of, its defaults among them; nothing is compiled."""
     for pair in ALL:
         is_as_recorded(f"parameters of {'/'.join(pair)}", eqx.filter(make(*pair), eqx.is_inexact_array))
+
+
+def test_ranges_of_gains_are_those_that_were_recorded():
+    """Between which `undertow tune` searches."""
+    for pair in ALL:
+        if ranges := tuning_ranges(make(*pair)):
+            is_as_recorded(f"ranges of {'/'.join(pair)}", ranges)
 
 
 def test_a_value_is_recorded_of_every_part():

@@ -69,7 +69,7 @@ def kinds_of(*targets):
     chosen, seen = [], set()
     for kind in KINDS:
         if kind.target.startswith(targets) and not {kind.target, kind.mode} <= seen:
-            quick = kind.target not in seen or kind.mode in ("one_sided", "duplicated_step")
+            quick = kind.target not in seen or kind.mode in ("fraction", "duplicated_step")
             chosen.append(pytest.param(kind, marks=() if quick else pytest.mark.full))
             seen |= {kind.target, kind.mode}
     return pytest.mark.parametrize("kind", chosen, ids=lambda kind: f"{kind.target}-{kind.mode}".replace(" ", "_"))

@@ -7,6 +7,7 @@ import pytest
 from textbook import euler_rate_matrix, jacobian, rotation_from_euler, wrap_angle
 
 from undertow.numerics.rotations import (
+    _SMALLEST_COSINE,
     Kinematics,
     cross,
     euler_from_rotation,
@@ -140,3 +141,11 @@ def test_rate_term_is_the_derivative_of_the_jacobian_times_nu():
         return jnp.linalg.norm(found - expected) / jnp.linalg.norm(expected)
 
     assert np.asarray(each(both)(ANGLES, RATES)).max() <= 1e-12
+
+
+def test_upright_the_cosine_of_the_pitch_is_the_smallest_there_is():
+    """No rate is divided by zero there, and nowhere else does it count."""
+    upright = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    assert float(Kinematics(jnp.asarray(upright)).cos_pitch) == _SMALLEST_COSINE == 1e-12
+    level = Kinematics(rotation_from_euler(jnp.array([0.3, 0.5, 0.2])))
+    assert float(level.cos_pitch) == pytest.approx(np.cos(0.5), rel=1e-15)

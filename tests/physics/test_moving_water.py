@@ -25,6 +25,7 @@ POSE = jnp.array([1.0, -2.0, 3.0, 0.3, -0.5, 2.0])
 RATES = jnp.array([0.4, -0.2, 0.1, 0.05, 0.1, -0.2])
 VOLTS = jnp.linspace(-6.0, 8.0, 8)
 STEP, TICKS = 2e-3, 2500
+ONE = jnp.ones(())
 
 
 def at(position):
@@ -102,6 +103,30 @@ def flow_of(sea, key, t):
 
     slopes, acceleration = jax.jacfwd(velocity, (0, 1), has_aux=True)(t, jnp.array([3.0, -2.0, 1.0]))
     return acceleration, *slopes
+
+
+def test_peak_of_the_spectrum():
+    """JONSWAP is Pierson-Moskowitz with its peak raised by gamma, narrower below (0.07) than above (0.09)."""
+    ratio = np.array([0.7, 0.93, 1.0, 1.09, 1.4])
+    frequency = ratio * 2 * np.pi / 5.0
+    raised = spectrum(frequency, 5.0, 3.3) / spectrum(frequency, 5.0, 1.0)
+    expected = [3.3 ** np.exp(-(0.3**2) / 2 / 0.07**2), 3.3 ** np.exp(-0.5), 3.3, 3.3 ** np.exp(-0.5)]
+    np.testing.assert_allclose(raised, [*expected, 3.3 ** np.exp(-(0.4**2) / 2 / 0.09**2)], rtol=1e-12)
+    np.testing.assert_allclose(spectrum(frequency, 5.0, 1.0), ratio**-5 * np.exp(-1.25 / ratio**4), rtol=1e-12)
+
+
+def test_above_the_surface_the_water_moves_as_on_it():
+    sea = waves(depth=2.0)
+
+    @jax.jit
+    def speeds(depths):
+        path = sea.realize(jax.random.PRNGKey(0))
+        flow = lambda down: sea.at(path, jnp.asarray(1.5), at(jnp.stack([ONE, ONE, down])), CALM).water.velocity
+        return jax.vmap(flow)(-depths)
+
+    surface, above, below = speeds(np.array([2.0, 2.5, 1.0]))
+    np.testing.assert_array_equal(above, surface)
+    assert np.linalg.norm(below) < 0.9 * np.linalg.norm(surface)
 
 
 def test_wave_acceleration_is_the_rate_of_the_velocity():

@@ -252,6 +252,16 @@ def test_one_step_of_the_memory(with_inertia):
         same((lost, after.taken - z.taken), (gained / after_h, gained / after_h), rtol=1e-3, atol=1e-6)
 
 
+def test_a_memory_that_only_harms_is_not_used():
+    """Its best share, shared / explained, is -2 with a standard error far below that; one that helps half is used so."""
+    found = Evidence(jnp.asarray(1e6), jnp.array([8.0, 2.0]), jnp.array([-4.0, 1.0]), jnp.array([2.0, 2.0]))
+    share, spread = evidence.best_share(found)
+    np.testing.assert_allclose(share, [-2.0, 0.5])
+    assert float(jnp.max(spread)) < 0.1
+    np.testing.assert_allclose(evidence.trust(found), [0.0, 0.5 + spread[1]])
+    assert float(evidence.wrong(found)) == 1.0
+
+
 def test_the_law_uses_what_it_remembers():
     """Command and estimator of preset `learning` with an inertia that is known: on what the memory itself gives.
 

@@ -278,6 +278,8 @@ def test_samples_of_a_log_are_held_or_joined():
     for wrong in (rows[:1], rows[:, :2], rows[::-1], np.where(rows == 5, np.nan, rows)):
         with pytest.raises(BadInput, match=r"^`commands"):
             replay(MODEL, wrong)
+    with pytest.raises(BadInput, match=r"^`commands` must have increasing times, but is row 3 too early"):
+        replay(MODEL, rows[[0, 2, 1, 3]])
 
 
 def test_laws_side_by_side_see_their_own_outputs():
