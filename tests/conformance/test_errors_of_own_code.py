@@ -4,10 +4,13 @@ import jax
 import jax.numpy as jnp
 import pytest
 
+from undertow import controllers
 from undertow.core.catalogue import find, maker_in
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
 from undertow.core.user_code import fault_of, place_of, python_says
+from undertow.plants import double_integrator
+from undertow.scenario.factory import derive_hint
 
 OWN = '''"""A part."""
 
@@ -183,6 +186,36 @@ def test_names_of_parts_that_do_not_work(folder, name, says):
     with pytest.raises(BadInput) as caught:
         find("sensors", name, folder, what=name)
     assert says in str(caught.value)
+
+
+class Plain:
+    """A controller that is derived from nothing."""
+
+    def __init__(self, model):
+        self.model = model
+
+
+@pytest.mark.parametrize("kind", ["controllers", ""])
+def test_from_which_contract_to_derive(kind):
+    """Of a function that takes `model` first it is known, whatever the names of the methods."""
+    expected = {
+        "controllers": "Derive `Plain` from AbstractController",
+        "": "Derive `Plain` from AbstractPlant: it has `model`",
+    }
+    assert derive_hint(Plain(None), kind) == expected[kind]
+
+
+def test_a_law_is_made_from_a_model_with_options_that_it_has():
+    model = double_integrator(1).model()
+    for make, says in (
+        (lambda: controllers.pid(double_integrator(1)), "`model` must be the nominal model of a plant, but is of type"),
+        (lambda: controllers.rcaf(double_integrator(1)), "Give it `plant.model()`"),
+        (lambda: controllers.rcaf(model, preset="robust", trackin=1.0), "Did you mean `tracking`?"),
+        (lambda: controllers.cascade(model, preset="plced"), "`preset` must be one of placed, ardusub, px4"),
+    ):
+        with pytest.raises(BadInput) as caught:
+            make()
+        assert says in str(caught.value)
 
 
 def test_a_vehicle_file_is_no_plant(folder):

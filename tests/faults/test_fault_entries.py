@@ -98,6 +98,7 @@ def test_a_continuous_loop_has_no_faults():
         pytest.param({"target": "Thruster_3"}, "thruster", 3, marks=pytest.mark.full),
         pytest.param({"target": "thruster3"}, "thruster", 3, marks=pytest.mark.full),
         ({"target": "thruster", "number": 3}, "thruster", 3),
+        pytest.param({"target": "T3"}, "thruster", 3, marks=pytest.mark.full),
         pytest.param({"target": "thruster", "number": "random"}, "thruster", "random", marks=pytest.mark.full),
         pytest.param({"target": "dvl"}, "sensor dvl", None, marks=pytest.mark.full),
         pytest.param({"target": "sensor dvl"}, "sensor dvl", None, marks=pytest.mark.full),

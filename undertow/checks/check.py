@@ -162,7 +162,7 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
         _check_model_comes_first(function, options)
         part, name = make(*_leading(function)), thing.rpartition(":")[2]
         if not factory.is_part(part):
-            raise _no_part(name, part)
+            raise _no_part(name, part, "controllers" if factory.takes_model(function) else "")
         return name, part, make
     prefix, _, short = thing.rpartition("/")
     known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if prefix in ("", kind)}
@@ -178,14 +178,14 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     raise BadInput(thing, must, "not", hint=hint)
 
 
-def _no_part(name: str, thing: Any) -> BadInput:
+def _no_part(name: str, thing: Any, kind: str) -> BadInput:
     """Error for what a function returns instead of a part."""
     place = place_of(thing)
     if not place:
         hint = "Return a vehicle, thruster, plant, controller or another part"
         return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)
     says = f"`{name}` returns a `{type(thing).__name__}`, which is not a part"
-    return BadInput("", "", says, hint=factory.derive_hint(thing), where=place)
+    return BadInput("", "", says, hint=factory.derive_hint(thing, kind), where=place)
 
 
 def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:

@@ -12,6 +12,7 @@ from undertow.cli.exit_codes import warn_of
 from undertow.cli.results_folder import Draft
 from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table
+from undertow.core.errors import BadInput
 from undertow.core.user_code import python_says
 from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.run_log import log_of_run
@@ -115,6 +116,8 @@ def predict(built: Built) -> PredictedMetrics:
     """Metrics of the steady window of a scenario, or the reason why there are none."""
     try:
         return PredictedMetrics(*predicted(operating_point(built)))
+    except BadInput as error:
+        return PredictedMetrics(None, str(error))
     except Exception as error:  # a user's part may run and yet not be differentiable
         return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
 

@@ -10,6 +10,7 @@ from undertow.controllers.actuation import actuation_for
 from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.cascade_law import Cascade
 from undertow.core import checks
+from undertow.core.catalogue import by_preset
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.core.runtime import double_outside_runs
@@ -222,10 +223,9 @@ def cascade(model: Model, *, preset: str = "placed", **options: Any) -> Cascade:
         options: those of the preset; see `undertow.controllers.cascade`.
 
     Raises:
-        BadInput: no such preset, or a value is out of its range.
+        BadInput: no such preset or option, or a value is out of its range.
     """
-    checks.choice("preset", preset, tuple(PRESETS))
-    return PRESETS[preset](model, **options)
+    return by_preset(PRESETS, preset, model, options)
 
 
 cascade.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here

@@ -5,7 +5,7 @@ from typing import Any
 from undertow.controllers.presets.learning import learning
 from undertow.controllers.presets.paper import paper
 from undertow.controllers.presets.robust import robust
-from undertow.core import checks
+from undertow.core.catalogue import by_preset
 from undertow.core.contracts import AbstractController, Model
 from undertow.core.runtime import double_outside_runs
 
@@ -26,10 +26,9 @@ def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractCont
         options: those of the preset; see `undertow.controllers.presets`.
 
     Raises:
-        BadInput: no such preset, or a value is out of its range.
+        BadInput: no such preset or option, or a value is out of its range.
     """
-    checks.choice("preset", preset, tuple(PRESETS))
-    return PRESETS[preset](model, **options)
+    return by_preset(PRESETS, preset, model, options)
 
 
 rcaf.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here

@@ -10,6 +10,7 @@ import functools
 import importlib
 import importlib.metadata
 import importlib.util
+import inspect
 import pkgutil
 import sys
 from collections.abc import Callable, Mapping
@@ -17,6 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from undertow.core.contracts import Model
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import MODULE_PREFIX, fault_of
@@ -66,9 +68,24 @@ def collect(package: ModuleType) -> dict[str, Part]:
         module = importlib.import_module(f"{package.__name__}.{info.name}")
         part = getattr(module, info.name, None)
         if callable(part):
-            parts[info.name] = double_outside_runs(part)
+            parts[info.name] = double_outside_runs(_of_a_model(part))
             setattr(module, info.name, parts[info.name])
     return parts
+
+
+def _of_a_model(part: Part) -> Part:
+    """A part that is made from a nominal model, with the error that a plant in its place is; any other as it is."""
+    if next(iter(inspect.signature(part).parameters), "") != "model":
+        return part
+
+    @functools.wraps(part)
+    def made(model: Any, *arguments: Any, **options: Any) -> Any:
+        if not isinstance(model, Model):
+            hint = "Give it `plant.model()`"
+            raise BadInput("model", "be the nominal model of a plant", f"of type {type(model).__name__}", hint=hint)
+        return part(model, *arguments, **options)
+
+    return made
 
 
 def publish(package_name: str) -> Callable[[str], Any]:
@@ -97,6 +114,21 @@ def presets_of(part: Part) -> Mapping[str, Part]:
 def presets(kind: str) -> dict[str, str]:
     """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
     return {preset: name for name, part in names(kind).items() for preset in presets_of(part)}
+
+
+def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Mapping[str, Any]) -> Any:
+    """A law of several presets: what the chosen one makes of a model and its options.
+
+    Raises:
+        BadInput: there is no such preset, or it has no such option.
+    """
+    if preset not in presets:
+        raise BadInput("preset", f"be one of {', '.join(presets)}", preset)
+    known = list(inspect.signature(presets[preset]).parameters)[1:]
+    for name in options:
+        if name not in known:
+            raise BadInput(name, f"be an option of preset `{preset}`", "unknown", hint=did_you_mean(name, known))
+    return presets[preset](model, **options)
 
 
 def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:

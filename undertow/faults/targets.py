@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractNavigation, AbstractPlant, Measurement
-from undertow.core.errors import BadInput, did_you_mean, joined
+from undertow.core.errors import BadInput, joined, nearest
 from undertow.core.user_code import MODULE_PREFIX
 from undertow.faults.quantities import OF_BODY, PROPELLER_SPEED, quantities_of
 from undertow.navigation.from_sensors import SensorNavigation
@@ -53,6 +53,15 @@ class FaultTarget(NamedTuple):
     places: tuple[int, ...] = ()
     angles: tuple[int, ...] = ()
 
+
+# What others call a target -> its name here; figures call a thruster `T2 bow port`.
+_OTHER_WORDS = {
+    "t": "thruster",
+    "thrusters": "thruster",
+    "inputs": "input",
+    "power": "bus",
+    "controller": "computation",
+}
 
 _INPUT_UNIT = "share of the largest input"
 
@@ -123,7 +132,7 @@ def named(
     """
     parsed = re.fullmatch(r"(.*?)[\s_]*(\d+)?", " ".join(text.split()).lower())
     word, digits = (parsed.group(1), parsed.group(2)) if parsed else (text, None)
-    word = {"thrusters": "thruster", "inputs": "input", "power": "bus", "controller": "computation"}.get(word, word)
+    word = _OTHER_WORDS.get(word, word)
     word = re.sub(r"^sensors?[\s_]+", "sensor ", word)
     if word not in known and f"sensor {word}" in known:
         word = f"sensor {word}"
@@ -131,7 +140,7 @@ def named(
         hint = "Write `number: random` for a random thruster; undertow.faults.sampling makes entries of random kinds"
         raise BadInput("target", "be something that can fail", text, hint=hint)
     if word not in known:
-        hint = joined(did_you_mean(word, known), f"This scenario has: {', '.join(known)}")
+        hint = joined(nearest(word, known), f"This scenario has: {', '.join(known)}")
         raise BadInput("target", "be something that this scenario has and that can fail", text, hint=hint)
     target = known[word]
     if digits is not None and number is not None:

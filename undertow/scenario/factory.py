@@ -105,7 +105,7 @@ def make(
         if part is None:
             raise BadInput("kind", must, f"{name}, which returns nothing", hint="Does the function lack a `return`?")
         got = f"{name}, which returns {_described(part)}"
-        raise BadInput("kind", must, got, hint=derive_hint(part) if place_of(part) else "")
+        raise BadInput("kind", must, got, hint=derive_hint(part, kind) if place_of(part) else "")
     if table:
         del resolved[argument]
     part = adjust(part, changes, tuple(own)) if changes else part
@@ -210,13 +210,19 @@ def _described(thing: Any) -> str:
     return f"a `{type(thing).__name__}` ({place})" if place else repr(thing)
 
 
-def derive_hint(thing: Any) -> str:
-    """From which contract to derive the class of the user's own of an object that is no part."""
-    contract, shared = contract_like(thing)
-    kind = type(thing).__name__
+def derive_hint(thing: Any, kind: str = "") -> str:
+    """From which contract to derive the class of the user's own of an object that is no part.
+
+    Args:
+        thing: the object.
+        kind: folder of the catalogue, where that is known.
+    """
+    contract, shared = contract_like(thing, kind)
+    own = type(thing).__name__
     if not contract:
-        return f"Derive `{kind}` from the contract of its kind, such as AbstractController"
-    return f"Derive `{kind}` from {contract}: it has {', '.join(f'`{one}`' for one in shared)}"
+        return f"Derive `{own}` from the contract of its kind, such as AbstractController"
+    has = f": it has {', '.join(f'`{one}`' for one in shared)}" if shared else ""
+    return f"Derive `{own}` from {contract}{has}"
 
 
 def _missing(function: Callable[..., Any], name: str, given: tuple[Any, ...]) -> BadInput:
@@ -240,14 +246,18 @@ def _missing(function: Callable[..., Any], name: str, given: tuple[Any, ...]) ->
     return BadInput(name, must, hint=hint)
 
 
-def contract_like(thing: Any) -> tuple[str, list[str]]:
-    """Name of the contract of which something has most methods, and these; "" where it has none of any."""
-    kinds = [kind for contract in _CONTRACTS.values() for kind in typing.get_args(contract) or (contract,)]
-    shared = {
-        kind: [name for name in getattr(kind, "__abstractmethods__", ()) if hasattr(thing, name)] for kind in kinds
-    }
-    nearest = max(kinds, key=lambda kind: len(shared[kind]))
-    return (nearest.__name__ if shared[nearest] else ""), sorted(shared[nearest])
+def contract_like(thing: Any, kind: str = "") -> tuple[str, list[str]]:
+    """Name of the contract of which something has most methods, and these; "" where it has none of any.
+
+    Args:
+        thing: an object.
+        kind: folder of the catalogue, whose contract is the one; "" where that is not known.
+    """
+    contracts = [_CONTRACTS[kind]] if kind else _CONTRACTS.values()
+    kinds = [one for contract in contracts for one in typing.get_args(contract) or (contract,)]
+    shared = {one: [name for name in getattr(one, "__abstractmethods__", ()) if hasattr(thing, name)] for one in kinds}
+    nearest = max(kinds, key=lambda one: len(shared[one]))
+    return (nearest.__name__ if kind or shared[nearest] else ""), sorted(shared[nearest])
 
 
 def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:

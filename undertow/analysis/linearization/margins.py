@@ -29,7 +29,10 @@ def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) 
     """
     found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
     if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
-        hint = "`loop.dt` is too long for this plant, or some number too large"
+        hint = (
+            "`loop.dt` is too long for this plant, some number too large, or the slope of the law infinite where it "
+            "rests, as that of sqrt(|e|)"
+        )
         raise BadInput("", "", "the loop cannot be linearised: its slopes are not finite", hint=hint)
     return found
 
