@@ -169,6 +169,45 @@ def test_part_from_a_file_that_does_not(undertow, tmp_path):
     assert said.out.startswith("Error: `at` must agree with the rate of the position at 0.37 s, but is -0.932")
 
 
+TERMINAL = """
+import jax.numpy as jnp
+from undertow.core.contracts import AbstractController, Model
+
+
+class Terminal(AbstractController):
+    model: Model
+
+    def init(self, y, r):
+        return ()
+
+    def command(self, z, y, r):
+        off = self.model.coordinates.tracking_error(y, r)
+        print("error", off.error)
+        return self.model.dynamics.invert(y, jnp.sign(off.error) * jnp.abs(off.error) ** 0.6 + off.rate), {}
+
+    def advance(self, z, y, r, u, dt):
+        return z
+
+    def signals(self):
+        return {}
+
+
+def terminal(model):
+    return Terminal(model)
+"""
+
+
+@pytest.mark.full
+def test_a_law_that_prints_and_has_no_slope_gets_advice(undertow, tmp_path):
+    (tmp_path / "law.py").write_text(TERMINAL)
+    said = undertow("check", "law.py:terminal")
+    assert said.code == 0 and "error JitTracer(float64[6])" in said.out
+    assert "`Terminal` prints `JitTracer(float64[6])`, once, while it is compiled, and never again" in said.out
+    assert "`command` should have a finite slope where the error is zero" in said.out
+    (tmp_path / "law.py").write_text(TERMINAL.replace("        print(", "        str(").replace("jnp.sign(off.error) * jnp.abs(off.error) ** 0.6", "off.error"))
+    assert undertow("check", "law.py:terminal").out.endswith("0 errors, 0 pieces of advice\n")
+
+
 def test_part_from_a_file_that_is_none(refused, tmp_path):
     (tmp_path / "mine.py").write_text("def mine():\n    return 7\n")
     said = "`mine` returns 7, which is not a part. Return a vehicle, thruster, plant, controller or another part"

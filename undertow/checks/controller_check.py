@@ -62,7 +62,13 @@ def check_stability(controller: AbstractController, plant: DoubleIntegrator, dt:
     still = np.zeros(len(plant.outputs))
     loop = ClosedLoop(plant, controller, setpoint(still), none(), perfect())
     at = equilibrium(loop, dt, still, still)
-    radius, reversed_radius = (margins.spectral_radius(margins.closed(at, dt, gain=gain)) for gain in (1.0, -1.0))
+    try:
+        radius, reversed_radius = (margins.spectral_radius(margins.closed(at, dt, gain=gain)) for gain in (1.0, -1.0))
+    except margins.NoSlopes:
+        got = "without one there, so that no loop with this law can be analysed or predicted"
+        hint = "sqrt(|e|) and |e|^0.6 have such slopes: add a small number, as in sqrt(e^2 + 1e-6)^0.6 sign(e)"
+        yield advice("slope", "command", "have a finite slope where the error is zero", got, hint)
+        return
     if at.found and radius > 1 + _GROWTH * dt:
         got = f"unstable there: the linearised closed loop has a spectral radius of {radius:.6g} at steps of {dt:g} s"
         hint = "Check the gains, and the signs of input and state: the error is target minus position"

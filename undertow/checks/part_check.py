@@ -1,5 +1,8 @@
 """Checks of the contract of a part: it is used once as in the loop, and its results are compared."""
 
+import contextlib
+import io
+import re
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -40,6 +43,9 @@ from undertow.sensors.motion import motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.thrusters.thruster import AbstractThruster, PropellerReport
 
+# What `print` shows of a value that is traced: `JitTracer(float64[6])`, `Traced<float64[6]>with<...>`.
+_TRACED = re.compile(r"(\w*Tracer\([^)]*\)|Traced<[^>]*>)")
+
 _TIMES = (0.37, 1.93, 7.1)  # s; no round numbers, at which references may have corners
 
 
@@ -71,11 +77,21 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
     """
     for kind, use in _USES.items():
         if isinstance(part, kind):
-            try:
-                return tuple(use(part, around))
-            except RAISED as complaint:
-                return (_failed(part, complaint),)
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                try:
+                    found = tuple(use(part, around))
+                except RAISED as complaint:
+                    found = (_failed(part, complaint),)
+            return (*found, *_printed(part, printed.getvalue()))
     return ()
+
+
+def _printed(part: Any, text: str) -> Iterator[Finding]:
+    """Advice where a part prints what it computes: it does so once, when it is compiled, and without numbers."""
+    print(text, end="")
+    if shown := _TRACED.search(text):
+        says = f"`{type(part).__name__}` prints `{shown[0]}`, once, while it is compiled, and never again"
+        yield Finding("advice", "print", type(part).__name__, says, 'Use `jax.debug.print("{}", value)`')
 
 
 def _failed(part: Any, complaint: BaseException) -> Finding:

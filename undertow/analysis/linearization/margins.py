@@ -21,11 +21,15 @@ _FADING = 1 - 1e-9  # so that what rounding leaves of modes that nothing excites
 _STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
 
 
+class NoSlopes(BadInput):
+    """The loop has no finite slopes where it rests."""
+
+
 def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) -> LinearLoop:
     """The closed loop of a scenario's kind; see `close_sampled` for what may stand `between` law and plant.
 
     Raises:
-        BadInput: its slopes are not finite where it rests.
+        NoSlopes: they are not finite where it rests.
     """
     found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
     if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
@@ -33,7 +37,7 @@ def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) 
             "`loop.dt` is too long for this plant, some number too large, or the slope of the law infinite where it "
             "rests, as that of sqrt(|e|)"
         )
-        raise BadInput("", "", "the loop cannot be linearised: its slopes are not finite", hint=hint)
+        raise NoSlopes("", "", "the loop cannot be linearised: its slopes are not finite", hint=hint)
     return found
 
 
