@@ -102,6 +102,20 @@ def test_with_limits_it_ends_at_the_exact_optimum(start):
     np.testing.assert_allclose(forces[:, 0], exact, atol=1e-5)
 
 
+def test_the_gain_of_a_plan_is_that_of_its_first_force():
+    """Where forces work better from step to step, so that no two steps have the same gain."""
+    stronger = lambda t, state: (jnp.zeros(1), -(1.0 + 2.0 * t) * jnp.eye(1))
+
+    @jax.jit
+    def planned(start):
+        plan = lambda start: improved(stronger, horizon(), start, jnp.zeros((6, 1)))
+        return plan(start).gain[0], jax.jacfwd(lambda start: plan(start).forces[:, 0])(start)
+
+    gain, slopes = planned(jnp.array([0.7, -0.4]))
+    np.testing.assert_allclose(gain, slopes[0], rtol=1e-9)
+    assert np.abs(slopes[-1] - gain).max() > 0.1
+
+
 # Forces of the nonlinear problem below for limits of 4, by IPOPT (tolerance 1e-12) through CasADi 3.8.2.
 IPOPT = [4.0, 3.9525671, 3.3038237, 2.7281681, 2.2396447, 1.8370436, 1.5108831, 1.2488662]
 
