@@ -36,6 +36,7 @@ from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.faulted import faulted
 from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
+from undertow.scenario.plausibility import angles_meant
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Fault, Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
@@ -232,7 +233,7 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)
-    for one in rounded_times(settings):
+    for one in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
         warnings.warn(one.sentence, stacklevel=3)
     outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
     attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}

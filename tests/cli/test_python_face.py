@@ -63,6 +63,14 @@ def test_a_law_by_its_name_is_that_of_a_scenario(law):
     assert run.dataset.attrs["content_hash"] == expected.dataset.attrs["content_hash"]
 
 
+def test_degrees_where_radians_are_due_are_said(parts):
+    plant, law, _ = parts
+    with pytest.warns(
+        UserWarning, match="`reference` has yaw at 30 rad, which is 4.77 turns.*30 degrees are 0.5236 rad"
+    ):
+        ut.simulate(plant, law, ut.references.setpoint([0, 0, 0, 0, 0, 30]), duration=0.02)
+
+
 def test_scenario_as_data():
     reference = {"kind": "setpoint", "position": [1] * 6}
     run = ut.simulate_scenario({"controller": "pid", "reference": reference, "loop": {"duration": 0.02}})

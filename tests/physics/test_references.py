@@ -15,6 +15,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
+from undertow.references.setpoint import Transition
 from undertow.scenario import factory
 from undertow.scenario.execute import execute
 
@@ -136,6 +137,14 @@ def test_step_is_a_constant():
     position, velocity, acceleration = at(step, [-1.0, 0.0, 3.0])
     np.testing.assert_array_equal(position, np.tile(goal, (3, 1)))
     assert not velocity.any() and not acceleration.any()
+
+
+def test_a_transition_that_takes_no_time_is_a_step():
+    goal = jnp.array([3.0, -1.0])
+    move = jax.jit(lambda settling, t: Transition(settling, jnp.ones(2)).to(goal, t))
+    for t in (0.0, 1.0):
+        np.testing.assert_array_equal(move(0.0, t), [goal, [0, 0], [0, 0]])
+    np.testing.assert_array_equal(move(2.0, 0.0).position, [1.0, 1.0])
 
 
 def test_settling_takes_its_time():

@@ -52,12 +52,16 @@ def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -
         duration: of the run, s.
         start: initial position, one entry per output, m and rad; None for zero.
     """
-    at_start, _ = loop.outputs_at_start(start, None)
-    desired = _sampled(loop.reference, np.linspace(0.0, duration, _SAMPLES), np.asarray(at_start, dtype=float))
+    desired = _desired(loop, duration, start)
     said = [*_angles(loop, desired), *_unfinished(loop.reference, desired)]
     if isinstance(loop.plant, HybridVehicle):
         said += [*_above(loop, desired), *_too_fast(loop, loop.plant, desired)]
     return tuple(said)
+
+
+def angles_meant(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
+    """Of `plausibility`, for the same arguments, what is said of angles."""
+    return tuple(_angles(loop, _desired(loop, duration, start)))
 
 
 def top_speed(plant: HybridVehicle) -> float:
@@ -238,6 +242,11 @@ def _members(loop: ClosedLoop, kind: type) -> list:
     """The disturbances of a kind."""
     every = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
     return [one for one in every if isinstance(one, kind)]
+
+
+def _desired(loop: ClosedLoop, duration: float, start: list[float] | None) -> Motion:
+    at_start, _ = loop.outputs_at_start(start, None)
+    return _sampled(loop.reference, np.linspace(0.0, duration, _SAMPLES), np.asarray(at_start, dtype=float))
 
 
 def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> Motion:
