@@ -7,6 +7,7 @@ import pytest
 
 import undertow as ut
 from undertow.core.measurement import measurement_of_outputs
+from undertow.plants.double_integrator import double_integrator
 from undertow.supervision.reduced_model import attained_share, default_priority, least_forces, reduced
 
 VEHICLES = {"odin": ut.vehicles.odin, "heavy": ut.vehicles.bluerov2_heavy, "bluerov2": ut.vehicles.bluerov2}
@@ -106,3 +107,8 @@ def test_lost_actuators_get_no_command_and_have_no_range():
     kept = np.delete(np.arange(8), 3)
     assert (command[kept] > 0).all() and (low[kept] < 0).all()
     assert of_quasi_static[3] == 0.0
+
+
+def test_axes_of_a_vehicle_give_way_in_their_order_and_others_alike():
+    np.testing.assert_array_equal(default_priority(double_integrator(3).model()), [1.0, 1.0, 1.0])
+    np.testing.assert_array_equal(default_priority(model_of("heavy")), [1, 1, 1, 0.1, 0.1, 0.3])
