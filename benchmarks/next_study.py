@@ -100,7 +100,7 @@ def observer(long: bool) -> None:
     print("\nOBSERVER-BASED: slowest observer with which a law is stable at small errors, rad/s (order 2, order 3)")
     model = double_integrator(1).model()
     for composite in (500.0, 20.0, 5.0):
-        law = papers_law(rcaf(model, composite=composite))
+        law = papers_law(rcaf(model, preset="paper", composite=composite))
         limits = [f"{slowest_observer(law, order):8.1f}" for order in (2, 3)]
         print(f"  paper, gamma_eps {composite:5.0f}: w_d {law.frequency:6.1f} rad/s", *limits)
     for share in (0.25, 0.5):

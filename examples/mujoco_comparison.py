@@ -59,6 +59,7 @@ def both_runs(duration: float) -> tuple[ut.Run, MujocoRun]:
     plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
     law = ut.rcaf(  # gains that a motor with a lag of 0.1 s allows
         plant.model(rate_term=True),
+        preset="paper",
         feedback=[[4, 7]] * 3 + [[20, 13]] * 3,
         pole=[4, 4, 4, 3, 3, 3],
         adaptation=[0.15] * 3 + [0.05] * 3,

@@ -12,7 +12,7 @@ import numpy as np
 import undertow as ut
 
 plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(fidelity="ideal"))
-law = ut.rcaf(plant.model(speed_sensor=True))
+law = ut.rcaf(plant.model(speed_sensor=True), preset="paper")
 goal = ut.references.setpoint([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5])  # m, rad
 run = ut.simulate(plant, law, goal, disturbance=ut.disturbances.u1())
 

@@ -16,7 +16,9 @@ runs = {}
 for inductance in (0.01, 0.003, 0.001):  # H; Table 3 prints 0.01
     thruster = ut.thrusters.paper_table3(inductance=inductance)
     plant = ut.HybridVehicle(ut.vehicles.odin(), thruster)
-    runs[inductance] = ut.simulate(plant, ut.rcaf(plant.model()), goal, disturbance=ut.disturbances.u1(), duration=5.0)
+    runs[inductance] = ut.simulate(
+        plant, ut.rcaf(plant.model(), preset="paper"), goal, disturbance=ut.disturbances.u1(), duration=5.0
+    )
 
 # %%
 # The largest voltage of the eight thrusters. Without a supply limit, a diverging loop demands an ever larger voltage.

@@ -16,7 +16,7 @@ goal = ut.references.setpoint([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5])  #
 runs = {}
 for level in ("ideal", "static", "shaft", "electromechanical"):
     plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(fidelity=level))
-    law = ut.rcaf(plant.model(speed_sensor=level == "ideal"))
+    law = ut.rcaf(plant.model(speed_sensor=level == "ideal"), preset="paper")
     runs[level] = ut.simulate(plant, law, goal, disturbance=ut.disturbances.u1())
 
 # %%

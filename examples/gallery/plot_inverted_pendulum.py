@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import undertow as ut
 
 plant = ut.plants.inverted_pendulum()
-law = ut.rcaf(plant.model(half_length=0.35))  # m, of 0.5
+law = ut.rcaf(plant.model(half_length=0.35), preset="paper")  # m, of 0.5
 sine = ut.references.sine(amplitude=0.1, frequency=1.0)  # rad, rad/s
 run = ut.simulate(plant, law, sine, position=[0.0523], duration=20.0)  # rad, s
 

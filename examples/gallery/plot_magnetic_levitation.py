@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import undertow as ut
 
 plant = ut.plants.magnetic_levitation()
-law = ut.rcaf(plant.model(force_factor=1.0))
+law = ut.rcaf(plant.model(force_factor=1.0), preset="paper")
 runs = {}
 for offset in (0.010, 0.006):  # m below the upper magnet
     sine = ut.references.sine(amplitude=0.001, frequency=1.0, offset=offset)

@@ -11,7 +11,7 @@ import numpy as np
 import undertow as ut
 
 plant = ut.plants.two_link_arm()
-law = ut.rcaf(plant.model(outer_mass=1.0))  # kg of 2
+law = ut.rcaf(plant.model(outer_mass=1.0), preset="paper")  # kg of 2
 sine = ut.references.sine(amplitude=[1.0, 1.0], frequency=[1.0, 2.0])  # rad, rad/s
 runs = {
     precision: ut.simulate(plant, law, sine, duration=10.0, precision=precision) for precision in ("float64", "float32")

@@ -19,7 +19,7 @@ goal = ut.references.setpoint([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5])  #
 # %%
 # The two laws differ in one gain: without the composite gain, RCAFC is RAFC.
 
-laws = {"RCAFC": ut.rcaf(model), "RAFC": ut.rcaf(model, composite=0.0)}
+laws = {"RCAFC": ut.rcaf(model, preset="paper"), "RAFC": ut.rcaf(model, preset="paper", composite=0.0)}
 runs = {name: ut.simulate(plant, law, goal, disturbance=ut.disturbances.u1()) for name, law in laws.items()}
 
 # %%

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import undertow as ut
 
 plant = ut.plants.two_link_arm()
-law = ut.rcaf(plant.model(outer_mass=1.0, outer_offset=0.0))  # kg of 2; rad
+law = ut.rcaf(plant.model(outer_mass=1.0, outer_offset=0.0), preset="paper")  # kg of 2; rad
 sine = ut.references.sine(amplitude=[1.0, 1.0], frequency=[1.0, 2.0])  # rad, rad/s
 run = ut.simulate(plant, law, sine, duration=10.0)
 

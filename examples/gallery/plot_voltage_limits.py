@@ -15,7 +15,7 @@ goal = ut.references.setpoint([1, 1, 1, 0, 0, 0.5])  # m, rad
 runs = {}
 for supply in (24.0, 48.0, 96.0):  # V
     plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3(fidelity="shaft", supply=supply))
-    law = ut.rcaf(plant.model(), composite=20.0, weights_bound=20.0)
+    law = ut.rcaf(plant.model(), preset="paper", composite=20.0, weights_bound=20.0)
     runs[supply] = ut.simulate(plant, law, goal, disturbance=ut.disturbances.u1(), duration=10.0)
 
 # %%

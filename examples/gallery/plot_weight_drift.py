@@ -17,7 +17,7 @@ hold = ut.references.setpoint([0.0])
 
 runs = {}
 for name, bound in {"without a bound": np.inf, "weights bounded by 5 m/s²": 5.0}.items():
-    law = ut.rcaf(plant.model(), weights_bound=bound)
+    law = ut.rcaf(plant.model(), preset="paper", weights_bound=bound)
     runs[name] = ut.simulate(plant, law, hold, navigation=noise, duration=60.0, record=0.1)
 
 # %%

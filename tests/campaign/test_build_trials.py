@@ -131,7 +131,7 @@ def test_invalid_trials_are_those_that_are_invalid_alone(campaign):
 
 def test_choices_of_parts_and_of_counts_are_built_apart(campaign):
     vary = {
-        "controller": {"choice": [{"kind": "pid", "frequency": 2.0}, {"kind": "rcaf", "sets": 3}]},
+        "controller": {"choice": [{"kind": "pid", "frequency": 2.0}, {"kind": "paper", "sets": 3}]},
         "disturbance.amplitude": {"uniform": [0.5, 2.0]},
     }
     alone, together = built_both_ways(several_of(campaign()["scenario"], vary, 150))

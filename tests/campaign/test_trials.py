@@ -32,9 +32,9 @@ def test_values_stand_where_the_key_path_says(campaign):
 
 
 def test_every_combination_flies_the_same_draws_and_seeds(campaign):
-    several = made(campaign(trials=5, cross={"controller": ["pid", "rcaf"], "loop.dt": [0.01, 0.02]}))
+    several = made(campaign(trials=5, cross={"controller": ["pid", "paper"], "loop.dt": [0.01, 0.02]}))
     assert several.number == 20
-    assert [several.values(i)["controller"] for i in range(4)] == ["pid", "pid", "rcaf", "rcaf"]
+    assert [several.values(i)["controller"] for i in range(4)] == ["pid", "pid", "paper", "paper"]
     assert [several.values(i)["loop.dt"] for i in range(4)] == [0.01, 0.02, 0.01, 0.02]
     for sample in range(5):
         same = [several.values(4 * sample + i)["disturbance.amplitude"] for i in range(4)]

@@ -94,6 +94,11 @@ MISTAKES = {
         "r_g: [0, 0]",
         "`plant.vehicle.r_g` must be a list of 3 numbers, but is of shape (2,) (s.yaml, line 2)",
     ),
+    "law with presets and none named": (
+        "kind: paper,",
+        "kind: rcaf,",
+        "`controller.preset` must be given (s.yaml, line 4). It is one of paper, robust, learning",
+    ),
     "matrix of wrong size": (
         "mass: 125",
         "added_mass: [[1, 0], [0, 1]]",
@@ -231,9 +236,9 @@ MISTAKES = {
         "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (5,) (s.yaml, line 11)",
     ),
     "noise that the rule for gains needs, of the wrong size": (
-        "  feedback: [1, 2]\n  weight: [[10, 0], [0, 10]]",
-        "  preset: robust\nnavigation: {kind: white_noise, velocity: [0.1, 0.1]}",
-        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 6)",
+        "{kind: paper,\n  feedback: [1, 2],\n  weight: [[10, 0], [0, 10]]}",
+        "robust\nnavigation: {kind: white_noise, velocity: [0.1, 0.1]}",
+        "`navigation.velocity` must be one number, or 6 of them, one per axis, but is of shape (2,) (s.yaml, line 5)",
     ),
     "bias of the wrong size": (
         "seed: 3",

@@ -22,7 +22,7 @@ VALID = {
     },
     "model": {"speed_sensor": False, "rate_term": True, "regularisation": 0.1},
     "controller": {
-        "kind": "rcaf",
+        "kind": "paper",
         "feedback": [1.0, 2.0],
         "weight": [[10.0, 0.0], [0.0, 10.0]],
         "adaptation": 100.0,
@@ -48,7 +48,8 @@ NAMES = (
     "paper_table3",
     "linear_voltage",
     "double_integrator",
-    "rcaf",
+    "paper",
+    "robust",
     "circle",
     "u1",
     "sinusoid",

@@ -7,6 +7,8 @@ from messages import named
 
 import undertow as ut
 from undertow.report.figures import writing
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data
 
 pytestmark = pytest.mark.full
 
@@ -61,6 +63,14 @@ def test_a_law_by_its_name_is_that_of_a_scenario(law):
     }
     expected = ut.simulate_scenario(scenario)
     assert run.dataset.attrs["content_hash"] == expected.dataset.attrs["content_hash"]
+
+
+def test_without_a_controller_the_law_is_robust():
+    scenario = {"plant": "double_integrator", "reference": {"kind": "setpoint", "position": [1.0]}}
+    for change in ({}, {"controller": {"tracking": 1.5}}):
+        law = build(from_data(scenario | change)).resolved["controller"]
+        assert (law["kind"], law["preset"]) == ("rcaf", "robust")
+    assert law["tracking"] == 1.5
 
 
 def test_degrees_where_radians_are_due_are_said(parts):

@@ -98,7 +98,7 @@ def test_a_law_too_stiff_for_one_ode():
     """Filter pole 150 / s of the identification model in steps of 50 ms: 7.5 beyond 2.785; with 10 ms it lasts."""
     scenario = {
         "plant": "double_integrator",
-        "controller": {"kind": "rcaf", "composite": 0.0},
+        "controller": {"kind": "paper", "composite": 0.0},
         "reference": {"kind": "setpoint", "position": [1.0]},
         "disturbance": {"kind": "sinusoid"},
     }

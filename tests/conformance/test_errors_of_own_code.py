@@ -209,7 +209,7 @@ def test_a_law_is_made_from_a_model_with_options_that_it_has():
     model = double_integrator(1).model()
     for make, says in (
         (lambda: controllers.pid(double_integrator(1)), "`model` must be the nominal model of a plant, but is of type"),
-        (lambda: controllers.rcaf(double_integrator(1)), "Give it `plant.model()`"),
+        (lambda: controllers.rcaf(double_integrator(1), preset="paper"), "Give it `plant.model()`"),
         (lambda: controllers.rcaf(model, preset="robust", trackin=1.0), "Did you mean `tracking`?"),
         (lambda: controllers.cascade(model, preset="plced"), "`preset` must be one of placed, ardusub, px4"),
     ):

@@ -88,7 +88,7 @@ def test_error_names_the_line(tmp_path, capsys):
 
 def test_a_continuous_loop_has_no_faults():
     with pytest.raises(BadInput, match=r"`loop.kind` must be sampled with this list of `faults`"):
-        built(OFF, controller="rcaf", loop={"kind": "continuous", "duration": 1.0})
+        built(OFF, controller="paper", loop={"kind": "continuous", "duration": 1.0})
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_single_precision(written):
 def test_a_continuous_scenario_is_stepped_too(vehicle, written):
     """Its steps are those of the fourth-order method; the same motion as of the sampled one with the same step."""
     scenario = DRIVEN | {"loop": {"kind": "continuous", "duration": 2.0, "dt": 0.01}}
-    scenario["controller"] = "rcaf"  # a law in continuous time
+    scenario["controller"] = "paper"  # a law in continuous time
     scenario["plant"] = {key: value for key, value in DRIVEN["plant"].items() if key != "esc"}
     other = SteppedVehicle(written(scenario))
     for pulses in ([1600.0] * 8, [1450.0] * 8):

@@ -35,7 +35,7 @@ class Gathered(sampled.AbstractAccumulator):
 def runs():
     plant = double_integrator(2, 4.0)
     load = sinusoid(np.array([3.0, 1.0]), np.array([2.0, 9.0]))
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint(np.array([1.0, -0.5])), load, white_noise())
+    loop = ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint(np.array([1.0, -0.5])), load, white_noise())
     return {
         every: sampled.simulate(
             loop,

@@ -35,7 +35,7 @@ BACK_ENDS = {"xla": sampled.simulate, "simd": simd_batch.simulate}
 LAWS = {
     "robust": lambda model: rcaf(model, preset="robust", sampling_time=DT, bandwidth=0.35 / DT),
     "pid": lambda model: pid(model, sampling_time=DT, frequency=3.0),
-    "paper": lambda model: rcaf(model, pole=20.0, composite=20.0, adaptation=5.0, weights_bound=20.0),
+    "paper": lambda model: rcaf(model, preset="paper", pole=20.0, composite=20.0, adaptation=5.0, weights_bound=20.0),
 }
 
 

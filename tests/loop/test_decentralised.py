@@ -62,7 +62,7 @@ def test_the_papers_law_is_decentralised_by_itself():
     """Axis by axis, with a model of blocks: one law for 12 axes = a law for each vehicle."""
     plant = pair("tether")
     several, _ = run(plant, decentralised(plant.model(), rcaf), GOAL, START)
-    one, _ = run(plant, rcaf(plant.model()), GOAL, START)
+    one, _ = run(plant, rcaf(plant.model(), preset="paper"), GOAL, START)
     for name in ("position", "estimate", "input"):
         np.testing.assert_allclose(several.signals[name], one.signals[name], rtol=1e-7, atol=1e-9)
     assert several.signals["tension"].max() > 1
@@ -131,7 +131,7 @@ def test_a_plant_of_one_part_has_one_law():
     assert len(law.laws) == 1 and law.model is law.laws[0].model
     y = arm.output(0.0, arm.initial_state(jnp.asarray([0.2, 0.1])))
     r = Target(jnp.ones(2), jnp.zeros(2), jnp.zeros(2))
-    alone = rcaf(arm.model())
+    alone = rcaf(arm.model(), preset="paper")
     np.testing.assert_array_equal(law.command(law.init(y, r), y, r)[0], alone.command(alone.init(y, r), y, r)[0])
 
 
@@ -252,4 +252,4 @@ def test_bad_law(law, says):
 def test_number_of_laws():
     plant = pair()
     with pytest.raises(BadInput, match="be one for each of the 2 subsystems"):
-        decentralised(plant.model(), [rcaf(parts_of(plant.model())[0][0])])
+        decentralised(plant.model(), [rcaf(parts_of(plant.model())[0][0], preset="paper")])

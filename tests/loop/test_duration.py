@@ -23,7 +23,9 @@ pytestmark = pytest.mark.full
 )
 def test_the_end_does_not_depend_on_the_records(tolerances, steps):
     plant = double_integrator(1)
-    loop = ClosedLoop(plant, rcaf(plant.model(), sets=3), setpoint(np.ones(1)), sinusoid(1.0, 2.0), perfect())
+    loop = ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper", sets=3), setpoint(np.ones(1)), sinusoid(1.0, 2.0), perfect()
+    )
     often, seldom = (
         continuous.simulate(loop, duration=0.29, record_step=step, dt=1e-3, tolerances=tolerances) for step in steps
     )

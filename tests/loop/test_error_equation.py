@@ -47,7 +47,7 @@ def terms(realization, t, position, velocity, estimates):
 def batch(request):
     plant = HybridVehicle(odin().with_thrusters(tuple(THRUSTERS[request.param])), paper_table3("ideal"))
     load = sinusoid(np.arange(1.0, 7.0), 3.0, offset=-1.0)
-    loop = ClosedLoop(plant, rcaf(plant.model()), circle(depth=1.0), load, perfect())
+    loop = ClosedLoop(plant, rcaf(plant.model(), preset="paper"), circle(depth=1.0), load, perfect())
     realization = loop.realize(jax.random.PRNGKey(0))
     random = np.random.default_rng(14)
     pose = random.uniform(-1, 1, (STATES, 6)) * np.array([4, 4, 4, 3, 1.3, 3])

@@ -36,7 +36,7 @@ class Breaks(AbstractDisturbance):
 def loop_with(value):
     plant = double_integrator(1)
     load = Breaks(jnp.asarray(value))
-    return ClosedLoop(plant, rcaf(plant.model()), setpoint(np.ones(1)), load, perfect())
+    return ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint(np.ones(1)), load, perfect())
 
 
 BREAK = 0.2512  # s; inside a step and between two records

@@ -62,7 +62,7 @@ def test_two_laws_meet_the_same_noise(key):
     plant = double_integrator(2)
 
     def noise(**gains):
-        law = rcaf(plant.model(), **gains)
+        law = rcaf(plant.model(), preset="paper", **gains)
         loop = ClosedLoop(plant, law, setpoint(np.ones(2)), sinusoid(), white_noise(0.0, 0.01))
         samples = sampled.simulate(loop, duration=0.2, dt=DT, record_every=1, key=key).signals
         return np.asarray(samples["predicted_velocity"] - samples["modelling_error"] - samples["velocity"])
@@ -75,7 +75,7 @@ def test_two_laws_meet_the_same_noise(key):
 @pytest.fixture(scope="module")
 def limited():
     plant = double_integrator(2, LIMIT)
-    law = rcaf(plant.model(), sets=3)
+    law = rcaf(plant.model(), preset="paper", sets=3)
     loop = ClosedLoop(plant, law, setpoint(np.array([2.0, -1.0])), sinusoid(1.0, 2.0), perfect())
     samples = jax.tree.map(np.asarray, sampled.simulate(loop, duration=2.0, dt=DT, record_every=1).signals)
     is_as_recorded("loop: two axes with limits", [samples[name][::50] for name in sorted(samples)])

@@ -45,7 +45,9 @@ class Step(AbstractDisturbance):
 
 def rail(disturbance, limit=float("inf"), **gains):
     plant = double_integrator(1, limit)
-    return ClosedLoop(plant, rcaf(plant.model(), **gains), setpoint(np.zeros(1)), disturbance, perfect())
+    return ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper", **gains), setpoint(np.zeros(1)), disturbance, perfect()
+    )
 
 
 class Pendulum(AbstractMechanism):
@@ -83,13 +85,13 @@ class Pendulum(AbstractMechanism):
 
 def swinging():
     plant = Pendulum(double_integrator(1))
-    law = rcaf(plant.model(), **GENTLE)
+    law = rcaf(plant.model(), preset="paper", **GENTLE)
     return ClosedLoop(plant, law, setpoint(np.zeros(1)), sinusoid(1.0, 15.0), perfect()), np.ones(1)
 
 
 def of_plant(plant, velocity):
     """A plant of the catalogue under a law that was told the truth."""
-    law = rcaf(plant.model(), **GENTLE)
+    law = rcaf(plant.model(), preset="paper", **GENTLE)
     n = len(plant.outputs)
     return ClosedLoop(plant, law, setpoint(np.full(n, 0.2)), sinusoid(1.0, 15.0), perfect()), np.full(n, velocity)
 
@@ -105,7 +107,9 @@ def reaching():
 def swimming():
     """ODIN moving on every axis, so that |nu| nu is smooth."""
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
-    loop = ClosedLoop(plant, rcaf(plant.model(), **GENTLE), setpoint(np.full(6, 0.5)), sinusoid(1.0, 15.0), perfect())
+    loop = ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper", **GENTLE), setpoint(np.full(6, 0.5)), sinusoid(1.0, 15.0), perfect()
+    )
     return loop, np.full(6, 0.8)
 
 

@@ -61,25 +61,25 @@ def trajectory(make, key):
 
 
 def rafc(model):
-    return PlainRAFC(rcaf(model, composite=0.0), model)
+    return PlainRAFC(rcaf(model, preset="paper", composite=0.0), model)
 
 
 def test_same_bits(key):
-    plain, special = trajectory(rafc, key), trajectory(lambda model: rcaf(model, composite=0.0), key)
+    plain, special = trajectory(rafc, key), trajectory(lambda model: rcaf(model, preset="paper", composite=0.0), key)
     for one, other in zip(jax.tree.leaves(plain), jax.tree.leaves(special), strict=True):
         np.testing.assert_array_equal(np.asarray(one), np.asarray(other))
 
 
 def test_composite_term_is_not_nothing(key):
     """Negative control."""
-    plain, composite = trajectory(rafc, key), trajectory(lambda model: rcaf(model, composite=1e-3), key)
+    plain, composite = trajectory(rafc, key), trajectory(lambda model: rcaf(model, preset="paper", composite=1e-3), key)
     pairs = zip(jax.tree.leaves(plain), jax.tree.leaves(composite), strict=True)
     assert any((np.asarray(one) != np.asarray(other)).any() for one, other in pairs)
 
 
 def test_one_axis_may_be_rafc_beside_others(key):
     """Gains per axis: the axis with gamma_eps = 0 is the RAFC one, bit for bit; the others are not."""
-    mixed = trajectory(lambda model: rcaf(model, composite=np.array([0.0, 500.0, 500.0])), key)
+    mixed = trajectory(lambda model: rcaf(model, preset="paper", composite=np.array([0.0, 500.0, 500.0])), key)
     plain = trajectory(rafc, key)
     mixed, plain = (signals["position"] for (signals, _) in (mixed, plain))
     np.testing.assert_array_equal(np.asarray(mixed)[:, 0], np.asarray(plain)[:, 0])

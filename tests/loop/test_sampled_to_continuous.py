@@ -23,14 +23,16 @@ PRECISE = (1e-11, 1e-13)
 def on_axes():
     plant = double_integrator(2)
     load = sinusoid(np.array([2.0, 1.0]), np.array([1.0, 5.0]))
-    return ClosedLoop(plant, rcaf(plant.model(), sets=3), setpoint(np.array([0.2, 0.3])), load, perfect())
+    return ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper", sets=3), setpoint(np.array([0.2, 0.3])), load, perfect()
+    )
 
 
 def on_odin():
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
     goal = setpoint(np.array([0.2, 0.3, -0.2, 0.1, -0.1, 0.2]))
     load = sinusoid(np.array([2.0, 1.0, 3.0, 1.0, 0.5, 1.0]), np.array([1.0, 5.0, 2.0, 3.0, 7.0, 4.0]))
-    return ClosedLoop(plant, rcaf(plant.model(), sets=3), goal, load, perfect())
+    return ClosedLoop(plant, rcaf(plant.model(), preset="paper", sets=3), goal, load, perfect())
 
 
 @pytest.fixture(

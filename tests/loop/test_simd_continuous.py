@@ -40,7 +40,9 @@ class Breaks(AbstractDisturbance):
 
 def under(load):
     plant = double_integrator(2)
-    return ClosedLoop(plant, rcaf(plant.model(), sets=3), setpoint(np.array([0.2, 0.3])), load, perfect())
+    return ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper", sets=3), setpoint(np.array([0.2, 0.3])), load, perfect()
+    )
 
 
 def test_figures_of_both_compilers_agree():

@@ -51,7 +51,7 @@ def test_quaternion_error_is_the_short_turn_in_body_axes(degrees):
 def commanded():
     """Voltages of the paper's law, and the acceleration that its model expects of them, for 1000 cases at once."""
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
-    controller = rcaf(plant.model())
+    controller = rcaf(plant.model(), preset="paper")
 
     @jax.jit
     @jax.vmap

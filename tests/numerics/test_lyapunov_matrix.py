@@ -25,7 +25,7 @@ P = np.asarray(lyapunov(FEEDBACK, WEIGHTS))
 def test_table_1_gives_the_matrix_of_the_theory():
     p = lyapunov(np.array([1.0, 2.0]), 10 * np.eye(2))
     np.testing.assert_allclose(p, [[15, 5], [5, 5]], rtol=0, atol=1e-12)
-    law = rcaf(double_integrator(axes=6).model())
+    law = rcaf(double_integrator(axes=6).model(), preset="paper")
     np.testing.assert_allclose(jax.jit(lambda: law.lyapunov())(), [[15, 5], [5, 5]], rtol=0, atol=1e-12)
 
 
@@ -48,7 +48,7 @@ def test_closed_form_agrees_with_a_general_solver():
 
 def test_law_uses_the_second_column_of_each_axis():
     """s = E^T P b with one K and Q per axis."""
-    law = rcaf(double_integrator(axes=3).model(), feedback=FEEDBACK[:3], weight=WEIGHTS[:3])
+    law = rcaf(double_integrator(axes=3).model(), preset="paper", feedback=FEEDBACK[:3], weight=WEIGHTS[:3])
     np.testing.assert_allclose(jax.jit(lambda: law.lyapunov())(), P[:3], rtol=1e-13)
 
 
@@ -62,7 +62,7 @@ def test_feedback_that_is_not_hurwitz_is_refused_by_name(wrong, right, place, ax
     pair[place] = wrong
     feedback = pair if axis is None else [pair if i == axis else [1.0, 2.0] for i in range(3)]
     with pytest.raises(BadInput) as caught:
-        rcaf(double_integrator(axes=3).model(), feedback=feedback)
+        rcaf(double_integrator(axes=3).model(), preset="paper", feedback=feedback)
     assert caught.value.name.startswith("feedback")
 
 
@@ -81,5 +81,5 @@ def test_feedback_that_is_not_hurwitz_is_refused_by_name(wrong, right, place, ax
 )
 def test_weight_that_is_not_positive_definite_is_refused_by_name(weight, must):
     with pytest.raises(BadInput, match=must) as caught:
-        rcaf(double_integrator(axes=2).model(), weight=weight)
+        rcaf(double_integrator(axes=2).model(), preset="paper", weight=weight)
     assert caught.value.name.startswith("weight")

@@ -25,6 +25,7 @@ def parts():
     plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster, ledger=False)
     law = ut.rcaf(
         plant.model(rate_term=True),
+        preset="paper",
         feedback=[[4, 7]] * 3 + [[20, 13]] * 3,
         pole=[4, 4, 4, 3, 3, 3],
         adaptation=[0.15] * 3 + [0.05] * 3,
@@ -86,7 +87,7 @@ def test_propellers_at_once():
 def test_a_run_that_fails_says_so(parts):
     """A feedback far too fast for the motor: the loop is unstable in both worlds."""
     plant, _, _, reference = parts
-    wild = ut.rcaf(plant.model(rate_term=True), composite=5e4, adaptation=1e4)
+    wild = ut.rcaf(plant.model(rate_term=True), preset="paper", composite=5e4, adaptation=1e4)
     mujoco_run = run_in_mujoco(Submerged(plant.vehicle), ut.thrusters.t200(supply=1e5), wild, reference, duration=20.0)
     assert mujoco_run.status in (Status.DIVERGED, Status.NOT_FINITE)
     assert 0 < len(mujoco_run.time) < 2001 and np.isfinite(mujoco_run.position).all()

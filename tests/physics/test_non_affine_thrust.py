@@ -133,7 +133,7 @@ def test_linear_thrust_makes_both_models_one():
     r = Target(MOVING.position + 0.3, MOVING.velocity, jnp.ones(6))
     found = []
     for affine in (True, False):
-        law = rcaf(plant.model(affine=affine))
+        law = rcaf(plant.model(affine=affine), preset="paper")
 
         @jax.jit
         def step(u, law=law):

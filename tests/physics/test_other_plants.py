@@ -368,7 +368,7 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
     springs, brakes = -np.eye(3), -0.5 * np.eye(3)
     plant = linear_plant(UNDER, springs, brakes)
     load = sinusoid(1.0, jnp.array([1.0, 2.0, 3.0]))
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), load, perfect())
+    loop = ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint([1.0, 0.0, 1.0]), load, perfect())
     outcome = sampled.simulate(loop, duration=12.0, dt=1e-3, record_every=10)
     samples = outcome.signals
     error, apart = np.asarray(samples["error"]), np.array([1.0, -1.0, 0.0])
@@ -386,7 +386,9 @@ def test_under_actuated_controlled_rows_follow_and_the_rest_is_the_open_loop():
 def test_under_actuated_error_equation_holds_along_the_controlled_rows():
     """Q^T (e_ddot + K^T E - d_hat + d + u_r) = 0 to 1e-9, with Q an orthonormal basis of the range of G."""
     plant = linear_plant(UNDER, -np.eye(3), -0.5 * np.eye(3))
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect())
+    loop = ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper"), setpoint([1.0, 0.0, 1.0]), sinusoid(1.0, 2.0), perfect()
+    )
     drawn, rng = loop.realize(jax.random.PRNGKey(0)), np.random.default_rng(6)
     basis = np.linalg.svd(np.asarray(UNDER))[0][:, :2]
 

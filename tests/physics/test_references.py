@@ -178,7 +178,7 @@ def test_settling_starts_where_the_plant_does_unless_told():
     assert float(execute(cart).dataset["reference"][0, 0]) == 0.1
     plant = double_integrator(2)
     for simulate in (sampled.simulate, continuous.simulate):
-        law = rcaf(plant.model(), sets=3)
+        law = rcaf(plant.model(), preset="paper", sets=3)
         loop = ClosedLoop(plant, law, setpoint(goal, 4.0), none(), perfect())
         found = simulate(loop, duration=0.1, dt=0.01, position=begun)
         np.testing.assert_array_equal(found.signals["reference"][0], begun)

@@ -126,7 +126,7 @@ def test_centimetres_give_the_same_motion_as_metres():
 def closed_loop(vehicle):
     plant = hybrid_vehicle(vehicle, paper_table3("ideal"))
     goal = setpoint(np.array([2, 3, 4, np.pi / 3, np.pi / 4, 2 * np.pi / 5]))
-    return ClosedLoop(plant, rcaf(plant.model()), goal, u1(), perfect())
+    return ClosedLoop(plant, rcaf(plant.model(), preset="paper"), goal, u1(), perfect())
 
 
 def test_renaming_the_thrusters_renames_the_voltages_and_nothing_else():

@@ -133,7 +133,9 @@ def quaternions(angles):
 
 def test_plant_that_is_no_vehicle_has_no_replay(run):
     plant = ut.plants.inverted_pendulum()
-    pendulum = ClosedLoop(plant, ut.rcaf(plant.model()), ut.references.sine(), ut.disturbances.none(), perfect())
+    pendulum = ClosedLoop(
+        plant, ut.rcaf(plant.model(), preset="paper"), ut.references.sine(), ut.disturbances.none(), perfect()
+    )
     assert replay_of(run, pendulum) is None
 
 

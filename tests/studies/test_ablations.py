@@ -137,7 +137,7 @@ def test_runs_that_ended_early_are_infinitely_bad():
 SMALL = {
     "scenario": {
         "plant": {"kind": "double_integrator", "axes": 6},
-        "controller": {"kind": "rcaf"},
+        "controller": "paper",
         "reference": {"kind": "setpoint", "position": [0.0] * 6},
         "disturbance": {"kind": "random_suite", "amplitude": 0.2, "step": 0.1},
         "loop": {"kind": "sampled", "duration": 0.4},

@@ -46,7 +46,7 @@ AXES = {"plant": {"kind": "double_integrator", "axes": 6}, "disturbance": "none"
 
 
 def rcaf(**options):
-    return {"kind": "rcaf", **options}
+    return {"kind": "paper", **options}
 
 
 @pytest.mark.full
@@ -55,7 +55,7 @@ def test_adrc_and_indi_of_one_bandwidth_are_one_law():
     observer, inversion = run({"kind": "adrc", **SAME}), run({"kind": "indi", **SAME})
     np.testing.assert_allclose(inversion["error"], observer["error"], atol=1e-12)
     np.testing.assert_allclose(inversion["estimate"], observer["estimate"], atol=1e-9)
-    table_1 = run("rcaf")["error"]  # in small signal the same again, but for the share of s in the adaptation
+    table_1 = run("paper")["error"]  # in small signal the same again, but for the share of s in the adaptation
     assert float(jnp.abs(observer["error"] - table_1).max()) < 0.03 * float(jnp.abs(table_1).max())
 
 

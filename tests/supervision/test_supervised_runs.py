@@ -33,7 +33,7 @@ SCENARIOS = {
     },
     "pid": {"plant": HEAVY, "controller": "pid", "reference": GOAL, "navigation": {"kind": "white_noise"}},
     "paper": {
-        "controller": {"kind": "rcaf", "composite": 20, "weights_bound": 20},
+        "controller": {"kind": "paper", "composite": 20, "weights_bound": 20},
         "reference": {"kind": "setpoint", "position": [2, 3, 4, 1, 0.8, 1.2]},
         "disturbance": "u1",
         "loop": {"dt": 1e-3},

@@ -19,7 +19,7 @@ def rails():
 
     def make(axes=1, goal=0.0, disturbance=None, limit=float("inf"), **choices):
         plant = double_integrator(axes, limit)
-        law = rcaf(plant.model(), **(THREE_SETS | choices))
+        law = rcaf(plant.model(), **({"preset": "paper"} | THREE_SETS | choices))
         goals = setpoint(np.broadcast_to(np.asarray(goal, dtype=float), (axes,)))
         return ClosedLoop(plant, law, goals, disturbance or none(), perfect())
 
@@ -31,6 +31,6 @@ def table1():
     """Maker of the law on one axis, three sets unless told otherwise."""
 
     def make(**choices):
-        return rcaf(double_integrator().model(), **(THREE_SETS | choices))
+        return rcaf(double_integrator().model(), **({"preset": "paper"} | THREE_SETS | choices))
 
     return make

@@ -70,7 +70,7 @@ class Late(AbstractNavigation):
 def test_delay_margin(name):
     choices, printed = MARGINS[name]
     plant = double_integrator()
-    law = rcaf(plant.model(), sets=3, **choices)
+    law = rcaf(plant.model(), **({"preset": "paper", "sets": 3} | choices))
     margin = delay_margin(law)
     print(f"{name}: {1e3 * margin:.3f} ms, printed {1e3 * printed}")
     whole_ticks = np.floor((margin - DT / 2) / DT)  # an input that is held is itself half a step late
@@ -105,7 +105,7 @@ def test_one_bad_sample(error, spacing, printed):
     plant = double_integrator()
     peaks = []
     for bound in (np.inf, 20.0):
-        law = rcaf(plant.model(), sets=3, reach=(spacing,), weights_bound=bound)
+        law = rcaf(plant.model(), preset="paper", sets=3, reach=(spacing,), weights_bound=bound)
         loop = ClosedLoop(plant, law, setpoint([0.0]), none(), OneBad(error))
         samples = sampled.simulate(loop, duration=0.5, dt=1e-3, record_every=1).signals
         peaks.append(float(jnp.abs(samples["estimate"]).max()))

@@ -34,7 +34,7 @@ def flown(d, law=None, axes=1, limit=np.inf, goal=2.0, dt=1e-3, duration=2.0, na
         choices["sampling_time"] = dt
     run = ut.simulate(
         plant,
-        rcaf(plant.model(), **choices),
+        rcaf(plant.model(), **({"preset": "paper"} | choices)),
         ut.references.setpoint([goal] * axes),
         disturbance=d,
         navigation=navigation,
@@ -189,8 +189,8 @@ def test_compensation_must_exceed_half_the_range_of_d():
 def test_residual_of_table_1():
     """U9: 0.2785 (phi w_bar + phi gamma_eps omega_bar) = 8.36 per axis; none with sign."""
     model = double_integrator(2).model()
-    assert lyapunov_residual(rcaf(model), 2) == pytest.approx(2 * 8.354, rel=1e-3)
-    assert lyapunov_residual(rcaf(model, switching="sign"), 2) == 0.0
+    assert lyapunov_residual(rcaf(model, preset="paper"), 2) == pytest.approx(2 * 8.354, rel=1e-3)
+    assert lyapunov_residual(rcaf(model, preset="paper", switching="sign"), 2) == 0.0
 
 
 def test_estimation_error_of_a_ramp_reaches_its_bound():
@@ -206,7 +206,7 @@ def test_estimation_error_of_a_ramp_reaches_its_bound():
 
 def test_rank_of_a_plant_that_cannot_go_everywhere():
     plant = linear_plant([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    run = ut.simulate(plant, rcaf(plant.model()), ut.references.setpoint([1, 0, 1]), duration=0.1)
+    run = ut.simulate(plant, rcaf(plant.model(), preset="paper"), ut.references.setpoint([1, 0, 1]), duration=0.1)
     assert hypothesis(run, "rank")["whole"] == 0.0 and hypothesis(run, "demand")["whole"] < 1
 
 
@@ -214,7 +214,7 @@ def test_a_run_that_failed_counts_until_its_end():
     plant = double_integrator(1, 1.0)
     run = ut.simulate(
         plant,
-        rcaf(plant.model()),
+        rcaf(plant.model(), preset="paper"),
         ut.references.setpoint([1.0]),
         disturbance=constant([1e6]),
         duration=2.0,
@@ -230,7 +230,7 @@ def test_theory_holds_for_a_class_made_of_a_law_and_for_no_other():
     class Renamed(RCAF):
         """The paper's law under another name."""
 
-    law = rcaf(double_integrator(2).model())
+    law = rcaf(double_integrator(2).model(), preset="paper")
     renamed = Renamed(**vars(law))
     assert theory.theory_of(renamed).poles(0) == theory.theory_of(law).poles(0) != []
     assert theory.theory_of(pid(double_integrator(2).model())).certificate is None

@@ -34,7 +34,7 @@ TABLE = [
 def noisy(duration, velocity, spacing, **choices):
     """Law, times, c along the run, weights, and the outcome, under white velocity noise."""
     plant = double_integrator(1)
-    law = rcaf(plant.model(), **({"sets": 3, "reach": (spacing,)} | choices))
+    law = rcaf(plant.model(), preset="paper", **({"sets": 3, "reach": (spacing,)} | choices))
     loop = ClosedLoop(plant, law, setpoint([0.0]), none(), white_noise(0.0, velocity))
     outcome = sampled.simulate(loop, duration=duration, dt=DT, record_every=10)
     weights = np.asarray(outcome.signals["weights"])[:, 0]
@@ -110,7 +110,7 @@ def test_ripple_drives_weights_apart_too():
     found = {}
     plant = double_integrator(1)
     for spacing in (1.0, 0.1):
-        law = rcaf(plant.model(), sets=3, reach=(spacing,))
+        law = rcaf(plant.model(), preset="paper", sets=3, reach=(spacing,))
         loop = ClosedLoop(plant, law, setpoint([0.0]), sinusoid(5.0, 20.0), perfect())
         outcome = sampled.simulate(loop, duration=100.0, dt=DT, record_every=1000)
         found[spacing] = float(drift.gain_of(law, np.asarray(outcome.signals["weights"])[-1, 0]))

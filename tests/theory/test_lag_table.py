@@ -30,7 +30,7 @@ SPEEDS = np.array([2.0, 10.0, 20.0, 40.0])  # rad/s
 def observer(bandwidth):
     """A pure linear observer in Table 1's letters: no robust term, no share of s, critically damped."""
     nothing = {"robust_gain": 0.0, "compensation_gain": 0.0, "weight": np.eye(2) * 1e-9}
-    rho = float(rcaf(thrust_model(), sets=3).fuzzy.basis_norm_squared())
+    rho = float(rcaf(thrust_model(), preset="paper", sets=3).fuzzy.basis_norm_squared())
     return nothing | {"sets": 3, "pole": 2 * bandwidth, "composite": bandwidth**2 / (100 * rho)}
 
 
@@ -79,7 +79,7 @@ def departure(law, speed):
 
 @pytest.mark.slow
 def test_sign_of_the_rightmost_eigenvalue_is_the_verdict_of_twenty_nonlinear_runs():
-    laws = [rcaf(MotorRail(WHOLE).model(), **choices) for choices in GAINS.values()]
+    laws = [rcaf(MotorRail(WHOLE).model(), preset="paper", **choices) for choices in GAINS.values()]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *laws)
     each_speed = jax.vmap(departure, in_axes=(None, 0))
     runs = np.asarray(jax.jit(jax.vmap(each_speed, in_axes=(0, None)))(stacked, jnp.asarray(SPEEDS)))
@@ -99,9 +99,9 @@ def test_a_linear_observer_is_stable_between_two_bandwidths():
     """20 to 60 rad/s at every speed from 1 rad/s; slower ones cannot hold motors that hardly turn."""
     rightmost = lambda law, speed: motor_loop.rightmost(motor_loop.motor_matrix(law, WHOLE.motor, speed)).real
     for bandwidth in (20.0, 30.0, 60.0):
-        law = rcaf(thrust_model(), **observer(bandwidth))
+        law = rcaf(thrust_model(), preset="paper", **observer(bandwidth))
         assert all(rightmost(law, speed) < 0 for speed in (1.0, 2.0, 5.0, 20.0, 40.0, 80.0))
-    slow = rcaf(thrust_model(), **observer(10.0))
+    slow = rcaf(thrust_model(), preset="paper", **observer(10.0))
     assert rightmost(slow, 1.0) > 0.05 and rightmost(slow, 2.0) < 0
 
 
@@ -134,7 +134,10 @@ def rows():
 def row(fidelity="electromechanical", supply=np.inf, speed_sensor=False, inner=None, dt=1e-3, **choices):
     thruster = paper_table3(fidelity, supply=supply)
     plant = MotorRail(thruster)
-    law = rcaf(plant.model(speed_sensor=speed_sensor) if inner is None else thrust_model(), **({"sets": 3} | choices))
+    law = rcaf(
+        plant.model(speed_sensor=speed_sensor) if inner is None else thrust_model(),
+        **({"preset": "paper", "sets": 3} | choices),
+    )
     flown = law if inner is None else InnerLoop(law.model, law, thruster, inner)
     loop = ClosedLoop(plant, flown, setpoint([2.0]), sinusoid(0.5, 1.0, offset=0.5), perfect())
     duration = 15.0 + 2 * PERIOD

@@ -29,7 +29,7 @@ FAST = np.flatnonzero(FREQUENCIES >= 100)
 @pytest.fixture(scope="module")
 def record():
     plant = double_integrator(len(FREQUENCIES))
-    law = rcaf(plant.model(), sets=3)
+    law = rcaf(plant.model(), preset="paper", sets=3)
     goal = setpoint(np.zeros(len(FREQUENCIES)))
     loop = ClosedLoop(plant, law, goal, sinusoid(1.0, FREQUENCIES), perfect())
     outcome = continuous.simulate(loop, duration=16.0, tolerances=(1e-7, 1e-9))

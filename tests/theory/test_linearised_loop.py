@@ -121,7 +121,7 @@ def test_noise_gains_are_those_of_one_axis(preset, options):
 def test_motors_are_in_it():
     """Section 3.9 on a whole vehicle: the vertical thrusters of ODIN hold a load in heave."""
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical"))
-    law = rcaf(plant.model(), **THREE_SETS)
+    law = rcaf(plant.model(), preset="paper", **THREE_SETS)
     loop = ClosedLoop(plant, law, setpoint([0.0] * 6), none(), perfect())
     found = equilibrium(loop, 1e-4, np.zeros(6), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]))
     assert found.found
@@ -184,7 +184,7 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
 
 def test_a_load_that_no_input_holds_is_told():
     plant = linear_plant(UNDER)
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 3), none(), perfect())
+    loop = ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint([0.0] * 3), none(), perfect())
     assert not equilibrium(loop, 1e-3, np.zeros(3), np.array([0.1, -0.1, 0.0])).found
     assert equilibrium(loop, 1e-3, np.zeros(3), np.array([0.1, 0.1, 0.2])).found, "but one that they can hold is found"
 
@@ -192,7 +192,7 @@ def test_a_load_that_no_input_holds_is_told():
 @pytest.mark.slow
 def test_a_load_that_no_thruster_holds_is_told():
     plant = hybrid_vehicle(remus100(), paper_table3("static"))
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0] * 6), none(), perfect())
+    loop = ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint([0.0] * 6), none(), perfect())
     assert not equilibrium(loop, 1e-3, np.zeros(6), np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])).found
 
 
@@ -218,7 +218,9 @@ def test_a_vehicle_rests_in_a_constant_current():
 def test_loads_along_the_reference_are_the_disturbance():
     """Where the model is exact and the target stands, nothing else is unknown."""
     plant = double_integrator(2)
-    loop = ClosedLoop(plant, rcaf(plant.model()), setpoint([0.0, 0.0]), sinusoid([1.0, 2.0], [3.0, 7.0]), perfect())
+    loop = ClosedLoop(
+        plant, rcaf(plant.model(), preset="paper"), setpoint([0.0, 0.0]), sinusoid([1.0, 2.0], [3.0, 7.0]), perfect()
+    )
     around = disturbance_profile(loop, at_rest(loop, 1e-2), jax.random.PRNGKey(0), 200, 1e-2)
     expected = np.stack([np.sin(3 * around.time), 2 * np.sin(7 * around.time)], axis=1)
     np.testing.assert_allclose(around.load, expected, atol=1e-9)
@@ -237,7 +239,7 @@ SCENARIOS = {
         "loop": {"duration": 40.0, "dt": 0.002},
     },
     "one ODE": {
-        "controller": {"kind": "rcaf"},
+        "controller": "paper",
         "disturbance": {"kind": "sinusoid", "amplitude": [1.0, 2.0], "frequency": [3.0, 20.0]},
         "loop": {"kind": "continuous", "duration": 8.0},
     },
@@ -316,7 +318,7 @@ def test_no_figure_is_predicted_beyond_the_limits_of_the_inputs(limit, predictab
 def _odin(fidelity, choices):
     return {
         "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": fidelity}},
-        "controller": {"kind": "rcaf", **choices},
+        "controller": {"kind": "paper", **choices},
         "reference": {"kind": "setpoint", "position": [2, 3, 4, 1.0472, 0.7854, 1.2566]},
         "disturbance": "u1",
         "loop": {"duration": 20, "dt": 1e-3, "record": 1e-2},

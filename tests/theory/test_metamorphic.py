@@ -44,7 +44,7 @@ class Stairs(AbstractDisturbance):
 def swimmer(disturbance):
     """ODIN with ideal thrusters at a pose away from the origin; the model is exact."""
     plant = hybrid_vehicle(odin(), paper_table3("ideal"))
-    law = rcaf(plant.model(), sets=3)
+    law = rcaf(plant.model(), preset="paper", sets=3)
     return ClosedLoop(plant, law, setpoint(POSE), disturbance, perfect())
 
 

@@ -91,7 +91,7 @@ def test_linear_model_is_the_jacobian_of_the_code(skew):
     """At equal weights, and at weights that drifted apart: these are damping, c = -xi'(0)^T theta."""
     speed = 20.0
     plant = hybrid_vehicle(odin(), paper_table3(), ledger=False)  # energies are never in equilibrium
-    law = rcaf(plant.model(), sets=3)
+    law = rcaf(plant.model(), preset="paper", sets=3)
     speeds = np.concatenate([np.zeros(4), np.full(4, speed)])
     current = MOTOR.steady_current(jnp.asarray(speeds))
     volts = MOTOR.resistance * current + MOTOR.back_emf_constant * speeds

@@ -29,7 +29,7 @@ LAWS = {
 def simulated(law_of, velocity, position=0.0):
     """Law, deviations over all seeds from 10 s to 60 s, and the gain c by the end."""
     plant = double_integrator(SEEDS)
-    law = rcaf(plant.model(), **law_of)
+    law = rcaf(plant.model(), **({"preset": "paper"} | law_of))
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(position, velocity))
     outcome = sampled.simulate(loop, duration=60.0, dt=1e-3, record_every=10)
     assert int(outcome.status) == 0

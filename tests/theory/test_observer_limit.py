@@ -29,7 +29,7 @@ def test_fast_observer_leaves_the_poles_of_law_and_observer(order):
 
 def test_papers_law_with_a_fast_observer_is_that_with_measured_velocity():
     """The four poles of the table of section 3.3."""
-    law = rcaf(double_integrator(1).model(), composite=50.0)
+    law = rcaf(double_integrator(1).model(), preset="paper", composite=50.0)
     fast = loop_poles(papers_law(law), 1e6)
     slow = fast[np.argsort(-fast.real)][:4]
     np.testing.assert_allclose(slow, poles(law), rtol=2e-3)

@@ -30,7 +30,7 @@ DT, NOISE = 1e-3, 1e-2  # s, m/s
 def minute(**choices):
     """Law, c at every tenth step, largest weight, and rms of d_hat and e over the 2nd and the 6th ten seconds."""
     plant = double_integrator(SEEDS)
-    law = rcaf(plant.model(), **choices)
+    law = rcaf(plant.model(), **({"preset": "paper"} | choices))
     loop = ClosedLoop(plant, law, setpoint(np.zeros(SEEDS)), none(), white_noise(0.0, NOISE))
     outcome = sampled.simulate(loop, duration=60.0, dt=DT, record_every=10)
     assert int(outcome.status) == 0

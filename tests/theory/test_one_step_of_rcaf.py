@@ -65,9 +65,9 @@ PREDICTED = RCAFState(np.array([0.25, -0.1]), np.array([0.9, -0.4]), THETA)
 @pytest.fixture(scope="module")
 def paper():
     """Command, rate and next state of the law with errors as fuzzy input, and of RAFC with the state as input."""
-    tanh = rcaf(MODEL, **CHOICES, **MODIFIED, weights_bound=BOX, substeps=2)
+    tanh = rcaf(MODEL, preset="paper", **CHOICES, **MODIFIED, weights_bound=BOX, substeps=2)
     sign = rcaf(
-        MODEL, **(CHOICES | {"composite": 0.0}), switching="sign", fuzzy_input="state", sets=2,
+        MODEL, preset="paper", **(CHOICES | {"composite": 0.0}), switching="sign", fuzzy_input="state", sets=2,
         identification_input="commanded", width=0.8,
     )  # fmt: skip
     wide = PREDICTED._replace(weights=np.asarray(THETA[:, :4]))

@@ -286,7 +286,7 @@ def test_laws_side_by_side_see_their_own_outputs():
     """Inputs and signals of two laws of one and two axes; the numbers of both become one."""
     parts = double_integrator(1).model(), MODEL
     model = composite_model(parts, (1, 2))
-    alone = tuple(rcaf(part, weights_bound=0.5) for part in parts)
+    alone = tuple(rcaf(part, preset="paper", weights_bound=0.5) for part in parts)
     both = decentralised(model, alone)
     y, goal = Measurement(np.append(0.5, X), np.append(-0.1, V)), Target(*(np.append(1.0, one) for one in GOAL))
     places = slice(0, 1), slice(1, 3)

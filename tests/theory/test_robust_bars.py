@@ -46,7 +46,9 @@ def test_whole_motor_at_24_volts(speed_sensor, bar):
 @pytest.mark.slow
 def test_table_1_does_not_hold_there():
     plant = hybrid_vehicle(odin(), paper_table3("electromechanical", supply=24.0), ledger=False)
-    rms, status, run = tracking(ClosedLoop(plant, rcaf(plant.model()), setpoint(TARGET), u1(scale=0.3), perfect()))
+    rms, status, run = tracking(
+        ClosedLoop(plant, rcaf(plant.model(), preset="paper"), setpoint(TARGET), u1(scale=0.3), perfect())
+    )
     at_limit = float(np.asarray(run.signals["saturated"])[1000:].mean())
     assert status != 0 or (rms > 5e-3 and at_limit > 0.5), (rms, status, at_limit)
 

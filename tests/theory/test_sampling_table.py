@@ -50,7 +50,7 @@ def law_of(rule, rafc, layout):
         | ({"composite": 0.0} if rafc else {})
         | ({"method": "rk4", "substeps": 3} if rule == "exact" else {})
     )
-    return rcaf(double_integrator().model(), **choices)
+    return rcaf(double_integrator().model(), preset="paper", **choices)
 
 
 def tick_matrix(g, dt, rule, delayed):

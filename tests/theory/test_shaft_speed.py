@@ -45,7 +45,7 @@ def test_the_papers_term_is_refused():
     """Before anything is compiled, and with the way out."""
     model = plant().model(speed_sensor=True)
     with pytest.raises(ut.BadInput, match=r"speed_sensor` must be false on fidelity `shaft`.* preset: robust"):
-        ut.simulate(plant(), ut.rcaf(model), ut.references.setpoint([0.0] * 6), duration=0.1)
+        ut.simulate(plant(), ut.rcaf(model, preset="paper"), ut.references.setpoint([0.0] * 6), duration=0.1)
 
 
 def test_where_there_is_no_speed_the_model_refuses():

@@ -192,7 +192,7 @@ def test_after_any_single_loss_the_error_is_what_the_linear_loop_predicts(preset
 def test_a_gain_three_times_too_large(dt, stable):
     """G_true = 3 G: p^2 + a1 p + 3 b2 for every sampling time short enough, dt < a1 / (3 b2) = 2.4 ms."""
     plant = linear_plant(((3.0,),))
-    law = rcaf(plant.model(gain=((1.0,),)), sets=3)
+    law = rcaf(plant.model(gain=((1.0,),)), preset="paper", sets=3)
     loop = ClosedLoop(plant, law, setpoint([1e-6]), none(), perfect())
     eps = np.abs(np.asarray(sampled.simulate(loop, duration=2.0, dt=dt, record_every=1).signals["modelling_error"]))
     assert (eps[-50:].max() < 1e-2 * eps[:20].max()) == stable

@@ -52,7 +52,7 @@ def step(name, limit, load=1.0):
     """Error, estimate and s of the step at every step, on one axis, and the law."""
     plant = double_integrator(1, limit)
     choices = {"rafc": {"sets": 3, "composite": 0.0}, "robust": {"preset": "robust"}}.get(name, {"sets": 3})
-    law = rcaf(plant.model(), **choices)
+    law = rcaf(plant.model(), **({"preset": "paper"} | choices))
     fed = FedCommanded(law.model, law) if name == "commanded" else law
     loop = ClosedLoop(plant, fed, setpoint([2.0]), sinusoid(0.0, 1.0, offset=load), perfect())
     samples = sampled.simulate(loop, duration=40.0, dt=1e-3, record_every=1).signals

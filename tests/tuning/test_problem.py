@@ -164,7 +164,7 @@ def test_ranges_that_cannot_be(ranges, said):
 
 
 def test_one_ode_is_not_what_a_vehicle_runs():
-    ode = {"controller": {"kind": "rcaf"}, "navigation": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
+    ode = {"controller": "paper", "navigation": "perfect", "loop": {"kind": "continuous", "duration": 1.0}}
     with pytest.raises(BadInput, match=r"^`loop.kind` must be sampled, for gains to be used on a vehicle"):
         problem(from_data(AXIS | ode))
 

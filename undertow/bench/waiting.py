@@ -30,7 +30,7 @@ _HEAVY = W2 | {"plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200
 _EXAMPLE_1: dict[str, Any] = {
     "plant": {"vehicle": "odin", "thruster": {"kind": "paper_table3", "fidelity": "ideal"}},
     "model": {"speed_sensor": True},
-    "controller": {"kind": "rcaf"},
+    "controller": {"kind": "paper"},
     "reference": {
         "kind": "setpoint",
         "position": [2, 3, 4, 1.0471975511965976, 0.7853981633974483, 1.2566370614359172],
@@ -47,7 +47,7 @@ _PENDULUM: dict[str, Any] = {
 }
 CASES = {
     "heavy": _changed(_HEAVY, "reference", {"kind": "setpoint", "position": [2, 1, 1.1, 0, 0, 0.5], "settling": 20}),
-    "example1": _changed(_EXAMPLE_1, "controller", {"kind": "rcaf", "composite": 450}),
+    "example1": _changed(_EXAMPLE_1, "controller", {"kind": "paper", "composite": 450}),
     "pendulum": _changed(_PENDULUM, "reference", {"kind": "sine", "amplitude": 0.12, "frequency": 1}),
 }
 _COMPARED = "robust,pid,adrc"

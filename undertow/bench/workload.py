@@ -22,7 +22,7 @@ W1: dict[str, Any] = {
         "thruster": {"kind": "paper_table3", "fidelity": "electromechanical"},
         "ledger": False,  # these runs are timed
     },
-    "controller": {"kind": "rcaf", "composite": 20.0, "weights_bound": 20.0},
+    "controller": {"kind": "paper", "composite": 20.0, "weights_bound": 20.0},
     "reference": {"kind": "setpoint", "position": [2, 3, 4, math.pi / 3, math.pi / 4, 2 * math.pi / 5]},
     "disturbance": "u1",
     "loop": {"kind": "sampled", "duration": 20.0},
@@ -40,7 +40,7 @@ W2: dict[str, Any] = {
     "description": "W2",
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
     "model": {"rate_term": True},
-    "controller": {"kind": "rcaf", "preset": "robust"},
+    "controller": {"kind": "paper", "preset": "robust"},
     "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
     "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}, {"kind": "waves", "height": 0.5, "period": 5}],
     "navigation": {"kind": "observer", "sensors": _SENSORS},

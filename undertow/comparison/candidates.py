@@ -11,7 +11,7 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario import factory
 from undertow.scenario.build import build
 from undertow.scenario.reading import Text, from_data, read
-from undertow.scenario.schema import Part, validate
+from undertow.scenario.schema import Part, named_law, validate
 
 OWN = "scenario"  # stands for the controller of the scenario itself
 _CODE = ".py:"
@@ -129,7 +129,7 @@ def _own(name: str, scenario: Text, path: Path | None) -> Candidate:
 
 def _controller(name: str, entry: Any) -> Candidate:
     if isinstance(entry, Mapping):
-        part = {"kind": "rcaf", **from_data(entry).data}
+        part = named_law(from_data(entry).data)
         return Candidate(name or label(part), {"controller": part}, None)
     if not isinstance(entry, str) or not entry:
         raise BadInput("--controllers", "name controllers, separated by commas", repr(entry))

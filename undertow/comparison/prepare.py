@@ -180,8 +180,9 @@ def _scenario_of(text: Text, allow_code: bool) -> Text:
 def _note(prepared: Prepared, number: int, built: Built, source: Path | None) -> TuningNote:
     """How the gains of a candidate came about."""
     given = prepared.trials.data(number).get("controller", {})
-    part = {"kind": given} if isinstance(given, str) else {"kind": "rcaf", **given}
-    return tuning_note(part, built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source)
+    return tuning_note(
+        schema.named_law(given), built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source
+    )
 
 
 def _prepared(campaign: Campaign, source: Text, allow_code: bool) -> tuple[Prepared, tuple[str, ...]]:

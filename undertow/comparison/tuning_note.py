@@ -63,7 +63,7 @@ def _given(
     kind = part["kind"]
     function = catalogue.find("controllers", kind, folder)
     presets = catalogue.presets_of(function)
-    preset = part.get("preset", next(iter(presets))) if presets else None
+    preset = part.get("preset", catalogue.usual_preset(function)) if presets else None
     defaults = inspect.signature(presets[preset] if preset else function).parameters
     known = law_of(kind, preset, law)
     tunable = [name.partition("[")[0] for name in known.ranges(dt)]

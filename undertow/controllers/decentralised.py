@@ -6,7 +6,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, PyTree
 
-from undertow.controllers.rcaf import rcaf
+from undertow.controllers.presets.robust import robust
 from undertow.core.composite_model import composite_model, parts_of, split, split_measurement, split_target
 from undertow.core.contracts import (
     AbstractController,
@@ -88,7 +88,7 @@ class Decentralised(AbstractInformedController):
 
 
 def decentralised(
-    model: Model, law: Callable[[Model], AbstractController] | Sequence[AbstractController] = rcaf
+    model: Model, law: Callable[[Model], AbstractController] | Sequence[AbstractController] = robust
 ) -> Decentralised:
     """The same law for each subsystem of a plant such as `two_vehicles`, with the nominal model of that alone.
 

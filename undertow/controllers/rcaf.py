@@ -16,17 +16,17 @@ PRESETS = {
 }
 
 
-def rcaf(model: Model, *, preset: str = "paper", **options: Any) -> AbstractController:
+def rcaf(model: Model, *, preset: str = "", **options: Any) -> AbstractController:
     """Robust composite adaptive fuzzy controller.
 
     Args:
         model: nominal model, from `plant.model()`.
         preset: `paper`, with the defaults of Table 1, `robust`, the robust variant for real vehicles, or
-            `learning`, the same with a memory.
+            `learning`, the same with a memory; there is no usual one.
         options: those of the preset; see `undertow.controllers.presets`.
 
     Raises:
-        BadInput: no such preset or option, or a value is out of its range.
+        BadInput: no preset, or no such one or option, or a value is out of its range.
     """
     return by_preset(PRESETS, preset, model, options)
 

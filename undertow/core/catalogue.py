@@ -111,6 +111,11 @@ def presets_of(part: Part) -> Mapping[str, Part]:
     return getattr(part, "presets", {})
 
 
+def usual_preset(part: Part) -> str:
+    """The preset that a part with presets has unless another is named; "" where one must be named."""
+    return inspect.signature(part).parameters["preset"].default
+
+
 def presets(kind: str) -> dict[str, str]:
     """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
     return {preset: name for name, part in names(kind).items() for preset in presets_of(part)}
@@ -122,13 +127,24 @@ def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Map
     Raises:
         BadInput: there is no such preset, or it has no such option.
     """
-    if preset not in presets:
-        raise BadInput("preset", f"be one of {', '.join(presets)}", preset)
+    check_preset(presets, preset)
     known = list(inspect.signature(presets[preset]).parameters)[1:]
     for name in options:
         if name not in known:
             raise BadInput(name, f"be an option of preset `{preset}`", "unknown", hint=did_you_mean(name, known))
     return presets[preset](model, **options)
+
+
+def check_preset(presets: Mapping[str, Part], preset: Any) -> None:
+    """Check that there is such a preset; with "" none was given to a part that has no usual one.
+
+    Raises:
+        BadInput: there is none.
+    """
+    if preset == "":
+        raise BadInput("preset", "be given", hint=f"It is one of {', '.join(presets)}")
+    if preset not in presets:
+        raise BadInput("preset", f"be one of {', '.join(presets)}", preset)
 
 
 def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def scenario(
         "description": description,
         "plant": plant,
         "model": {"speed_sensor": fidelity == "ideal"},
-        "controller": {"kind": "rcaf", "composite": composite, **(controller or {})},
+        "controller": {"kind": "paper", "composite": composite, **(controller or {})},
         "reference": {"kind": "setpoint", "position": GOAL},
         "disturbance": {"kind": "u1"},
         "loop": {"kind": "continuous", "duration": 20.0, "method": method},

@@ -82,7 +82,8 @@ def listed(kind: str) -> list[tuple[str, str]]:
     found = [(name, summary(part)) for name, part in parts.items()]
     for preset, name in catalogue.presets(kind).items():
         sentence = summary(catalogue.presets_of(parts[name])[preset])
-        found.append((preset, f"Preset of `{name}`: {sentence[:1].lower()}{sentence[1:]}"))
+        begin = sentence[:1] if sentence[1:2].isupper() else sentence[:1].lower()
+        found.append((preset, f"Preset of `{name}`: {begin}{sentence[1:]}"))
     return sorted(found)
 
 

@@ -38,7 +38,7 @@ INNER = {
     "esc": ("power", "esc"),
     "sensors": ("sensors", ("imu", "dvl", "depth", "compass", "position_fix")),
     "second_vehicle": ("vehicles", "odin"),
-    _LAW: ("controllers", "rcaf"),
+    _LAW: ("controllers", "robust"),
 }
 
 # Arguments that are tables of samples, which a file can give.
@@ -261,12 +261,12 @@ def contract_like(thing: Any, kind: str = "") -> tuple[str, list[str]]:
 
 
 def _preset(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Callable[..., Any], dict[str, str]]:
-    """The function of the preset in the options, by default the first; and its name."""
+    """The function of the preset in the options, or of the usual one; and its name."""
     presets = catalogue.presets_of(function)
     if not presets:
         return function, {}
-    name = options.pop("preset", next(iter(presets)))
-    checks.choice("preset", name, tuple(presets))
+    name = options.pop("preset", catalogue.usual_preset(function))
+    catalogue.check_preset(presets, name)
     return presets[name], {"preset": name}
 
 

@@ -10,7 +10,7 @@ from undertow.scenario import describing, factory
 from undertow.scenario.schema import Scenario
 
 # Kind of part -> the part that stands where its name is left out.
-_DEFAULTS = {"plants": "hybrid_vehicle", "controllers": "rcaf", "vehicles": "odin", "thrusters": "paper_table3"}
+_DEFAULTS = {"plants": "hybrid_vehicle", "controllers": "robust", "vehicles": "odin", "thrusters": "paper_table3"}
 
 _FILES = {"vehicles": r"\.ya?ml$", "": r"\.py:\w+$"}
 
@@ -37,8 +37,8 @@ def _reference(kind: str) -> dict[str, Any]:
 
 def _kind(kind: str) -> dict[str, Any]:
     """A part by name, or a mapping whose further keys depend on the name."""
-    parts = catalogue.names(kind)
-    names = _names(kind)
+    parts, names = catalogue.names(kind), _names(kind)
+    own = {preset: catalogue.presets_of(parts[name])[preset] for preset, name in catalogue.presets(kind).items()}
     mapping = {"type": "object", "properties": {"kind": {"anyOf": names}}}
     if kind not in _DEFAULTS and kind != "power":  # `battery` and `esc` have a default each
         mapping["required"] = ["kind"]
@@ -51,15 +51,14 @@ def _kind(kind: str) -> dict[str, Any]:
             },
             "then": {"properties": _options(kind, part)},
         }
-        for name, part in sorted(parts.items())
+        for name, part in sorted({**parts, **own}.items())
     ]
     return {**found, "allOf": options} if options else found
 
 
 def _names(kind: str) -> list[dict[str, Any]]:
     """What may stand where a part is named: the names of the catalogue, and files."""
-    parts = catalogue.names(kind)
-    known = [{"const": name, "description": describing.summary(part)} for name, part in sorted(parts.items())]
+    known = [{"const": name, "description": sentence} for name, sentence in describing.listed(kind)]
     return known + [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
 
 

@@ -28,12 +28,15 @@ def _named(default: str | None = None) -> BeforeValidator:
 
 
 def _law(value: Any) -> Any:
-    """A law by its name or that of a preset, or a mapping; `rcaf` unless it says otherwise."""
-    if not isinstance(value, str | dict):
-        return value
-    return catalogue.spelled_out(
-        "controllers", {"kind": value} if isinstance(value, str) else {"kind": "rcaf", **value}
-    )
+    """A law by its name or that of a preset, or a mapping; a mapping without `kind` has options of preset `robust`."""
+    return named_law(value) if isinstance(value, str | dict) else value
+
+
+def named_law(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    """The part that a value of the key `controller` stands for."""
+    described = {"kind": value} if isinstance(value, str) else dict(value)
+    kind = "rcaf" if "preset" in described else "robust"
+    return catalogue.spelled_out("controllers", {"kind": kind, **described})
 
 
 _YES, _NO = ("true", "yes", "on"), ("false", "no", "off", "none")
@@ -261,7 +264,9 @@ class Scenario(Strict):
     model: dict[str, Any] = Field(
         default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
     )
-    controller: Annotated[Part, BeforeValidator(_law)] = Field(Part(kind="rcaf"), description="the control law")
+    controller: Annotated[Part, BeforeValidator(_law)] = Field(
+        Part.model_validate({"kind": "rcaf", "preset": "robust"}), description="the control law"
+    )
     reference: NamedPart = Field(description="the desired motion")
     disturbance: OneOrMore = Field(Part(kind="none"), description="the disturbance; several as a list")
     navigation: NamedPart = Field(

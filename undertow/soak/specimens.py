@@ -11,8 +11,7 @@ plant:
   thruster: {kind: t200, supply: 16}  # V
 model: {rate_term: true}
 controller:
-  kind: rcaf
-  preset: robust
+  kind: robust
 reference:
   kind: setpoint
   position: [2, 1, 1, 0, 0, 0.5]  # m, rad
@@ -37,8 +36,7 @@ plant:
   thruster: {kind: paper_table3, fidelity: ideal}
 model: {speed_sensor: true}
 controller:
-  kind: rcaf
-  preset: paper
+  kind: paper
   feedback: [1, 2]  # 1/s^2, 1/s
   weight: [[10, 0], [0, 10]]
   adaptation: 100

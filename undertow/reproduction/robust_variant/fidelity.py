@@ -13,8 +13,8 @@ from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, sce
 from undertow.scenario.execute import Executed
 
 LAWS = {
-    "rcafc": ("RCAFC, Table 1", {"kind": "rcaf", "composite": RCAFC}),
-    "rafc": ("RAFC, Table 1", {"kind": "rcaf", "composite": RAFC}),
+    "rcafc": ("RCAFC, Table 1", {"kind": "paper", "composite": RCAFC}),
+    "rafc": ("RAFC, Table 1", {"kind": "paper", "composite": RAFC}),
     "robust": ("robust", {"kind": "rcaf", "preset": "robust"}),
     "measured": ("robust, speeds measured", {"kind": "rcaf", "preset": "robust"}),
 }
@@ -45,8 +45,8 @@ _TABLE1: dict[str, Any] = {
     "weights_bound": float("inf"),
 }
 _AT_SEA: dict[str, tuple[str, dict[str, Any]]] = {
-    "table1": ("Table 1", {"kind": "rcaf", **_TABLE1}),
-    "hand_tuned": ("paper's law, tuned by hand", {"kind": "rcaf", **HAND_TUNED}),
+    "table1": ("Table 1", {"kind": "paper", **_TABLE1}),
+    "hand_tuned": ("paper's law, tuned by hand", {"kind": "paper", **HAND_TUNED}),
     "robust": ("robust, no given gain", {"kind": "rcaf", "preset": "robust"}),
 }
 
