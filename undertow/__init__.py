@@ -2,7 +2,7 @@
 
     import undertow as ut
     plant = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3())
-    run = ut.simulate(plant, ut.rcaf(plant.model()), ut.references.setpoint([2, 3, 4, 0, 0, 1]))
+    run = ut.simulate(plant, "robust", ut.references.setpoint([2, 3, 4, 0, 0, 1]))
 
 Names are loaded when first used: `import undertow` by itself is quick.
 """
