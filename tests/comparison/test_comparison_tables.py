@@ -10,7 +10,7 @@ import xarray as xr
 from undertow.comparison.findings import Median, find
 from undertow.comparison.sentences import digits, sentences
 from undertow.comparison.step_time import StepTime
-from undertow.comparison.tables import median, medians, table
+from undertow.comparison.tables import even_digits, median, medians, table
 from undertow.core.metric import Metric
 from undertow.report.run_tables import metrics_rows
 
@@ -93,16 +93,32 @@ def test_too_few_pairs_for_the_correction(findings):
 
 def test_latex(findings):
     text = table(findings, "latex")
-    assert text.startswith(
-        "% Needs \\usepackage{booktabs}.\n\\begin{tabular}{lrrr}\n\\toprule\nmetric & a & b\\_1 & c \\\\"
-    )
-    assert "position rms per axis (m) & 1.04 [1.01, 1.08] & 0.59 [0.52, 0.66]$^{*}$ & " in text
+    assert text.startswith("% Needs \\usepackage{booktabs,tabularx}.")
+    assert "\\begin{tabularx}{\\linewidth}{Xrrr}\n\\toprule\nmetric & a & b\\_1 & c \\\\" in text
+    assert "\\caption{Median over completed trials [95 \\% interval of the median]; metrics of the steady" in text
+    assert "\\label{tab:medians}" in text and "\\label{tab:differences}" in text
+    assert "position rms per axis (m) & 1.04 [1.01, 1.08] & 0.590 [0.520, 0.660]$^{*}$ & " in text
     assert "input variation (m/s$^{2}$/s) & $1.04 \\times 10^{-5}$ [" in text
     assert "b\\_1 $-$ a & position rms per axis (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
     for line in text.splitlines():
         if "&" in line:
             assert line.count(" & ") in (3, 6) and line.endswith(" \\\\")
-    assert text.count("\\begin{tabular}") == text.count("\\end{tabular}") == text.count("\\bottomrule") == 2
+    assert text.count("\\begin{tabularx}") == text.count("\\end{tabularx}") == text.count("\\bottomrule") == 2
+    assert text.count("\\begin{table}\n") == text.count("\\end{table}\n") == 2
+
+
+def test_numbers_of_a_column_have_equal_digits():
+    values = (0.59, 1.0, 12.0, 123.4, 0.0012, 0.0, 1234.5, 1.2e-5)
+    assert [even_digits(value) for value in values] == [
+        "0.590",
+        "1.00",
+        "12.0",
+        "123",
+        "0.00120",
+        "0",
+        "1234",
+        "1.20e-05",
+    ]
 
 
 def test_markdown(findings):

@@ -57,7 +57,8 @@ class Comparison:
         """Metrics and differences as a table.
 
         Args:
-            style: `markdown`; `latex`, which needs the package booktabs; or `csv`, a line per metric and candidate.
+            style: `markdown`; `latex`, which needs the packages booktabs and tabularx; or `csv`, a line per metric and
+                candidate.
 
         Raises:
             BadInput: another style.

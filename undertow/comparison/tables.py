@@ -28,12 +28,15 @@ class Rows(NamedTuple):
     rows: list[tuple[str, ...]]
 
 
-def medians(found: Findings, times: Mapping[str, StepTime] | None = None) -> Rows:
+def medians(
+    found: Findings, times: Mapping[str, StepTime] | None = None, number: Callable[[float], str] = digits
+) -> Rows:
     """Metrics by candidate, below the number of completed trials.
 
     Args:
         found: what a comparison found.
         times: computing time of a step of each law, for a last row; None where it was not measured.
+        number: how a number is written.
     """
     first = found.names[0]
     rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
@@ -42,7 +45,8 @@ def medians(found: Findings, times: Mapping[str, StepTime] | None = None) -> Row
         rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in kept)))
     for metric, by_name in found.medians.items():
         marked = {one.candidate for one in found.differences if one.baseline == first and _is(one, metric)}
-        cells = (f"{median(by_name[name], found.units[metric])}{'*' * (name in marked)}" for name in found.names)
+        unit = found.units[metric]
+        cells = (f"{median(by_name[name], unit, number)}{'*' * (name in marked)}" for name in found.names)
         rows.append((titled(found, metric), *cells))
     if times:
         rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
@@ -56,17 +60,17 @@ def _time(one: StepTime | None) -> str:
     return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
 
 
-def paired(found: Findings) -> Rows:
+def paired(found: Findings, number: Callable[[float], str] = digits) -> Rows:
     """Differences of every two candidates in every metric."""
     rows = []
     for one in found.differences:
         unit = found.units[one.metric]
-        of = lambda number, one=one: f"{number} of {one.pairs}"
+        of = lambda count, one=one: f"{count} of {one.pairs}"
         rows.append(
             (
                 f"{one.candidate} - {one.baseline}",
                 titled(found, one.metric),
-                median(Median(one.median, one.low, one.high, one.pairs), unit),
+                median(Median(one.median, one.low, one.high, one.pairs), unit, number),
                 _NOTHING if math.isnan(one.relative) else relative(one, unit),
                 of(one.smaller),
                 _NOTHING if math.isnan(one.p_holm) else digits(one.p_holm),
@@ -77,17 +81,17 @@ def paired(found: Findings) -> Rows:
     return Rows(head, rows)
 
 
-def median(one: Median, unit: str) -> str:
+def median(one: Median, unit: str, number: Callable[[float], str] = digits) -> str:
     """A median with its interval, in the unit of tables for people."""
     if math.isnan(one.value):
         return _NOTHING
-    value, low, high = (value_in(number, unit) for number in one[:3])
+    value, low, high = (value_in(each, unit, number) for each in one[:3])
     return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
 
 
-def value_in(number: float, unit: str) -> str:
+def value_in(value: float, unit: str, number: Callable[[float], str] = digits) -> str:
     """A value in the unit of tables for people, without its name."""
-    return infinite(unit) if math.isinf(number) else digits(for_people(number, unit)[0])
+    return infinite(unit) if math.isinf(value) else number(for_people(value, unit)[0])
 
 
 def titled(found: Findings, metric: str) -> str:
@@ -117,15 +121,27 @@ def _markdown_rows(rows: Rows) -> str:
 
 
 def _latex(found: Findings) -> str:
-    lines = ["% Needs \\usepackage{booktabs}.", *_tabular(medians(found)), f"% {NOTE}", "", *_tabular(paired(found))]
-    return "\n".join(lines) + "\n"
+    pairs = "Paired differences: median over the trials that both completed [95 % interval]."
+    lines = ["% Needs \\usepackage{booktabs,tabularx}. Wide tables fit on a page as table* or within landscape.", ""]
+    lines += [*_floating(medians(found, number=even_digits), NOTE, "medians"), ""]
+    return "\n".join([*lines, *_floating(paired(found, number=even_digits), pairs, "differences")]) + "\n"
 
 
-def _tabular(rows: Rows) -> list[str]:
+def even_digits(value: float) -> str:
+    """A number as `digits` writes it, with zeros at its end: three digits in every cell of a column."""
+    if not value or not 1e-4 <= abs(value) < 1000:
+        return digits(value)
+    return f"{value:#.3g}".rstrip(".")
+
+
+def _floating(rows: Rows, caption: str, label: str) -> list[str]:
+    """A table as wide as the text, whose first column takes what the others leave."""
     line = lambda cells: f"{' & '.join(map(_escaped, cells))} \\\\"
-    columns = "l" + "r" * (len(rows.head) - 1)
+    columns = "X" + "r" * (len(rows.head) - 1)
     body = ["\\toprule", line(rows.head), "\\midrule", *map(line, rows.rows), "\\bottomrule"]
-    return [f"\\begin{{tabular}}{{{columns}}}", *body, "\\end{tabular}"]
+    begin = ["\\begin{table}", "\\centering", f"\\caption{{{_escaped(caption)}}}", f"\\label{{tab:{label}}}"]
+    begin.append(f"\\begin{{tabularx}}{{\\linewidth}}{{{columns}}}")
+    return [*begin, *body, "\\end{tabularx}", "\\end{table}"]
 
 
 _LATEX = re.compile(
