@@ -191,13 +191,14 @@ def test_schema_completes(schema):
     """Every part is offered where it may stand, and every option of it with its meaning."""
     for kind in catalogue.KINDS:
         offered = {one["const"] for one in schema["$defs"][kind]["anyOf"] if "const" in one}
-        assert offered == set(catalogue.names(kind))
+        assert offered == {*catalogue.names(kind), *catalogue.presets(kind)}
     options = {
         one["if"]["properties"]["kind"]["const"]: one["then"]["properties"]
         for one in schema["$defs"]["controllers"]["allOf"]
     }
     assert options["pid"]["integral_share"]["default"] == 0.1 and "model" not in options["pid"]
     assert options["rcaf"]["preset"] == {"enum": ["paper", "robust", "learning"]} and "bandwidth" in options["rcaf"]
+    assert "bandwidth" in options["robust"] and "preset" not in options["robust"]
 
 
 def test_schema_is_printed(capsys, schema):

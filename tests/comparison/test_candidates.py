@@ -1,6 +1,7 @@
 """Candidates by name, file and options, and the line that says how each was tuned."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -86,7 +87,7 @@ def test_how_gains_came_about():
     assert given == ("gains given in a.yaml (frequency 2.0), not tuned by `undertow tune`", False)
     assert note({"kind": "adrc"}, adrc) == by_rule
     assert note({"kind": "adrc", "bandwidth": 20.0}, adrc).sentence.startswith("gains given (bandwidth 20.0)")
-    paper = note({"kind": "rcaf", "preset": "paper"}, rcaf)
+    paper = note({"kind": "rcaf", "preset": "paper"}, partial(rcaf, preset="paper"))
     assert not paper.tuned and "Table 1" in paper.sentence
 
 

@@ -19,6 +19,7 @@ ODIN = {
 PENDULUM = {
     "description": 'a pendulum /* in a "comment" */ at 5\u00b0, 50 % \\',  # which C and XML must survive
     "plant": "inverted_pendulum",
+    "controller": "paper",
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
     "disturbance": {"kind": "random_suite", "axes": 1, "span": 4},
     "initial": {"position": [0.05]},

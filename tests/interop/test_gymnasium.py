@@ -29,6 +29,7 @@ SEA = SHORT | {
 }
 PENDULUM = {
     "plant": {"kind": "inverted_pendulum", "limit": 30.0},
+    "controller": "paper",
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
     "initial": {"position": [0.05]},
     "loop": {"duration": 0.2, "dt": 0.001, "record": 0.001},

@@ -27,6 +27,7 @@ AUV = {
 }
 PENDULUM = {
     "plant": "inverted_pendulum",
+    "controller": "paper",
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
     "initial": {"position": [0.05]},
     "loop": {"duration": 1.0, "dt": 0.001, "record": 0.001},

@@ -84,6 +84,7 @@ def test_a_scenario_is_run_by_the_backend_that_it_names():
     """`backend: xla` gives the same figures to rounding, and neither run had to change its backend."""
     scenario = {
         "plant": {"kind": "double_integrator", "axes": 1},
+        "controller": "paper",
         "reference": {"kind": "setpoint", "position": [1.0]},
         "disturbance": {"kind": "sinusoid", "amplitude": 1.0, "frequency": 3.0},
         "loop": {"kind": "continuous", "duration": 1.0},

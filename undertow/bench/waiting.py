@@ -41,6 +41,7 @@ _EXAMPLE_1: dict[str, Any] = {
 _PENDULUM: dict[str, Any] = {
     "plant": "inverted_pendulum",
     "model": {"half_length": 0.35},
+    "controller": "paper",
     "reference": {"kind": "sine", "amplitude": 0.1, "frequency": 1},
     "initial": {"position": [0.05235987755982988]},
     "loop": {"duration": 20},

@@ -167,10 +167,10 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     prefix, _, short = thing.rpartition("/")
     known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if prefix in ("", kind)}
     for kind, names in known.items():
-        if short in names:
+        if (whole := catalogue.presets(kind).get(short, short)) in names:
             make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]
-            return short, make(*_leading(names[short])), make
-    every = {name for names in known.values() for name in names}
+            return short, make(*_leading(names[whole])), make
+    every = {name for kind, names in known.items() for name in (*names, *catalogue.presets(kind))}
     must = "be a .yaml file, or the name of a part"
     if Path(thing).exists() or Path(thing).suffix:
         raise no_file(Path(thing), "", must)
