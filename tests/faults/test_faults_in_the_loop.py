@@ -96,7 +96,7 @@ def test_a_random_thruster_with_random_onset_and_severity():
     """Different for every seed, and different thrusters within one run."""
     entry = {"target": "thruster", "number": "random", "mode": "scale", "severity": [0.1, 0.9], "onset": [2.0, 4.0]}
     loop = build(ODIN | {"faults": [entry, entry]}).closed_loop
-    realized = jax.vmap(loop.faults.realize)(jax.random.split(jax.random.PRNGKey(0), 400))
+    realized = jax.jit(jax.vmap(lambda key: loop.faults.realize(key)))(jax.random.split(jax.random.PRNGKey(0), 400))
     (first, second), chosen = realized[1], np.asarray(realized[1][0].chosen)
     assert (chosen.sum(1) == 1).all() and not (chosen * np.asarray(second.chosen)).any()
     counts = chosen.sum(0)
