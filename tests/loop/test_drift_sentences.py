@@ -38,6 +38,10 @@ def test_position_from_a_velocity():
     assert found["down"] == pytest.approx(np.sqrt(density * T + (offset * T) ** 2))
 
 
+def test_a_dvl_knows_the_three_velocities_and_no_rate():
+    np.testing.assert_array_equal(dvl(noise=0.004).velocity_noise(), [0.004] * 3 + [np.inf] * 3)
+
+
 def test_what_is_measured_does_not_drift():
     every = [imu(), dvl(), compass(), depth(), position_fix()]
     assert drifts(every, 0.1, T) == {} and drift_advice(every, 0.1, T) == ()

@@ -16,6 +16,7 @@ from undertow.disturbances.parameter_error import parameter_error
 from undertow.disturbances.payload import payload
 from undertow.disturbances.sheared_current import sheared_current
 from undertow.disturbances.tether import tether
+from undertow.disturbances.thruster_loss import thruster_loss
 from undertow.disturbances.waves import waves
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.thrusters.paper_table3 import paper_table3
@@ -160,3 +161,5 @@ def test_jumps_of_several_disturbances_are_those_of_each():
     both = Together((payload(start=1.0, stop=4.0), payload(start=4.0, stop=6.0), waves(), tether()))
     assert both.jumps(10.0) == (1.0, 4.0, 6.0) and both.jumps(5.0) == (1.0, 4.0) and both.jumps(4.0) == (1.0,)
     assert parameter_error().jumps(10.0) == ()
+    assert thruster_loss(start=0.5).jumps(10.0) == (0.5,)
+    assert thruster_loss(start=0.5).jumps(0.5) == thruster_loss(start=0.0).jumps(10.0) == ()
