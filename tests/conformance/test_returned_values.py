@@ -86,7 +86,7 @@ def test_a_state_that_changes_its_form():
 
 
 class Mode:
-    """A fault that alters a signal to what it is told."""
+    """A fault that alters a signal to the answer it was given."""
 
     def __init__(self, answer):
         self.answer = answer

@@ -40,7 +40,7 @@ W2: dict[str, Any] = {
     "description": "W2",
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
     "model": {"rate_term": True},
-    "controller": {"kind": "paper", "preset": "robust"},
+    "controller": {"kind": "robust"},
     "reference": {"kind": "setpoint", "position": [2, 1, 1, 0, 0, 0.5], "settling": 20},
     "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}, {"kind": "waves", "height": 0.5, "period": 5}],
     "navigation": {"kind": "observer", "sensors": _SENSORS},
