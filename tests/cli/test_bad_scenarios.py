@@ -94,6 +94,11 @@ MISTAKES = {
         "r_g: [0, 0]",
         "`plant.vehicle.r_g` must be a list of 3 numbers, but is of shape (2,) (s.yaml, line 2)",
     ),
+    "preset of a preset": (
+        "kind: paper,",
+        "kind: paper, preset: robust,",
+        "`controller.preset` must be left out, because `paper` is a preset of `rcaf`, but is robust (s.yaml, line 4)",
+    ),
     "law with presets and none named": (
         "kind: paper,",
         "kind: rcaf,",

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.runtime import double_outside_runs
@@ -143,8 +144,7 @@ def check_preset(presets: Mapping[str, Part], preset: Any) -> None:
     """
     if preset == "":
         raise BadInput("preset", "be given", hint=f"It is one of {', '.join(presets)}")
-    if preset not in presets:
-        raise BadInput("preset", f"be one of {', '.join(presets)}", preset)
+    checks.choice("preset", preset, tuple(presets))
 
 
 def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:

@@ -35,8 +35,9 @@ def _law(value: Any) -> Any:
 def named_law(value: str | Mapping[str, Any]) -> dict[str, Any]:
     """The part that a value of the key `controller` stands for."""
     described = {"kind": value} if isinstance(value, str) else dict(value)
-    kind = "rcaf" if "preset" in described else "robust"
-    return catalogue.spelled_out("controllers", {"kind": kind, **described})
+    if "preset" in described:
+        return {"kind": "rcaf", **described}
+    return catalogue.spelled_out("controllers", {"kind": "robust", **described})
 
 
 _YES, _NO = ("true", "yes", "on"), ("false", "no", "off", "none")
