@@ -180,8 +180,8 @@ def test_bluerov2_is_not_asked_to_pitch():
 def test_fewer_thrusters_than_outputs_share_a_demand_by_moore_and_penrose():
     """G# of a vehicle of rank five, in motion and tilted, by its closed form."""
     dynamics = hybrid_vehicle(bluerov2(), t200()).model().dynamics
-    y = measurement_of_outputs(np.array([1.0, 2, 3, 0.3, -0.4, 0.8]), np.array([0.2, -0.1, 0.3, 0.1, 0.2, -0.3]))
-    demand = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 0.2])
+    y = measurement_of_outputs(jnp.array([1.0, 2, 3, 0.3, -0.4, 0.8]), jnp.array([0.2, -0.1, 0.3, 0.1, 0.2, -0.3]))
+    demand = jnp.array([0.3, -0.2, 0.5, 0.1, -0.4, 0.2])
     both = jax.jit(lambda y, demand: (dynamics.gain(y), dynamics.invert(y, demand)))
     gain, u = map(np.asarray, both(y, demand))
     assert np.linalg.matrix_rank(gain) == 5

@@ -176,8 +176,8 @@ def test_status_of_a_vehicle():
 def test_a_known_speed_of_the_propellers_adds_its_term_to_the_model():
     """phi of Eq. (15) for each thruster, as thrust; the rate of the speed is in it."""
     without, known = (NOMINAL.model(speed_sensor=on).dynamics for on in (False, True))
-    speed, rate = np.linspace(-30.0, 40.0, 8), np.linspace(5.0, -6.0, 8)
-    x = NOMINAL.initial_state(POSE[0], VELOCITY[0])
+    speed, rate = jnp.linspace(-30.0, 40.0, 8), jnp.linspace(5.0, -6.0, 8)
+    x = NOMINAL.initial_state(*map(jnp.asarray, (POSE[0], VELOCITY[0])))
     motor = NOMINAL.thruster.motor
 
     @jax.jit

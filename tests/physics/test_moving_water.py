@@ -107,7 +107,7 @@ def flow_of(sea, key, t):
 
 def test_peak_of_the_spectrum():
     """JONSWAP is Pierson-Moskowitz with its peak raised by gamma, narrower below (0.07) than above (0.09)."""
-    ratio = np.array([0.7, 0.93, 1.0, 1.09, 1.4])
+    ratio = jnp.array([0.7, 0.93, 1.0, 1.09, 1.4])
     frequency = ratio * 2 * np.pi / 5.0
     raised = spectrum(frequency, 5.0, 3.3) / spectrum(frequency, 5.0, 1.0)
     expected = [3.3 ** np.exp(-(0.3**2) / 2 / 0.07**2), 3.3 ** np.exp(-0.5), 3.3, 3.3 ** np.exp(-0.5)]

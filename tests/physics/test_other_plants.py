@@ -424,5 +424,5 @@ def test_loads_act_as_they_say():
 
 def test_power_of_the_arm_is_torque_times_rate():
     plant = two_link_arm()
-    x = plant.initial_state(np.array([0.3, -0.4]), np.array([0.7, -1.1]))
-    np.testing.assert_allclose(plant.power(x, np.array([2.0, 3.0])), [1.4, -3.3])
+    x = plant.initial_state(jnp.array([0.3, -0.4]), jnp.array([0.7, -1.1]))
+    np.testing.assert_allclose(plant.power(x, jnp.array([2.0, 3.0])), [1.4, -3.3])

@@ -347,7 +347,7 @@ def bench():
 
 def test_what_a_controller_knows_of_axial_flow_is_its_steady_curve():
     """The range of the force is that of the largest command, and has no end where the command has none."""
-    volts = np.array([-2.5, 1.5, 3.0])
+    volts = jnp.array([-2.5, 1.5, 3.0])
 
     @eqx.filter_jit
     def known(thruster):
