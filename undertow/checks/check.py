@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from undertow.checks.controller_check import check_stability
 from undertow.checks.finding import Finding
+from undertow.checks.flow_stability import flow_advice
 from undertow.checks.part_check import check_contract, of_plant
 from undertow.checks.plant_check import derived_of_plant
 from undertow.checks.thruster_check import derived_of_thruster
@@ -135,7 +136,10 @@ def _of_scenario(text: Text) -> list[Report]:
     """Reports on the scenario itself, its vehicle and thruster, and its plant and other parts."""
     built = build(text)
     loop = built.closed_loop
-    said = [(Finding("advice", "scenario", "", one.says, one.hint), one.where) for one in built.advice()]
+    said = [
+        (Finding("advice", "scenario", "", one.says, one.hint), one.where)
+        for one in (*built.advice(), *flow_advice(built))
+    ]
     reports = [Report(tuple(said), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
         reports.append(_of_vehicle(facts, vehicle_location(text)))

@@ -6,6 +6,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from undertow.checks.flow_stability import flow_advice
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -33,7 +34,8 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool,
         built = build(read(scenario, allow_code=allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
-        warnings = (*(one.sentence for one in built.advice()), *advice(prediction))
+        before = (*built.advice(), *flow_advice(built))
+        warnings = (*(one.sentence for one in before), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.console import Console
 
+from undertow.checks.flow_stability import flow_advice
 from undertow.checks.vehicle_lint import vehicle_advice
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
@@ -98,7 +99,7 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
 
         if not can_be_shown(built.closed_loop.plant):
             raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
-    for one in (*built.advice(), *vehicle_advice(built)):
+    for one in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
         typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: execute(built))

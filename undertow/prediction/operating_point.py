@@ -49,8 +49,9 @@ def operating_point(built: Built) -> OperatingPoint:
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
     around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)
     inside = (around.time >= start) & (around.time <= stop)
-    load = around.load[inside if inside.any() else slice(None)].mean(axis=0)
-    mean = equilibrium(loop, settings.dt, position, load)
+    steady = inside if inside.any() else slice(None)
+    load, flow = around.load[steady].mean(axis=0), None if around.flow is None else around.flow[steady].mean(axis=0)
+    mean = equilibrium(loop, settings.dt, position, load, flow)
     linear = margins.closed(mean, settings.dt, settings.kind)
     return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
 

@@ -8,6 +8,7 @@ import numpy as np
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
 from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
+from undertow.analysis.linearization.disturbance_profile import Conditions
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.theory import theory_of
@@ -30,7 +31,8 @@ Progress = Callable[[str, float], None]  # called with a message and the share d
 class Point(NamedTuple):
     """One operating point."""
 
-    share: float  # quantile of the load
+    where: str
+    flow: float | None  # speed of the water past the vehicle, m/s; None for other plants
     at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
@@ -78,7 +80,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     known = operating_point(built)
     loop, settings = known.built.closed_loop, built.scenario.loop
     progress("poles at the operating points", 0.5)
-    points = tuple(_point(known, *each) for each in zip(SHARES, known.around.operating_loads(SHARES), strict=True))
+    points = tuple(_point(known, one) for one in known.around.operating_points(SHARES))
     worst = max(points, key=lambda point: point.radius).at
     progress("margins", 0.6)
     found = _margins(worst, settings.dt)
@@ -107,13 +109,14 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     )
 
 
-def _point(known: OperatingPoint, share: float, load: np.ndarray) -> Point:
+def _point(known: OperatingPoint, acting: Conditions) -> Point:
     loop, settings = known.built.closed_loop, known.built.scenario.loop
-    at = equilibrium(loop, settings.dt, known.mean.parts.target.position, load)
+    at = equilibrium(loop, settings.dt, known.mean.parts.target.position, acting.load, acting.flow)
     linear = margins.closed(at, settings.dt, settings.kind)
     low, high = input_limits(known.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
-    return Point(share, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
+    speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
+    return Point(acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
 
 
 def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
@@ -161,7 +164,8 @@ def summary(prediction: Prediction) -> dict[str, Any]:
         "mean_load": known.mean.at["load"].tolist(),
         "points": [
             {
-                "share": point.share,
+                "where": point.where,
+                "flow": point.flow,
                 "load": point.at.at["load"].tolist(),
                 "input": point.at.at["u"].tolist(),
                 "input_used": point.used,

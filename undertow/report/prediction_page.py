@@ -82,7 +82,8 @@ def tables(prediction: Prediction) -> list[Rows]:
 def _points(prediction: Prediction) -> Rows:
     rows = [
         (
-            _percent(point.share),
+            point.where,
+            "-" if point.flow is None else f"{point.flow:.2f}",
             _percent(point.used) if point.used else "-",
             _pole(point.poles[0]) if len(point.poles) else "-",
             f"{point.radius:.6f}",
@@ -92,9 +93,10 @@ def _points(prediction: Prediction) -> Rows:
     ]
     return Rows(
         "Controllable closed-loop poles over the operating range",
-        ("load quantile", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
+        ("operating point", "flow, m/s", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
         rows,
-        "The whole loop, linearised at its equilibrium under loads along the reference, with constant fuzzy weights.",
+        "The whole loop, linearised at its equilibrium under loads along the reference, with constant fuzzy weights. "
+        "Flow is the speed of the water past the vehicle; its drag and moments change as the vehicle turns and moves.",
     )
 
 

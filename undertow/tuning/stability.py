@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.disturbance_profile import disturbance_profile
+from undertow.analysis.linearization.disturbance_profile import Conditions, disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
@@ -59,24 +59,24 @@ class Certifier:
         once = [trials.variants.index(name) for name in self._variants]
         self._plants = [_plant(trials, i) for i in once]
         pairs = zip(self._plants, once, strict=True)
-        self._loads = [self._operating_loads(plant, trials.keys[i], first) for plant, i in pairs]
+        self._points = [self._operating_points(plant, trials.keys[i], first) for plant, i in pairs]
 
     def __call__(self, law: AbstractController) -> Certificate:
         """Certificate of a controller."""
         dt = self._training_loop.settings.dt
         radii: list[float] = []
         variants: list[str] = []
-        for name, plant, loads in zip(self._variants, self._plants, self._loads, strict=True):
-            found = margins.certify(self._training_loop.with_parts(plant, law), dt, self._position, loads)
+        for name, plant, points in zip(self._variants, self._plants, self._points, strict=True):
+            found = margins.certify(self._training_loop.with_parts(plant, law), dt, self._position, points)
             radii += [radius if np.isfinite(radius) else float("inf") for radius in found]
             variants += [name] * len(found)
         return Certificate(tuple(radii), tuple(variants))
 
-    def _operating_loads(self, plant: Any, key: Any, law: AbstractController) -> np.ndarray:
+    def _operating_points(self, plant: Any, key: Any, law: AbstractController) -> list[Conditions]:
         loop, dt = self._training_loop.with_parts(plant, law), self._training_loop.settings.dt
         at = equilibrium(loop, dt, self._position, np.zeros_like(self._position))
         around = disturbance_profile(loop, at, key, round(self._training_loop.duration / dt), dt)
-        return around.operating_loads(_SHARES)
+        return around.operating_points(_SHARES)
 
 
 def _plant(trials: Trials, number: int) -> Any:

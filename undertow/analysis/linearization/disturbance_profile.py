@@ -6,10 +6,22 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PRNGKeyArray
+from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
+from undertow.core.contracts import Load, Pose
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.numerics.linear_algebra import matvec
+
+_BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow
+
+
+class Conditions(NamedTuple):
+    """What acts at one operating point."""
+
+    where: str
+    load: np.ndarray  # acceleration of the outputs, m/s^2, rad/s^2
+    flow: np.ndarray | None  # velocity of the water past the vehicle, m/s; None for other plants
 
 
 class DisturbanceProfile(NamedTuple):
@@ -20,18 +32,28 @@ class DisturbanceProfile(NamedTuple):
         load: what the model does not know of the acceleration, as an acceleration of the outputs where the loop
             rests, m/s^2 and rad/s^2: disturbances, and what moving along the reference takes beyond the model.
         noise: measured minus true position and velocity, m, rad, m/s, rad/s.
+        flow: velocity of the water past the vehicle, m/s, world axes where the loop rests; None for other plants.
     """
 
     time: np.ndarray
     load: np.ndarray
     noise: np.ndarray
+    flow: np.ndarray | None
 
-    def operating_loads(self, shares: tuple[float, ...]) -> np.ndarray:
-        """The loads that are larger than given shares of all, one row each; sizes in units of each axis' rms."""
+    def operating_points(self, shares: tuple[float, ...]) -> list[Conditions]:
+        """Where the load is larger than given shares of all, and for a vehicle the flow faster than nine tenths of all.
+
+        Sizes of loads are in units of each axis' rms.
+        """
         scale = np.sqrt((self.load**2).mean(axis=0))
         size = np.linalg.norm(self.load / np.where(scale > 0, scale, 1.0), axis=1)
         order = np.argsort(size, kind="stable")
-        return self.load[order[[round(share * (len(order) - 1)) for share in shares]]]
+        rows = {f"{share:.0%} quantile of the load": order[round(share * (len(order) - 1))] for share in shares}
+        if self.flow is None:
+            return [Conditions(where, self.load[row], None) for where, row in rows.items()]
+        fastest_first = np.argsort(-np.linalg.norm(self.flow, axis=1), kind="stable")
+        rows["fast flow"] = fastest_first[round(_BRIEF * (len(fastest_first) - 1))]
+        return [Conditions(where, self.load[row], self.flow[row]) for where, row in rows.items()]
 
 
 def disturbance_profile(
@@ -47,8 +69,9 @@ def disturbance_profile(
         dt: s.
     """
     x, _ = at.parts.states(at.at)
-    unknown, noise = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), steps)
-    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise))
+    unknown, noise, flow = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), steps)
+    flow = None if flow is None else np.asarray(flow)
+    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow)
 
 
 @eqx.filter_jit
@@ -68,14 +91,19 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     still = jnp.zeros_like(y_rest.position)
     scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
 
-    times = jnp.arange(steps, dtype=float) * dt
+    times, resting = jnp.arange(steps, dtype=float) * dt, plant.pose(x_rest)
 
     def along(t):
         r = loop.reference.at(t)
         x = plant.initial_state(r.position, r.velocity)
-        return plant.output(t, x), jnp.linalg.solve(scale, unknown(t, x, realization.load(t, x)) - at_rest)
+        load = realization.load(t, x)
+        return (
+            plant.output(t, x),
+            jnp.linalg.solve(scale, unknown(t, x, load) - at_rest),
+            _flow(load, plant.pose(x), resting),
+        )
 
-    outputs, loads = jax.vmap(along)(times)
+    outputs, loads, flow = jax.vmap(along)(times)
 
     def look(measuring, now):
         t, truth = now
@@ -87,4 +115,12 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     measuring = loop.navigation.init(
         realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
-    return loads, jax.lax.scan(look, measuring, (times, outputs))[1]
+    return loads, jax.lax.scan(look, measuring, (times, outputs))[1], flow
+
+
+def _flow(load: Load, pose: Pose | None, resting: Pose | None) -> Array | None:
+    """Velocity of the water past a vehicle, m/s, as it is past one that rests and has the same in body axes."""
+    if pose is None or resting is None:
+        return None
+    water = jnp.zeros(3) if load.water is None else load.water.velocity
+    return matvec(resting.rotation, matvec(pose.rotation.T, water - pose.velocity))

@@ -113,7 +113,7 @@ class Equilibrium(NamedTuple):
         return self.moving < 1e-5
 
 
-def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equilibrium:
+def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any, flow: Any = None) -> Equilibrium:
     """The loop at rest at a reference, under a constant load.
 
     Args:
@@ -121,8 +121,10 @@ def equilibrium(loop: ClosedLoop, dt: float, position: Any, load: Any) -> Equili
         dt: sampling time, s.
         position: of the reference, m and rad.
         load: acceleration of the outputs, m/s^2 and rad/s^2.
+        flow: velocity of the water past the vehicle, m/s, world axes: what of the load it causes changes as the vehicle
+            turns and moves. None: the load stays what it is.
     """
-    parts, start = take_apart(loop, position)
+    parts, start = take_apart(loop, position, flow)
     load, model = np.asarray(load, dtype=float), parts.loop.controller.model.in_body_axes()
     y = _output(parts, as_array(start["plant"]))
     balance = Balance(parts, dt, _acting(parts.differentiate(start, dt)), _steered(model, y))

@@ -17,7 +17,7 @@ from jaxtyping import Array, PyTree
 
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractContinuousController, Target, known_acceleration
+from undertow.core.contracts import AbstractContinuousController, Load, Target, Water, known_acceleration
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 
@@ -35,6 +35,13 @@ class Local(NamedTuple):
     slopes: Slopes
 
 
+class Flow(NamedTuple):
+    """Water that moves past a vehicle at rest."""
+
+    velocity: Array  # m/s, world axes
+    pushes: Array  # acceleration of the outputs that it causes there, m/s^2 and rad/s^2: a part of the load
+
+
 class Parts(NamedTuple):
     """A closed loop whose states are vectors.
 
@@ -43,6 +50,7 @@ class Parts(NamedTuple):
         target: constant reference.
         plant_state, law_state: vectors back into the states of plant and law.
         sizes: length of each of `INPUTS`.
+        flow: of the water; None for none.
     """
 
     loop: ClosedLoop
@@ -50,6 +58,7 @@ class Parts(NamedTuple):
     plant_state: Any
     law_state: Any
     sizes: tuple[int, ...]
+    flow: Flow | None = None
 
     def differentiate(self, at: dict[str, Any], dt: float) -> Local:
         """Values and slopes where the states, the input, the load and the noise are as given, arrays by name.
@@ -73,12 +82,20 @@ class Parts(NamedTuple):
             },
         )
 
+    def pushed(self, load: Array) -> Load:
+        """A load as an acceleration of the outputs (m/s^2, rad/s^2), as far as the water does not cause it."""
+        unloaded = self.loop.plant.no_load()
+        if self.flow is None:
+            return unloaded._replace(acceleration=unloaded.acceleration + load)
+        rest = unloaded.acceleration + load - self.flow.pushes
+        return _moved(unloaded, self.flow.velocity)._replace(acceleration=rest)
+
     def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
         """States of plant and law of a point."""
         return self.plant_state(jnp.asarray(at["plant"])), self.law_state(jnp.asarray(at["law"]))
 
 
-def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.ndarray]]:
+def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts, dict[str, np.ndarray]]:
     """A closed loop about a constant reference, and its states at rest there as vectors (`plant` and `law`).
 
     A law that learns along a moving reference is taken without that: it adds nothing to the fast part of the loop, and
@@ -87,6 +104,7 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
     Args:
         loop: the five roles.
         position: reference, m and rad.
+        flow: velocity of the water past the vehicle, m/s, world axes; its forces change as the vehicle turns and moves.
     """
     law = theory_of(loop.controller).at_rest
     loop = loop if law is None else dataclasses.replace(loop, controller=law)
@@ -94,18 +112,29 @@ def take_apart(loop: ClosedLoop, position: Any) -> tuple[Parts, dict[str, np.nda
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
-    x, z = _at_rest(loop, target)
+    x, z, found = _at_rest(loop, target, None if flow is None else as_array(flow))
     flat_x, plant_state = ravel_pytree(x)
     flat_z, law_state = ravel_pytree(z)
     axes, inputs = position.shape[0], loop.plant.inputs()
     sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
-    return Parts(loop, target, plant_state, law_state, sizes), {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
+    parts = Parts(loop, target, plant_state, law_state, sizes, found)
+    return parts, {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
 
 
 @eqx.filter_jit
-def _at_rest(loop: ClosedLoop, target: Target) -> tuple[PyTree, PyTree]:
-    x = loop.plant.initial_state(target.position, target.velocity)
-    return x, loop.controller.init(loop.plant.output(jnp.zeros(()), x), target)
+def _at_rest(loop: ClosedLoop, target: Target, velocity: Array | None) -> tuple[PyTree, PyTree, Flow | None]:
+    plant, zero = loop.plant, jnp.zeros(())
+    x, unloaded = plant.initial_state(target.position, target.velocity), plant.no_load()
+    z = loop.controller.init(plant.output(zero, x), target)
+    if velocity is None:
+        return x, z, None
+    pushed = lambda load: plant.acceleration(zero, x, jnp.zeros(plant.inputs()), load)
+    return x, z, Flow(velocity, pushed(_moved(unloaded, velocity)) - pushed(unloaded))
+
+
+def _moved(unloaded: Load, velocity: Array) -> Load:
+    """The load of water that moves at a velocity, m/s, world axes."""
+    return unloaded._replace(water=Water(velocity, jnp.zeros_like(velocity)))
 
 
 def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:
@@ -132,8 +161,7 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
     """What follows from states, input, load and noise."""
     (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
     x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
-    unloaded = plant.no_load()
-    pushed = unloaded._replace(acceleration=unloaded.acceleration + load)
+    pushed = parts.pushed(load)
     truth, axes = plant.output(zero, x), load.shape[0]
     y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])
     command, of_law = law.command(z, y, r)

@@ -1,11 +1,12 @@
 """Robustness margins of the linearised loop: sampling, delay, lag and gain; its poles and its response to noise."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
+from undertow.analysis.linearization.disturbance_profile import Conditions
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearization.minimal_realization import multipliers, visible
@@ -108,8 +109,8 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
     return small.signals[signal] @ inner + loop.direct[signal]["load"]
 
 
-def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any) -> list[float]:
-    """Spectral radius of the closed loop at rest under each of some constant loads; below 1 each is stable.
+def certify(loop: ClosedLoop, dt: float, position: Any, points: Iterable[Conditions]) -> list[float]:
+    """Spectral radius of the closed loop at rest at each of some operating points; below 1 each is stable.
 
     Loads that no input holds are left out; where none is held, the radius is infinite.
 
@@ -117,9 +118,9 @@ def certify(loop: ClosedLoop, dt: float, position: Any, loads: Any) -> list[floa
         loop: the five roles.
         dt: sampling time, s.
         position: of the reference, m and rad.
-        loads: accelerations of the outputs, m/s^2 and rad/s^2, one per row.
+        points: what acts at each.
     """
-    found = [at for load in np.atleast_2d(loads) if (at := equilibrium(loop, dt, position, load)).found]
+    found = [at for one in points if (at := equilibrium(loop, dt, position, one.load, one.flow)).found]
     return [spectral_radius(closed(at, dt)) for at in found] or [float("inf")]
 
 

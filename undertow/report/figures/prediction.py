@@ -12,7 +12,7 @@ from undertow.loop.dataset import input_names
 from undertow.prediction.predict import Prediction
 from undertow.report.figures import style
 
-_MARKS = ("o", "s", "^")
+_MARKS = ("o", "s", "^", "D")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")
 _FORWARD, _REVERSE = style.Look(style.INK, "-", 1.4, 3), style.Look(style.INK, (0, (4, 1.6)), 1.4, 3)
 _DASHES = ("-", (0, (4, 1.6)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (2, 1)), (0, (8, 2)))
@@ -32,8 +32,7 @@ def _poles(prediction: Prediction) -> Figure:
     panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
         marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
-        words = f"{100 * point.share:.0f} % quantile of the load"
-        panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=words)
+        panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=point.where)
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
     right = max(1.0, *(float(np.real(point.poles).max(initial=0.0)) for point in prediction.points))
