@@ -24,7 +24,7 @@ _ATTITUDES = {"euler": BODY_OUTPUTS[3:], "quaternion": _QUATERNION, "both": (*BO
 _VELOCITIES = {"body": _BODY, "world": _WORLD, "rates": _RATES, "both": (*_RATES, *_BODY)}
 ATTITUDES, VELOCITIES = tuple(_ATTITUDES), tuple(_VELOCITIES)
 
-_UNIT = 1e-9  # a quaternion whose square departs from 1 by less, as in a simulation, is taken as it is
+AS_INTEGRATED = 1e-6  # a quaternion whose square departs from 1 by less, as in a simulation, is taken as it is
 
 
 class Format(NamedTuple):
@@ -101,7 +101,7 @@ class Motion(NamedTuple):
 def _unit(quaternion: Float[Array, "4"]) -> Float[Array, "4"]:
     """The quaternion with length 1: as it is where that is so already."""
     square = (quaternion**2).sum()
-    return jnp.where(jnp.abs(square - 1) < _UNIT, quaternion, quaternion / jnp.sqrt(square))
+    return jnp.where(jnp.abs(square - 1) < AS_INTEGRATED, quaternion, quaternion / jnp.sqrt(square))
 
 
 def _in_body_axes(rotation: Float[Array, "3 3"], velocity: Float[Array, "6"]) -> Float[Array, "6"]:

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from undertow.autopilot.measured_motion import AS_INTEGRATED
 from undertow.core.errors import BadInput
 from undertow.interop.ros2.frames import between_attitudes, between_frd_and_flu, between_ned_and_enu
 from undertow.logs.frames import attitudes_of_quaternions
 
 SECOND = 1_000_000_000  # ns
 
-_ROUNDED = 1e-9
 _UNIT = 1e-3  # a quaternion whose square departs from 1 by more was not meant as an attitude
 
 
@@ -139,4 +139,4 @@ def _attitude(given: Any, topic: str) -> NDArray:
         must = "be of unit length"
         raise BadInput(f"{topic} orientation", must, f"{numbers.tolist()} (w, x, y, z), of length {square**0.5:.4g}")
     # As it is where it was integrated, so that the bits of a simulation pass.
-    return between_attitudes(numbers if abs(square - 1) < _ROUNDED else numbers / square**0.5)
+    return between_attitudes(numbers if abs(square - 1) < AS_INTEGRATED else numbers / square**0.5)
