@@ -161,6 +161,7 @@ def test_composite_of_different_plants():
             "acceleration": coordinates.acceleration(y, demanded),
             "output_velocity": coordinates.output_velocity(y, demanded),
             "drift": both.dynamics.drift(y),
+            "compensated": both.drift_at_target_velocity(y, demanded),
         }
         alone = [
             {
@@ -169,6 +170,7 @@ def test_composite_of_different_plants():
                 "acceleration": c.acceleration(y, demanded[k]),
                 "output_velocity": c.output_velocity(y, demanded[k]),
                 "drift": one.dynamics.drift(y),
+                "compensated": one.drift_at_target_velocity(y, demanded[k]),
             }
             for one, c, y, r, k in own
         ]
@@ -229,7 +231,7 @@ def test_scenario_gives_each_law_its_options_and_its_noise():
     noise = np.repeat([0.001, 0.05], 6).tolist()
     built = build(from_data(scenario(navigation={"kind": "white_noise", "velocity": noise})))
     law = built.closed_loop.controller
-    quiet, loud = (float(np.min(one.estimator.bandwidth)) for one in law.laws)
+    quiet, loud = (float(one.actuator_rate) for one in law.laws)
     assert loud < 0.8 * quiet
     again = build(from_data(built.resolved)).closed_loop.controller
     for one, other in zip(again.laws, law.laws, strict=True):

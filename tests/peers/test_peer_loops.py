@@ -36,12 +36,12 @@ def damped(time_constant, inertia=1.0):
 
 @pytest.mark.parametrize("case", [0, 1])
 def test_pid_pole_placement_of_the_otter(case):
-    """PythonVehicleSimulator feeds back less damping where undertow compensates drag: the closed loop is the same."""
+    """PythonVehicleSimulator feeds back the damping that is asked for less that of the vessel, 1 / T, which acts here too."""
     peer, expected = PEER["pid"], PEER["pid"]["runs"][case]
-    plant, dt = damped(1.0, peer["inertia"]), peer["dt"]
-    law = pid(
-        plant.model(), sampling_time=dt, frequency=peer["wn"], damping=float(peer["zeta"]), reference_frequency=0.0
-    )
+    time_constant, dt = 1.0, peer["dt"]
+    plant = damped(time_constant, peer["inertia"])
+    damping = float(peer["zeta"]) - 1 / (2 * peer["wn"] * time_constant)
+    law = pid(plant.model(), sampling_time=dt, frequency=peer["wn"], damping=damping, reference_frequency=0.0)
     load = expected["load"] / peer["inertia"]
     found = run(plant, law, [0.0], 20.0, dt, load, position=[expected["start"]])["position"][:, 0]
     np.testing.assert_allclose(dt * np.abs(found).sum(), expected["integral_of_error"], rtol=1e-6)
@@ -49,22 +49,29 @@ def test_pid_pole_placement_of_the_otter(case):
 
 
 def test_integral_sliding_mode_of_the_remus_100_under_a_load():
-    """Fossen (2021), Eq. (16.479), in its layer: its K_d s and K_s sat(s / phi) are one slope M / phi here."""
+    """Fossen (2021), Eq. (16.479), in its layer: its K_d s and K_s sat(s / phi) are one slope M / phi here.
+
+    The peer compensates the damping 1 / T of the vessel at the velocity that its surface asks for, undertow at that of
+    the target: the same PID with k_d less by 1 / T, from which frequency, damping and slope follow.
+    """
     peer = PEER["integral_sliding_mode"]
     (expected,), dt, time_constant = peer["runs"], peer["dt"], float(peer["T_nomoto"])
     slope = (1 + peer["K_d"]) / time_constant + peer["K_sigma"] / time_constant / peer["phi_b"]
-    plant = damped(time_constant)
+    plant, lam = damped(time_constant), peer["lam"]
+    by_rate, by_error, by_integral = 2 * lam + slope - 1 / time_constant, lam**2 + 2 * lam * slope, lam**2 * slope
+    slope = max(root.real for root in np.roots([1, -by_rate, by_error, -by_integral]) if abs(root.imag) < 1e-9)
+    frequency = np.sqrt(by_integral / slope)
     law = integral_sliding_mode(
         plant.model(),
         sampling_time=dt,
-        frequency=peer["lam"],
-        damping=1.0,
+        frequency=frequency,
+        damping=(by_rate - slope) / (2 * frequency),
         amplitude=slope,
         layer=1.0,
         reference_frequency=0.0,
     )
     found = run(plant, law, [0.0], 60.0, dt, expected["load"])
-    assert np.abs(found["surface"]).max() < peer["phi_b"]
+    assert np.abs(found["surface"]).max() < 1.0  # inside the layer
     heading = found["position"][:, 0]
     np.testing.assert_allclose(dt * np.abs(heading).sum(), expected["integral_of_error"], rtol=1e-3)
     np.testing.assert_allclose(heading.max(), expected["most"], rtol=1e-3)

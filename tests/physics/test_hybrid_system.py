@@ -193,6 +193,28 @@ def test_a_known_speed_of_the_propellers_adds_its_term_to_the_model():
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
+def test_what_laws_compensate_is_the_drift_at_the_velocity_of_the_target():
+    """M^-1 (-C nu - D nu - g), nu that of the target, the attitude that of the vehicle; in Euler angles as in body axes."""
+    outputs, body = NOMINAL.model(), NOMINAL.body
+    pose, nu, off = (jnp.asarray(one[0]) for one in (POSE, VELOCITY, WRENCH / 50))
+
+    @jax.jit
+    def compensated(pose, nu, off):
+        kinematics = Kinematics(jacobian(pose[3:])[:3, :3])
+        y = outputs.coordinates.measurement(pose, kinematics.to_world(nu))
+        target, down = nu + off, jacobian(pose[3:])[2, :3]
+        expected = jnp.linalg.solve(
+            body.mass_matrix, -body.coriolis(target) - body.damping(target) - body.restoring(down)
+        )
+        found = outputs.in_body_axes().drift_at_target_velocity(y, off)
+        in_outputs = outputs.drift_at_target_velocity(y, kinematics.to_world(off))
+        return found, kinematics.to_body(in_outputs), expected
+
+    found, in_outputs, expected = compensated(pose, nu, off)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    np.testing.assert_allclose(in_outputs, expected, rtol=1e-9)
+
+
 @pytest.mark.full
 def test_inverse_of_the_model_is_the_pseudo_inverse_of_its_gain():
     """Also below rank 6, where the closed form does not hold."""

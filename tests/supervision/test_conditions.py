@@ -93,7 +93,7 @@ def vehicle(name: str):
     euler, reporting = name == "near_vertical", name == "report_lost"
     thruster = ut.thrusters.paper_table3(fidelity="shaft") if reporting else ut.thrusters.t200()
     plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
-    law = ut.controllers.pid(plant.model(), sampling_time=T)
+    law = ut.controllers.pid(plant.model(), sampling_time=T, frequency=2.8)
     made = supervisor(Tampered(law, law.model), plant, sampling_time=T, thruster_faults=False)
     return plant, dataclasses.replace(made, model=plant.model()) if euler else made
 
@@ -102,7 +102,7 @@ def on_axes(name: str):
     """Two axes in metres and four in radians that know nothing of each other, with the gates of a vehicle."""
     plant = DoubleIntegrator(20.0, outputs=tuple("abcdef"), output_units=("m",) * 3 + ("rad",) * 3)
     coordinates = OutputCoordinates(angles=(False,) * 3 + (True,) * 3)
-    law = ut.controllers.pid(plant.model()._replace(coordinates=coordinates), sampling_time=T)
+    law = ut.controllers.pid(plant.model()._replace(coordinates=coordinates), sampling_time=T, frequency=4.8)
     made = supervisor(Tampered(law, law.model), plant, sampling_time=T)
     limits = {"max_distance": 1e4, "max_speed": 10.0, "max_rate": 10.0}
     limits |= dict.fromkeys(("jump_position", "jump_angle", "jump_velocity", "jump_rate"), 1.0)
@@ -113,7 +113,7 @@ class Stepped:
     """A supervised law that watches a plant which another law moves; what it is given can be tampered with."""
 
     def __init__(self, plant, supervised):
-        mover = ut.controllers.pid(plant.model(), sampling_time=T)
+        mover = ut.controllers.pid(plant.model(), sampling_time=T, frequency=4.8)
         self.parts = (plant, mover, supervised)
         # With the parts inside, a call takes a third of the time that it takes with the parts as arguments.
         self.compiled = jax.jit(functools.partial(_steps, self.parts))

@@ -18,7 +18,7 @@ from undertow.supervision.fault_tolerant_law import fault_tolerant
 
 DT, ONSET, DURATION = 0.02, 15.0, 18.0
 PLANT = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(fidelity="static"))
-LAW = ut.controllers.pid(PLANT.model(), sampling_time=DT)
+LAW = ut.controllers.pid(PLANT.model(), sampling_time=DT, frequency=4.8)
 
 
 def losses():

@@ -84,7 +84,7 @@ def test_the_first_order_rule_keeps_the_margin_of_the_delay():
     )
     held = (1 - np.exp(-s * dt)) / (s * dt)
     for factor, _, delay, largest in (MARGINS[0], MARGINS[4]):
-        loop = demand * given * held * np.exp(-s * delay * dt) / (1 + s * factor * lag)
+        loop = demand * given * held * np.exp(-s * delay * axis.unknown_delay) / (1 + s * factor * lag)
         assert np.abs(1 / (1 + loop)).max() <= largest * 1.01
 
 

@@ -200,14 +200,16 @@ def test_one_step_of_the_robust_law():
     xi = basis_of(eps, np.linspace(-1, 1, 5), 0.5)
     d_hat, u_r = (THETA * xi).sum(-1), np.array([1.2, 0.7]) * np.tanh(S / [2.0, 0.5])
     desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + u_r
-    same(u, np.linalg.solve(G, desired - d_hat - DRIFT))
+    # Compensated at the velocity of the target, known at the measured one.
+    compensated = d_hat + F @ X + H @ GOAL.velocity
+    same(u, np.linalg.solve(G, desired - compensated))
     same(known, DRIFT + G @ APPLIED)
     expected = {"estimate": d_hat, "robust_term": u_r, "modelling_error": eps, "attained_share": 1.0} | DECREASE
     for name, value in expected.items():
         same(signals[name], value)
     same(signals["weights_at_bound"], 0.0)
     of_rates, of_estimate = estimator_gains(NATURAL, ZETA)
-    wanted = desired - d_hat - DRIFT
+    wanted = desired - compensated
     assert (G @ APPLIED) @ wanted < 0.999 * wanted @ wanted
     for after, mu, force in ((free, MU, np.asarray(u)), (limited, 0 * MU, APPLIED)):
         moved = of_estimate * (eps + mu * S)

@@ -80,10 +80,11 @@ def paths():
 def test_a_demand_beyond_the_limits(paths, name):
     """Forces by the inverse of the model, allocated; what limits took away returns to the integral."""
     target, u, signals, after, known, moved, free = paths[name]
-    drift = 0 * DRIFT if "without" in name else DRIFT
     e, r = target.position - X, target.velocity - V
     demand = target.acceleration + K_P * e + K_D * r + OWN
-    forces = np.linalg.solve(G, demand - drift)
+    # Compensated at the velocity of the target, known at the measured one.
+    drift, compensated = (0 * DRIFT, 0 * DRIFT) if "without" in name else (DRIFT, F @ X + H @ target.velocity)
+    forces = np.linalg.solve(G, demand - compensated)
     limits, lead = np.array([[-LIMIT, -LIMIT], [LIMIT, LIMIT]]), TAU * RATE
     if name == "computed":
         limits = FORCE + (limits - FORCE) / lead

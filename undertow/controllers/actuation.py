@@ -1,8 +1,8 @@
 """From a demanded acceleration to inputs: the path that laws with acceleration as output share.
 
-A law decides an acceleration; everything after it is common: the modelled forces are compensated, the model is
-inverted, forces are allocated within the limits of the actuators, and the actuators are commanded. What limits took
-away comes back to the law as `Given`, so that it need not wind up.
+A law decides an acceleration; everything after it is common: the modelled forces are compensated, as they are at the
+velocity of the target, the model is inverted, forces are allocated within the limits of the actuators, and the
+actuators are commanded. What limits took away comes back to the law as `Given`, so that it need not wind up.
 """
 
 import abc
@@ -130,13 +130,18 @@ class AbstractAccelerationLaw(AbstractInformedController):
     def _drift(self, y: Measurement) -> PerAxis:
         return self.model.dynamics.drift(y) if self.actuation.feedforward else jnp.zeros_like(y.position)
 
+    def _compensated(self, y: Measurement, off: TrackingError) -> PerAxis:
+        if not self.actuation.feedforward:
+            return jnp.zeros_like(y.position)
+        return self.model.drift_at_target_velocity(y, off.rate)
+
     def _plan(self, z: ActuatedState, y: Measurement, r: Target) -> Plan:
         dynamics, coordinates, _ = self.model
         smoothing = self.actuation.filter
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         off = coordinates.tracking_error(y, target)
         acceleration, signals = self.demand(z.law, y, off)
-        forces = dynamics.invert(y, acceleration - self._drift(y))
+        forces = dynamics.invert(y, acceleration - self._compensated(y, off))
         return Plan(self._actuators().update_from_report(z.actuators, y.actuator), off, forces, signals)
 
 

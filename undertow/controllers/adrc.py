@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.controllers.observer_gains import gains_with_feedback
 from undertow.controllers.tracking_error import check_gains
@@ -71,7 +72,7 @@ def adrc(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     bandwidth=None,
     damping=1.0,

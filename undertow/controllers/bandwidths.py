@@ -2,8 +2,8 @@
 
 One axis, x_ddot = f + d with f behind a first-order actuator, sampled, with noise on the measured velocity. A law is
 two transfer functions from position and velocity to its input. The rule tries a grid of bandwidths and takes the one
-of least cost E = rms(e) / 0.05 + 0.05 (variation of the input per second, as a share of its limit), the cost that
-`undertow tune` minimises, among those that keep every margin of `MARGINS`; where none keeps them all, the slowest.
+of least cost E = rms(e) / 0.05 + (mean step of the input between sampling times, as a share of its limit) / 0.02 among
+those that keep every margin of `MARGINS`; where none keeps them all, the slowest.
 Masses enter through the authority of the actuators only. Frequencies are those of the sampled loop; the actuator is
 assumed continuous. The rule assumes damping 1, and a tenth for the integral of a PID.
 """
@@ -25,20 +25,25 @@ from undertow.core.contracts import Model
 from undertow.numerics.linear_algebra import matvec
 
 # Largest sensitivity |1 / (1 + L)| allowed with a factor on the nominal lag, an additional lag of the actuator and an
-# unknown delay, both in sampling times.
+# unknown delay, both in shares of `Axis.unknown_delay`.
 MARGINS = (
-    # lag factor, added lag / T, added delay / T, largest sensitivity
+    # lag factor, added lag, added delay, largest sensitivity
     (1.0, 0.0, 0.0, 2.5),
-    (2.0, 0.0, 3.0, 10.0),
+    (2.0, 0.0, 0.75, 10.0),
     (1 / 3, 0.0, 0.0, 5.0),
     (3.0, 0.0, 0.0, 15.0),
-    (1.0, 0.0, 4.0, 5.0),
-    (1.0, 2.0, 3.0, 5.0),
+    (1.0, 0.0, 1.0, 5.0),
+    (1.0, 0.5, 0.75, 5.0),
 )
-UNKNOWN_LAG = 6.0  # sampling times; assumed for an actuator of unknown lag
+UNKNOWN_LAG = 1.5  # share of the unknown delay; assumed for an actuator of unknown lag
+# What sensors, link and drives may take beyond what is known: they are made for the rate of the loop, up to a point.
+_UNKNOWN_SAMPLES, _UNKNOWN_TIME = 4.0, 0.02  # sampling times; s
 
-# Weights of an error of one metre or radian and of the variation of the input, as in `undertow tune`.
-_ERROR_SCALE, _VARIATION_PRICE = 0.05, 0.05
+# Random walk of the loads that a law assumes unless it is given, m/s^2 and rad/s^2 per sqrt(s).
+LOAD_RATE = 0.25
+
+# An error of so many metres or radians costs as much as an input that moves by this share of its limit at each step.
+_ERROR_SCALE, _STEP_SCALE = 0.05, 0.02
 
 _FASTEST = 0.35  # share of the sampling rate; faster loops are dominated by sampling
 _TRACKING_SHARES = (0.25, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # tracking bandwidth over the estimator's
@@ -72,6 +77,11 @@ class Axis(NamedTuple):
     velocity_noise: float
     load_rate: float
     authority: float
+
+    @property
+    def unknown_delay(self) -> float:
+        """Delay against which the margins are kept, beyond what is known, s."""
+        return min(_UNKNOWN_SAMPLES * self.sampling_time, _UNKNOWN_TIME)
 
     @property
     def response_time(self) -> float:
@@ -248,8 +258,9 @@ def _best(axis: Axis, law: Callable[[np.ndarray], Law], rates: np.ndarray) -> in
         some = order[start : start + _AT_ONCE]
         allowed = np.ones(len(some), dtype=bool)
         for factor, added, delay, largest in MARGINS:
-            slower = UNKNOWN_LAG if added and axis.lag is None else added
-            behind = np.exp(-s * delay * dt) / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * slower * dt))
+            slower = axis.unknown_delay * (UNKNOWN_LAG if added and axis.lag is None else added)
+            late = np.exp(-s * delay * axis.unknown_delay)
+            behind = late / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * slower))
             allowed &= _keeps(open_loop[some] * behind, largest)
         if allowed.any():
             return int(some[allowed.argmax()])
@@ -268,8 +279,8 @@ def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open
     noise = axis.velocity_noise * np.sqrt(dt)
     by_noise = noise * rms(from_y.of_velocity * held * actuator * sensitivity / s**2)
     # Mean size of a normal step from one sampling time to the next: sqrt(2 / pi) of its standard deviation.
-    variation = np.sqrt(2 / np.pi) / dt * noise * rms((1 - np.exp(-s * dt)) * from_y.of_velocity * sensitivity)
-    return np.hypot(by_load, by_noise) / _ERROR_SCALE + _VARIATION_PRICE * variation / axis.authority
+    step = np.sqrt(2 / np.pi) * noise * rms((1 - np.exp(-s * dt)) * from_y.of_velocity * sensitivity)
+    return np.hypot(by_load, by_noise) / _ERROR_SCALE + step / axis.authority / _STEP_SCALE
 
 
 def _at(point: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.controllers.actuation import actuation_for
-from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
 from undertow.controllers.cascade_law import Cascade
 from undertow.core import checks
 from undertow.core.catalogue import by_preset
@@ -31,7 +31,7 @@ def placed(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     outer=None,
     inner=None,

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.controllers.observer_gains import gains_and_path
 from undertow.controllers.tracking_error import pole_placement
@@ -74,7 +75,7 @@ def disturbance_observer(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     bandwidth=None,
     tracking=None,

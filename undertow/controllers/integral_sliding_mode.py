@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -83,7 +83,7 @@ def integral_sliding_mode(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     frequency=None,
     damping=1.0,

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -134,7 +134,7 @@ def lqi(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     frequency=None,
     integral_weight=_INTEGRAL,

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
@@ -119,7 +119,7 @@ def mrac(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     frequency=None,
     damping=1.0,

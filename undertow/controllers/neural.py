@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, ROBUST_TERM
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -54,7 +54,7 @@ class Neural(AbstractAccelerationLaw):
     model: Model
     actuation: Actuation
     start: Float[Array, "inputs hidden"]  # V at the start
-    slope: Float[Param, "..."] = param("1/s", "pole of the filtered error", symbol="Lambda", range=(0.1, 15.0))
+    slope: Float[Param, "..."] = param("1/s", "pole of the filtered error", symbol="Lambda", range=(0.1, 30.0))
     gain: Float[Param, "..."] = param("1/s", "gain of the filtered error", symbol="K_v", range=(0.1, 30.0))
     adaptation: Float[Param, "..."] = param(
         "1/s^2", "adaptation gain of the output layer", symbol="F", range=(1e-3, 30.0)
@@ -112,7 +112,7 @@ def neural(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     hidden: int = 8,
     seed: int = 0,

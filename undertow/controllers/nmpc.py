@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.controllers.observer_gains import gains_and_path
 from undertow.controllers.receding_horizon import Horizon, Improved, improved, regulator
@@ -72,7 +73,7 @@ class NMPC(AbstractAccelerationLaw):
         dynamics, estimate, horizon = self.model.dynamics, self._estimate(own, y), self._horizon(y)
         state = jnp.concatenate([off.error, off.rate])
         force = own.plan.forces[0] + matvec(own.plan.gain, state - own.plan.start)
-        planned = dynamics.drift(y) + matvec(dynamics.gain(y), jnp.clip(force, horizon.low, horizon.high))
+        planned = self._compensated(y, off) + matvec(dynamics.gain(y), jnp.clip(force, horizon.low, horizon.high))
         # What has become known since the plan enters at once.
         planned = planned + (off.acceleration - own.acceleration) - (estimate - own.estimate)
         gains = regulator(horizon)[1]
@@ -134,7 +135,7 @@ def nmpc(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     bandwidth=None,
     tracking=None,

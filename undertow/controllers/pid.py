@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -66,7 +66,7 @@ def pid(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     frequency=None,
     damping=1.0,

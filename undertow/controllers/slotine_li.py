@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import AbstractDynamics, Measurement, Model, Outputs, Target, TrackingError
@@ -100,14 +100,14 @@ class SlotineLi(AbstractAccelerationLaw):
     def demand(self, own: Parameters, y: Measurement, off: TrackingError):
         structure, surface = self.regressor.parametrization(), self._surface(off)
         force, nominal = self._force(own, y, off), self._force(structure.nominal, y, off)
-        # Of the whole acceleration, the drift is compensated later by the path that all laws share.
+        # This is the whole acceleration; the path that all laws share compensates the modelled forces once more.
         demanded = self.regressor.accelerated_by(y, force + self.gain * structure.inertia * surface)
         signals = {
             "estimate": self.regressor.accelerated_by(y, nominal - force),
             "surface": surface,
             "parameter_change": (jnp.abs(own - structure.nominal) / structure.most).max(),
         }
-        return demanded + self.regressor.drift(y), signals
+        return demanded + self._compensated(y, off), signals
 
     def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: Given, dt) -> Parameters:
         """Parameters one sampling time later.
@@ -142,7 +142,7 @@ def slotine_li(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     slope=None,
     gain=None,

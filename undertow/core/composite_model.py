@@ -78,6 +78,11 @@ class CompositeCoordinates(AbstractCoordinates):
         each = zip(self.parts, split_measurement(self.parts, y), strict=True)
         return jnp.concatenate([part.velocity(own) for part, own in each])
 
+    def with_velocity(self, y: Measurement, velocity):
+        each = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
+        rates = [part.with_velocity(own, given).velocity for part, own, given in each]
+        return y._replace(velocity=jnp.concatenate(rates))
+
     def acceleration(self, y: Measurement, acceleration):
         each = zip(self.parts, split_measurement(self.parts, y), self._split(acceleration), strict=True)
         return jnp.concatenate([part.acceleration(own, given) for part, own, given in each])

@@ -181,6 +181,10 @@ class AbstractCoordinates(eqx.Module):
         """Velocity of the plant, m/s and rad/s."""
 
     @abc.abstractmethod
+    def with_velocity(self, y: Measurement, velocity: Outputs) -> Measurement:
+        """The same pose and report of the actuators, with another `velocity`."""
+
+    @abc.abstractmethod
     def acceleration(self, y: Measurement, acceleration: Outputs) -> Outputs:
         """Rate of `velocity` that belongs to a second derivative of the outputs."""
 
@@ -205,6 +209,19 @@ class Model(NamedTuple):
     dynamics: AbstractDynamics
     coordinates: AbstractCoordinates
     actuators: AbstractActuatorModel
+
+    def drift_at_target_velocity(self, y: Measurement, rate: Outputs) -> Outputs:
+        """F at the measured pose and the velocity of the target: what a law compensates, m/s^2 and rad/s^2.
+
+        At the measured velocity, the compensation of a drag that the vehicle does not have would be positive feedback
+        of its velocity; this way the drag of the vehicle damps, whatever it is.
+
+        Args:
+            y: measurement.
+            rate: velocity of the target less that of the plant, m/s, rad/s.
+        """
+        target = self.coordinates.velocity(y) + rate
+        return self.dynamics.drift(self.coordinates.with_velocity(y, target))
 
     def in_body_axes(self) -> "Model":
         """The same model in body axes; itself where the plant has none."""

@@ -17,6 +17,9 @@ class AbstractOutputCoordinates(AbstractCoordinates):
     def velocity(self, y: Measurement) -> Outputs:
         return y.velocity
 
+    def with_velocity(self, y: Measurement, velocity: Outputs) -> Measurement:
+        return self.measurement(y.position, velocity, y.actuator)
+
     def acceleration(self, y: Measurement, acceleration: Outputs) -> Outputs:
         return acceleration
 

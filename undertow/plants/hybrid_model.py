@@ -114,6 +114,10 @@ class BodyCoordinates(AbstractCoordinates):
     def velocity(self, y: Measurement) -> Vector6:
         return body_of(y).nu
 
+    def with_velocity(self, y: Measurement, velocity: Vector6) -> Measurement:
+        own = body_of(y)
+        return y._replace(velocity=Kinematics(own.rotation).to_world(velocity), body=own._replace(nu=velocity))
+
     def acceleration(self, y: Measurement, acceleration: Vector6) -> Vector6:
         """nu_dot that belongs to an acceleration of the outputs."""
         own = body_of(y)

@@ -6,6 +6,7 @@ from typing import Annotated
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.inertia import InertiaIdentification
 from undertow.controllers.robust.knowledge import Knowledge, load_knowledge
@@ -23,7 +24,7 @@ def learning(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     bandwidth=None,
     damping=1.0,

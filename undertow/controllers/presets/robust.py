@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.bandwidths import LOAD_RATE, axes_of, completed
 from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator, widened
 from undertow.controllers.robust.robust_law import RobustRCAF
@@ -18,7 +18,7 @@ def robust(
     *,
     sampling_time: float = 1e-3,
     velocity_noise=0.0,
-    load_rate=1.0,
+    load_rate=LOAD_RATE,
     delay: float = 0.0,
     bandwidth=None,
     damping=1.0,

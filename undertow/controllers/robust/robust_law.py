@@ -62,6 +62,9 @@ class Plan(NamedTuple):
 class RobustRCAF(AbstractInformedController):
     """The paper's structure in body axes, with the applied input in the estimator and actuator limits.
 
+    Unlike in Eq. (23), the drift is compensated as it is at the velocity of the target; the estimator takes the one at
+    the measured velocity.
+
     Gains are one number for all axes or one per axis. With `tracking_share` 0 the estimator is a pure observer: it
     depends on neither the controller nor its limits.
 
@@ -212,5 +215,6 @@ class RobustRCAF(AbstractInformedController):
             correction = desired - off.acceleration - seen.uncertainty
             recalled = Recalled(phi, correction, self.memory.value(z.memory, phi, correction))
             seen = seen._replace(uncertainty=seen.uncertainty + recalled.value)
-        forces = dynamics.invert(y, desired - seen.uncertainty - dynamics.drift(y))
+        compensated = seen.uncertainty + self.model.drift_at_target_velocity(y, off.rate)
+        forces = dynamics.invert(y, desired - compensated)
         return Plan(reported, seen, off, u_r, desired, forces, recalled)
