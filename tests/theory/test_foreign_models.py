@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +12,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import Conditions
 from undertow.checks.flow_stability import flow_advice, munk_rate
 from undertow.core import runtime
+from undertow.core.contracts import AbstractController
 from undertow.scenario.build import build
 from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
@@ -80,6 +82,26 @@ def test_a_loop_that_is_too_slow_is_named_with_the_rate_that_is_enough():
     assert advised.hint.startswith("80 Hz is enough")
     for plant, rate in (("px4", 20), ("ng2024", 50)):
         assert flow_advice(build(from_data(scenario(plant, plant, rate)))) == ()
+
+
+class WithoutSlopes(eqx.Module):
+    """A law that runs and cannot be differentiated."""
+
+    law: AbstractController
+
+    def __getattr__(self, name):
+        return getattr(self.law, name)
+
+    def command(self, z, y, r):
+        u, signals = self.law.command(z, y, r)
+        return jax.pure_callback(lambda u: u, u, u), signals
+
+
+@pytest.mark.full
+def test_of_a_law_without_slopes_nothing_is_said():
+    built = build(from_data(scenario("ng2024", "gazebo_box_drag", 20)))
+    loop = dataclasses.replace(built.closed_loop, controller=WithoutSlopes(built.closed_loop.controller))
+    assert flow_advice(built._replace(closed_loop=loop)) == ()
 
 
 LISSAJOUS = {"kind": "lissajous", "amplitude": [2.0, 1.0, 0.5, 0.8], "frequency": [0.2, 0.4, 0.3, 0.25]}

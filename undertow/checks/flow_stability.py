@@ -12,7 +12,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.core.arrays import as_array
-from undertow.core.errors import Advice, advice, within
+from undertow.core.errors import Advice, BadInput, advice, within
 from undertow.navigation.perfect import perfect
 from undertow.numerics.random_keys import key_of_seed
 from undertow.plants import HybridVehicle
@@ -63,7 +63,10 @@ def _remedy(built: Built) -> str:
     settings = built.scenario.loop
     for times in _FASTER:
         faster = settings.model_copy(update={"dt": settings.dt / times})
-        again = build_scenario(built.scenario.model_copy(update={"loop": faster}), built.text)
+        try:
+            again = build_scenario(built.scenario.model_copy(update={"loop": faster}), built.text)
+        except BadInput:  # other times of the scenario may not be multiples of this one
+            continue
         if _in_fast_flow(again)[1] <= _HARMLESS:
             return f"{times / settings.dt:g} Hz is enough; a slower motion or a weaker current helps as well"
     return "A faster loop alone does not help: use other gains, a nearer nominal model, or a weaker current"
@@ -75,6 +78,13 @@ def _in_fast_flow(built: Built) -> tuple[float, float]:
 
     That is infinite where the loop has no equilibrium or no slopes, which the rate does not change.
     """
+    try:
+        return _growth(built)
+    except Exception:  # a user's part may run and yet not be differentiable, which `analyze` says
+        return np.nan, np.inf
+
+
+def _growth(built: Built) -> tuple[float, float]:
     settings = built.scenario.loop
     loop = dataclasses.replace(built.of_the_law().closed_loop, navigation=perfect())
     position = np.asarray(loop.reference.at(as_array(settings.duration / 2)).position)
@@ -83,8 +93,5 @@ def _in_fast_flow(built: Built) -> tuple[float, float]:
     around = disturbance_profile(loop, still, key_of_seed(built.scenario.seed), int(settings.duration / every), every)
     acting = around.operating_points(())[-1]
     assert acting.flow is not None
-    try:
-        radius = margins.certify(loop, settings.dt, position, [acting])[0]
-    except margins.NoSlopes:
-        radius = np.inf
+    radius = margins.certify(loop, settings.dt, position, [acting])[0]
     return float(np.linalg.norm(acting.flow)), float(np.log(radius) / settings.dt)
