@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import numpy as np
-from scipy.spatial.transform import Rotation
+from learning import errors_of
 
 from undertow.analysis.metrics import Metrics
 from undertow.core.runtime import double_outside_runs
@@ -105,7 +105,7 @@ def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int]) -> Err
     time = np.asarray(outcome.time)[0]
     late = time >= START
     position, target = (np.asarray(outcome.signals[name])[:, late] for name in ("position", "reference"))
-    distance, angle = errors_of(target, position)
+    distance, angle = errors_of(target, np.nan_to_num(position, nan=1e6, posinf=1e6, neginf=1e6))
     return Errors(
         np.sqrt((distance**2).mean(1)),
         np.sqrt((angle**2).mean(1)),
@@ -113,14 +113,6 @@ def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int]) -> Err
         state.variation / state.span,
         np.asarray(outcome.status) != 0,
     )
-
-
-def errors_of(target: np.ndarray, outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance, m, and angle of the rotation between two attitudes, rad; both of a vehicle's six outputs."""
-    finite = np.nan_to_num(outputs, nan=1e6, posinf=1e6, neginf=1e6)
-    there, here = (Rotation.from_euler("ZYX", one[..., :2:-1].reshape(-1, 3)) for one in (target, finite))
-    angle = (here.inv() * there).magnitude().reshape(target.shape[:-1])
-    return np.linalg.norm(target[..., :3] - finite[..., :3], axis=-1), angle
 
 
 def cases(options: Any, law: str, rate: int, task: str) -> tuple[list[tuple[str, str]], Errors]:

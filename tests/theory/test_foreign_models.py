@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.disturbance_profile import Conditions
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions
 from undertow.checks.flow_stability import flow_advice, munk_rate
 from undertow.core import runtime
 from undertow.core.contracts import AbstractController
@@ -66,7 +66,7 @@ def test_a_slow_loop_is_unstable_in_a_current_that_turns_its_vehicle():
     for rate in (20, 50):
         built = build(from_data(scenario("ng2024", "wu2018", rate)))
         load = np.array([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0])
-        points = [Conditions("", load, None), Conditions("", load, np.array([CURRENT, 0.0, 0.0]))]
+        points = [OperatingConditions("", load, None), OperatingConditions("", load, np.array([CURRENT, 0.0, 0.0]))]
         with runtime.in_precision("float64"):
             found[rate] = [margins.certify(built.closed_loop, 1 / rate, np.zeros(6), [one])[0] for one in points]
         attitude[rate] = float(execute(built).steady["attitude_rms"])

@@ -1,7 +1,7 @@
 """Preset `robust` on BlueROV2 Heavy in current and waves, with actuators, delays and noise that it does not know of.
 
 The KTH-like case (a first-order lag of nominally 0.1 s that is 0.03 to 0.3 s), a motor of 0.15 s taken for one of
-0.05 s, and what is not modelled at all: 20 ms of delay, and 1 cm/s of velocity noise.
+0.05 s, and what is not modelled at all: 20 and 40 ms of delay, and 1 cm/s of velocity noise.
 """
 
 import equinox as eqx
@@ -93,14 +93,16 @@ def test_a_lag_that_is_wrong_by_three_costs_little(make):
 
 # Noise by itself is that of test_noise_gain.
 @pytest.mark.parametrize(
-    "navigation", [Late(2), pytest.param(white_noise(0.0, 0.01), marks=pytest.mark.slow)], ids=["delay", "noise"]
+    ("navigation", "known"),
+    [(Late(2), 0.0), (Late(4), 0.02), pytest.param(white_noise(0.0, 0.01), 0.0, marks=pytest.mark.slow)],
+    ids=["delay", "longer delay", "noise"],
 )
-def test_delay_and_noise_on_independent_axes(navigation):
-    """20 ms of delay that no law knows of, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
+def test_delay_and_noise_on_independent_axes(navigation, known):
+    """20 ms of delay beyond what is known, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
 
     def error(make, navigation):
         plant = double_integrator(2)
-        law = make(plant.model(), sampling_time=DT)
+        law = make(plant.model(), sampling_time=DT, delay=known)
         loop = ClosedLoop(plant, law, setpoint([2.0, 1.0]), sinusoid([0.3, 0.5], [1.3, 0.7]), navigation)
         run = sampled.simulate(loop, duration=30.0, dt=DT, record_every=5, method="euler")
         assert int(run.status) == 0
@@ -113,8 +115,8 @@ def test_delay_and_noise_on_independent_axes(navigation):
 
 @pytest.mark.slow
 def test_delay_and_noise_that_nobody_tells_of():
-    """20 ms of delay that no law knows of, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
-    for navigation in (Late(2), white_noise(0.0, 0.01)):
+    """40 ms of delay that no law knows of, 1 cm/s of noise: `robust` keeps ahead of a PID of the same rule."""
+    for navigation in (Late(4), white_noise(0.0, 0.01)):
         own, _ = error(t200(), None, robust, navigation)
         other, _ = error(t200(), None, pid, navigation)
         exact, _ = error(t200(), None, robust)

@@ -8,7 +8,7 @@ import numpy as np
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
 from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
-from undertow.analysis.linearization.disturbance_profile import Conditions
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.theory import theory_of
@@ -109,7 +109,7 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     )
 
 
-def _point(known: OperatingPoint, acting: Conditions) -> Point:
+def _point(known: OperatingPoint, acting: OperatingConditions) -> Point:
     loop, settings = known.built.closed_loop, known.built.scenario.loop
     at = equilibrium(loop, settings.dt, known.mean.parts.target.position, acting.load, acting.flow)
     linear = margins.closed(at, settings.dt, settings.kind)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization import margins
-from undertow.analysis.linearization.disturbance_profile import Conditions, disturbance_profile
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions, disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
@@ -72,7 +72,7 @@ class Certifier:
             variants += [name] * len(found)
         return Certificate(tuple(radii), tuple(variants))
 
-    def _operating_points(self, plant: Any, key: Any, law: AbstractController) -> list[Conditions]:
+    def _operating_points(self, plant: Any, key: Any, law: AbstractController) -> list[OperatingConditions]:
         loop, dt = self._training_loop.with_parts(plant, law), self._training_loop.settings.dt
         at = equilibrium(loop, dt, self._position, np.zeros_like(self._position))
         around = disturbance_profile(loop, at, key, round(self._training_loop.duration / dt), dt)

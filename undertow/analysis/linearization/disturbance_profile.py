@@ -16,7 +16,7 @@ from undertow.numerics.linear_algebra import matvec
 _BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow
 
 
-class Conditions(NamedTuple):
+class OperatingConditions(NamedTuple):
     """What acts at one operating point."""
 
     where: str
@@ -40,7 +40,7 @@ class DisturbanceProfile(NamedTuple):
     noise: np.ndarray
     flow: np.ndarray | None
 
-    def operating_points(self, shares: tuple[float, ...]) -> list[Conditions]:
+    def operating_points(self, shares: tuple[float, ...]) -> list[OperatingConditions]:
         """Where the load is larger than given shares of all, and for a vehicle the flow faster than nine tenths of all.
 
         Sizes of loads are in units of each axis' rms.
@@ -50,10 +50,10 @@ class DisturbanceProfile(NamedTuple):
         order = np.argsort(size, kind="stable")
         rows = {f"{share:.0%} quantile of the load": order[round(share * (len(order) - 1))] for share in shares}
         if self.flow is None:
-            return [Conditions(where, self.load[row], None) for where, row in rows.items()]
+            return [OperatingConditions(where, self.load[row], None) for where, row in rows.items()]
         fastest_first = np.argsort(-np.linalg.norm(self.flow, axis=1), kind="stable")
         rows["fast flow"] = fastest_first[round(_BRIEF * (len(fastest_first) - 1))]
-        return [Conditions(where, self.load[row], self.flow[row]) for where, row in rows.items()]
+        return [OperatingConditions(where, self.load[row], self.flow[row]) for where, row in rows.items()]
 
 
 def disturbance_profile(

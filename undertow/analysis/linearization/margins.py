@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from undertow.analysis.linearization.disturbance_profile import Conditions
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop, close_continuous, close_sampled
 from undertow.analysis.linearization.minimal_realization import multipliers, visible
@@ -109,7 +109,7 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
     return small.signals[signal] @ inner + loop.direct[signal]["load"]
 
 
-def certify(loop: ClosedLoop, dt: float, position: Any, points: Iterable[Conditions]) -> list[float]:
+def certify(loop: ClosedLoop, dt: float, position: Any, points: Iterable[OperatingConditions]) -> list[float]:
     """Spectral radius of the closed loop at rest at each of some operating points; below 1 each is stable.
 
     Loads that no input holds are left out; where none is held, the radius is infinite.

@@ -251,7 +251,7 @@ def _slow_rate(n: Numbers) -> str:
         return ""
     return (
         f"Slow sampling of axes without a motor. At 100 Hz with exact velocities, Table 1 tracks to {paper:.2g} m for "
-        f"the 10 s of A8, on drifting weights; `robust` keeps a margin of three sampling times of delay, and tracks to "
+        f"the 10 s of A8, on drifting weights; `robust` keeps margins against 20 ms of unknown delay, and tracks to "
         f"{robust:.2g} m."
     )
 
