@@ -48,7 +48,7 @@ class DisturbanceProfile(NamedTuple):
         scale = np.sqrt((self.load**2).mean(axis=0))
         size = np.linalg.norm(self.load / np.where(scale > 0, scale, 1.0), axis=1)
         order = np.argsort(size, kind="stable")
-        rows = {f"{share:.0%} quantile of the load": order[round(share * (len(order) - 1))] for share in shares}
+        rows = {f"{100 * share:.0f} % quantile of the load": order[round(share * (len(order) - 1))] for share in shares}
         if self.flow is None:
             return [OperatingConditions(where, self.load[row], None) for where, row in rows.items()]
         fastest_first = np.argsort(-np.linalg.norm(self.flow, axis=1), kind="stable")
