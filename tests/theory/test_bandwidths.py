@@ -16,6 +16,7 @@ from undertow.controllers.pid import pid
 from undertow.controllers.presets.robust import robust
 from undertow.core.errors import BadInput
 from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.run import simulate_scenario
 from undertow.thrusters import first_order, t200
 from undertow.vehicles import bluerov2_heavy
 
@@ -167,6 +168,28 @@ def test_noise_and_delay_slow_a_law_and_limits_price_its_chattering():
     assert robust_bandwidths(base._replace(delay=0.1)).tracking < noise[0].tracking / 3
 
 
+def test_dead_zone_without_a_lag_slows_a_law():
+    axis = AXES[0]._replace(load_rate=bandwidths.LOAD_RATE)
+    ignoring, knowing = (robust_bandwidths(axis._replace(dead_zone=zone)) for zone in (0.0, 1.2 / 16))
+    assert knowing.tracking < ignoring.tracking / 5 and knowing.bandwidth < ignoring.bandwidth / 2
+    assert pid_frequency(axis._replace(dead_zone=1.2 / 16)) < pid_frequency(axis) / 4
+    lagged = axis._replace(lag=0.1)
+    assert robust_bandwidths(lagged._replace(dead_zone=1.2 / 16)) == robust_bandwidths(lagged)
+
+
+@pytest.mark.parametrize(
+    "thruster",
+    [
+        t200(fidelity="static", supply=16.0, dead_zone=1.2),
+        t200(fidelity="shaft", supply=16.0, dead_zone=1.2),
+        first_order(supply=16.0, dead_zone=1.2),
+    ],
+)
+def test_models_tell_the_dead_zone_of_their_actuators(thruster):
+    model = hybrid_vehicle(bluerov2_heavy(), thruster).model().in_body_axes()
+    assert float(model.actuators.dead_zone()) == pytest.approx(1.2 / 16)
+
+
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 def test_pid_keeps_the_same_margins(lag):
     axis = Axis(0.01, lag, 35.0, 0.0, 0.0, 1.0, 5.0)
@@ -227,3 +250,19 @@ def test_impossible_values_are_named(wrong):
     for make in (robust, pid):
         with pytest.raises(BadInput, match=next(iter(wrong))):
             make(double_integrator(1).model(), **wrong)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("law, variation, error", [("robust", 1.0, 0.005), ("pid", 4.0, 0.001)])
+def test_thrusters_without_lag_do_not_chatter_in_still_water(law, variation, error):
+    """1 N of net weight is less than the thrust at the edge of the dead zone: with gains for its sampling time alone, a
+    law would jump through the zone at 5 (`robust`) and 7 V/s (`pid`) for ever."""
+    metrics = simulate_scenario(
+        {
+            "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "fidelity": "static", "supply": 16}},
+            "controller": law,
+            "reference": {"kind": "setpoint", "position": [1, 0, 1, 0, 0, 0.5]},
+            "loop": {"duration": 20},
+        }
+    ).metrics["steady"]
+    assert metrics["input_variation"] < variation and metrics["position_rms"] < error

@@ -3,7 +3,8 @@
 One axis, x_ddot = f + d with f behind a first-order actuator, sampled, with noise on the measured velocity. A law is
 two transfer functions from position and velocity to its input. The rule tries a grid of bandwidths and takes the one
 of least cost E = rms(e) / 0.05 + (mean step of the input between sampling times, as a share of its limit) / 0.02 among
-those that keep every margin of `MARGINS`; where none keeps them all, the slowest.
+those that keep every margin of `MARGINS`; where none keeps them all, the slowest. Noise makes such steps, and the dead
+zone of an actuator without lag.
 Masses enter through the authority of the actuators only. Frequencies are those of the sampled loop; the actuator is
 assumed continuous. The rule assumes damping 1, and a tenth for the integral of a PID.
 """
@@ -68,6 +69,7 @@ class Axis(NamedTuple):
         velocity_noise: standard deviation at each sampling time, m/s or rad/s.
         load_rate: random walk of the loads, m/s^2 per sqrt(s) or rad/s^2 per sqrt(s).
         authority: largest acceleration of the actuators, m/s^2 or rad/s^2; infinite without a limit.
+        dead_zone: input below which the actuators give nothing, as a share of its limit.
     """
 
     sampling_time: float
@@ -77,6 +79,7 @@ class Axis(NamedTuple):
     velocity_noise: float
     load_rate: float
     authority: float
+    dead_zone: float = 0.0
 
     @property
     def unknown_delay(self) -> float:
@@ -127,12 +130,13 @@ def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, lo
     with jax.ensure_compile_time_eval():  # bandwidths are numbers even where a law is made inside a compiled function
         still = as_array(np.zeros(axes))
         lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))
+        dead_zone = float(model.actuators.dead_zone())
     lag, max_bandwidth, reached = None if lag is None else float(lag), float(max_bandwidth), np.asarray(forces)
     authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
     common = (float(sampling_time), lag, max_bandwidth, float(delay))
-    return [Axis(*common, *row) for row in rows]
+    return [Axis(*common, *row, dead_zone) for row in rows]
 
 
 @eqx.filter_jit
@@ -280,7 +284,20 @@ def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open
     by_noise = noise * rms(from_y.of_velocity * held * actuator * sensitivity / s**2)
     # Mean size of a normal step from one sampling time to the next: sqrt(2 / pi) of its standard deviation.
     step = np.sqrt(2 / np.pi) * noise * rms((1 - np.exp(-s * dt)) * from_y.of_velocity * sensitivity)
-    return np.hypot(by_load, by_noise) / _ERROR_SCALE + step / axis.authority / _STEP_SCALE
+    input_step = step / axis.authority + _jump_step(axis, frequency, open_loop)
+    return np.hypot(by_load, by_noise) / _ERROR_SCALE + input_step / _STEP_SCALE
+
+
+def _jump_step(axis: Axis, frequency: np.ndarray, open_loop: np.ndarray) -> np.ndarray:
+    """Mean step of the input by jumps through the dead zone, as a share of its limit.
+
+    A force below that of the zone's edge can be given on average only. Near rest the input jumps from one edge to the
+    other, twice in a period of the crossover frequency. A lag of the actuators smooths this, and is not priced.
+    """
+    if axis.lag:
+        return np.zeros(len(open_loop))
+    crossover = np.where(np.abs(open_loop) >= 1, frequency, 0.0).max(axis=-1)
+    return 2 * axis.dead_zone * crossover * axis.sampling_time / np.pi
 
 
 def _at(point: float, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -49,6 +49,10 @@ class AbstractActuatorModel(eqx.Module):
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State one sampling time later, with the input held."""
 
+    def dead_zone(self) -> Float[Array, ""]:
+        """Largest input without effect, as a share of the limit of the input."""
+        return jnp.zeros(())
+
     @abc.abstractmethod
     def quasi_static(self) -> "AbstractActuatorModel":
         """The same actuators without their dynamics: the force follows the input at once."""
@@ -139,6 +143,9 @@ class LaggedActuator(AbstractActuatorModel):
     def advance(self, state, u, dt):
         """Exact for an input that is held."""
         return state + (self.curve.force((), u) - state) * -jnp.expm1(-dt / self.tau)
+
+    def dead_zone(self):
+        return self.curve.dead_zone()
 
     def quasi_static(self) -> AbstractActuatorModel:
         return self.curve

@@ -180,6 +180,10 @@ class CompositeActuators(AbstractActuatorModel):
     def advance(self, state, u, dt) -> tuple[Any, ...]:
         return tuple(part.advance(own, given, dt) for part, own, given in self._each(state, u))
 
+    def dead_zone(self):
+        """That of the subsystem with the largest."""
+        return jnp.stack([part.dead_zone() for part in self.parts]).max()
+
     def quasi_static(self) -> "CompositeActuators":
         return CompositeActuators(tuple(part.quasi_static() for part in self.parts), self.inputs)
 

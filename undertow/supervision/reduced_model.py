@@ -81,6 +81,9 @@ class ReducedActuators(AbstractActuatorModel):
     def advance(self, state, u, dt):
         return self.whole.advance(state, u, dt)
 
+    def dead_zone(self):
+        return self.whole.dead_zone()
+
     def quasi_static(self):
         return ReducedActuators(self.whole.quasi_static(), self.used)
 

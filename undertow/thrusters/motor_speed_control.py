@@ -93,6 +93,9 @@ class SpeedControlledMotor(AbstractActuatorModel):
         speed = rk4(turning, jnp.zeros(()), state.speed, dt)
         return MotorState(speed, settled + (state.current - settled) * jnp.exp(-fading))
 
+    def dead_zone(self):
+        return self.quasi_static().dead_zone()
+
     def quasi_static(self) -> QuasiStaticActuator:
         names = ("motor", "supply", "dead_zone", "dead_zone_kind")
         return QuasiStaticActuator(StaticThruster(**{name: getattr(self.thruster, name) for name in names}))

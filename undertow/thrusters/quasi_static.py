@@ -53,3 +53,6 @@ class QuasiStaticActuator(AbstractMemorylessActuator):
 
     def command(self, state, force, rate) -> PerThruster:
         return self.thruster.voltage_for(force)
+
+    def dead_zone(self):
+        return jnp.max(self.thruster.dead_zone / self.thruster.supply)
