@@ -114,7 +114,8 @@ def test_a_trial_unlike_all_probes(campaign):
 def test_a_run_that_fails_costs_no_other(campaign, backend):
     """Gains that are far too fast for the sampling time diverge; their neighbours do not notice."""
     unlimited = lambda *frequencies: campaign(
-        cross={"plant.limit": [1e30], "controller.frequency": list(frequencies)}, trials=4
+        cross={"plant": [{"kind": "double_integrator", "limit": 1e30}], "controller.frequency": list(frequencies)},
+        trials=4,
     )
     tame, wild = unlimited(2.0, 3.0), unlimited(2.0, 500.0)
     good, bad = columns(tame, range(8)), columns(wild, range(8))

@@ -15,7 +15,7 @@ from undertow.cli.main import run
 
 pytestmark = pytest.mark.full
 
-CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant.limit": [1e30]}
+CROSS = {"controller.frequency": {"calm": 2.0, "wild": 500.0}, "plant": [{"kind": "double_integrator", "limit": 1e30}]}
 
 
 def test_what_it_leaves(campaign_file, whole_figures, tmp_path, capsys):

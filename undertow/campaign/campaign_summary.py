@@ -114,6 +114,7 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
         "trials": results.total,
         "done": results.rows.sizes["trial"],
         "status": endings(results.rows),
+        "nominal_model": several.nominal_model(),
         "by_xla": int((results.rows["backend"].values == XLA).sum()),
         "invalid": [one._asdict() for one in reasons(several, invalid)],  # pyright: ignore[reportArgumentType] - an array serves as rows
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],

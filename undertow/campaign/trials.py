@@ -1,9 +1,7 @@
 """Trials of a campaign by number: each is a scenario that `undertow simulate` could run."""
 
-import copy
 import itertools
 from collections.abc import Iterator
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,9 +10,9 @@ from jaxtyping import Int, UInt32
 from undertow.campaign.campaign_schema import VARIANT, Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.sampling import Samples, quantiles
-from undertow.core.errors import BadInput, nearest, within
-from undertow.scenario.reading import Text, key_path, read
-from undertow.scenario.schema import Scenario
+from undertow.campaign.varied_scenario import nominal_model_sentence, varied_scenario
+from undertow.core.errors import BadInput, within
+from undertow.scenario.reading import Text, read
 
 # Trials of each combination that are built first, to find errors and the numbers that differ.
 _PROBES = 4
@@ -36,9 +34,8 @@ class Trials(NamedTuple):
 
     def values(self, trial: int) -> dict[str, Any]:
         """Values that this trial sets in the scenario, by key path."""
-        swept = dict(zip(self.campaign.axes, self.combinations[trial % len(self.combinations)], strict=True))
-        swept |= swept.pop(VARIANT, {}) if self.campaign.variants else {}
-        return swept | {key: column[0] for key, column in self.sampled(np.array([trial])).items()}
+        swept, variant = self._combination(trial)
+        return swept | variant | {key: column[0] for key, column in self.sampled(np.array([trial])).items()}
 
     def sampled(self, trials: Int[np.ndarray, " n"]) -> dict[str, list[Any]]:
         """Sampled values of several trials, by key path."""
@@ -64,18 +61,25 @@ class Trials(NamedTuple):
 
     def data(self, trial: int) -> dict[str, Any]:
         """The scenario of this trial."""
-        data = copy.deepcopy(self.scenario.data)
-        for key, put in self.values(trial).items():
-            put_value(data, key, copy.deepcopy(put))
-        return data | {"seed": self.seed(trial)}
+        _, variant = self._combination(trial)  # a scenario of its own, which the controller knows
+        return varied_scenario(self.scenario.data, self.values(trial), variant) | {"seed": self.seed(trial)}
 
     def alternatives(self) -> Iterator[dict[str, Any]]:
         """The scenario of the first trial with each entry of every choice that is not numeric."""
         for key, entries in varied_keys(self.campaign):
             for entry in (entries or {}).values():
-                data = self.data(0)
-                put_value(data, key, copy.deepcopy(entry))
-                yield data
+                yield varied_scenario(self.data(0), {key: entry})
+
+    def nominal_model(self) -> str:
+        """Sentence on what the controller knows of a plant that varies; empty where it does not."""
+        _, variant = self._combination(0)
+        return nominal_model_sentence(self.scenario.data, self.values(0), variant)
+
+    def _combination(self, trial: int) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Values of `cross` and of the variant, by key path."""
+        swept = dict(zip(self.campaign.axes, self.combinations[trial % len(self.combinations)], strict=True))
+        variant = swept.pop(VARIANT, {}) if self.campaign.variants else {}
+        return swept, variant
 
     def location(self, name: str) -> str:
         """Line that sets a key of the scenario: of the campaign file, or of the scenario's own."""
@@ -118,56 +122,3 @@ def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
         return found
     lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
     return Text(given, text.name, text.folder, lines)
-
-
-def put_value(data: dict[str, Any], key: str, put: Any) -> None:
-    """Set the value at a key path; a part given by its name alone becomes a mapping."""
-    path = key_path(key)
-    node: Any = data
-    for step, following in itertools.pairwise(path):
-        inner = _entry(node, step, key)
-        if isinstance(inner, str):
-            inner = {"kind": inner}
-        elif inner is None and isinstance(following, int):
-            elsewhere = _elsewhere(str(step), data) if node is data else ""
-            hint = nearest(str(step), node) or elsewhere or f"Give `{step}` there, with all its entries"
-            raise BadInput(key, f"name an entry of a list of the scenario, which has no `{step}` there", hint=hint)
-        elif inner is None:
-            inner = {}
-        node[step] = inner
-        node = inner
-    _entry(node, path[-1], key)
-    node[path[-1]] = put
-
-
-def _elsewhere(word: str, data: dict[str, Any]) -> str:
-    """Sentence that names the list whose key is nearest to a word that is no key at the top of a scenario."""
-    if word in Scenario.model_fields:
-        return ""
-    paths = {path.rpartition(".")[2]: path for path in _lists(data, "")}
-    near = get_close_matches(word, list(paths), n=1)
-    return f"Did you mean `{paths[near[0]]}`?" if near else ""
-
-
-def _lists(node: Any, path: str) -> Iterator[str]:
-    """Key paths of all lists below a node."""
-    pairs = node.items() if isinstance(node, dict) else ()
-    if isinstance(node, list):
-        pairs = ((i, one) for i, one in enumerate(node) if isinstance(one, dict))
-    for step, one in pairs:
-        inner = f"{path}[{step}]" if isinstance(step, int) else f"{path}.{step}".lstrip(".")
-        if isinstance(one, list):
-            yield inner
-        yield from _lists(one, inner)
-
-
-def _entry(node: Any, step: str | int, key: str) -> Any:
-    if isinstance(node, list):
-        if isinstance(step, int) and 0 <= step < len(node):
-            return node[step]
-        raise BadInput(key, f"name one of the {len(node)} entries, 0 to {len(node) - 1}", f"[{step}]")
-    if not isinstance(node, dict):
-        raise BadInput(key, "lead to a key of the scenario", f"past {node!r}")
-    if isinstance(step, int):
-        raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
-    return node.get(step)

@@ -141,7 +141,7 @@ def sentences(found: dict) -> list[str]:
     """The numbers of trials by status, and the verdict on each requirement."""
     ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
     text = [f"{found['done']} trials: {ended}."]
-    text += [sentence for sentence in (by_xla(found),) if sentence]
+    text += [sentence for sentence in (found["nominal_model"], by_xla(found)) if sentence]
     text += [f"Invalid trials ({one['trials']} with this error): {one['why']}." for one in found["invalid"]]
     for one in found["combinations"]:
         of = "".join(f", {key} {value}" for key, value in one["values"].items())

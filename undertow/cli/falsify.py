@@ -113,16 +113,18 @@ def _table(found: Falsified) -> Table:
 
 def _sentences(found: Falsified, folder: Path) -> list[str]:
     runs, objective = found.objective.runs, found.objective
+    known = [sentence for sentence in (found.nominal_model(),) if sentence]
     how = "by differentiation" if found.differentiated else "by differences"
     ended = "the search converged" if found.finished else "the budget is used up"
     if found.violation is None:
         least = min(objective.robustnesses)
         none = f"No violation in {runs} runs within the bounds; least robustness {least:.4g}. This proves nothing"
-        return [f"{none}: {ended}, gradients {how}.", f"Results: {folder}"]
+        return [f"{none}: {ended}, gradients {how}.", *known, f"Results: {folder}"]
     alone = "repeats" if found.repeated() else "does not repeat"
     return [
         f"The counter-example {_violated(found)}. Its departure is {found.violation.size:.4g} of the bounds (norm). "
         f"{runs} runs: {ended}, gradients {how}.",
+        *known,
         f"A single run {alone} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
         f"Results: {folder}",
     ]

@@ -89,7 +89,8 @@ def read_comparison(folder: Path, results: "Results", ready: "PreparedComparison
     own = [name for name in results.metrics if name not in MEANINGS]
     metrics = [name for name in (*_COMPARED, *own) if name in results.metrics]
     tuning = {name: note.sentence for name, note in zip(ready.names, ready.notes, strict=True)}
-    return Comparison(dataset, find(dataset, ready.dimension, metrics, tuning, ready.differing))
+    findings = find(dataset, ready.dimension, metrics, tuning, ready.differing)
+    return Comparison(dataset, findings._replace(nominal_model=ready.prepared.trials.nominal_model()))
 
 
 def compare(

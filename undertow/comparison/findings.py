@@ -51,6 +51,7 @@ class Findings(NamedTuple):
         tuning: candidate -> how its gains came about.
         differing: of scenarios that are compared as a whole: key -> the value in each.
         fronts: Pareto fronts of medians of an error against medians of an effort.
+        nominal_model: sentence on what controllers know of a plant that varies; empty where it does not.
     """
 
     dimension: str
@@ -67,6 +68,7 @@ class Findings(NamedTuple):
     tuning: dict[str, str]
     differing: dict[str, list[str]]
     fronts: tuple[Front, ...]
+    nominal_model: str = ""
 
     def completed(self, name: str) -> int:
         """Number of completed trials of a candidate."""

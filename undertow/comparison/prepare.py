@@ -145,7 +145,7 @@ def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: 
         found = controllers(entries, base, path)
         if tuner is not None:
             found, budgets = tuner(found, base)
-            text, found = held_out(text, base, found, budgets)
+            text = held_out(text, base, budgets)
     if "scenario" not in text.data:
         lines = {("scenario", *place): line for place, line in text.lines.items()}
         text = text._replace(data={"scenario": text.data}, lines=lines)

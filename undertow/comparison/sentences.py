@@ -16,10 +16,11 @@ HOW = (
 
 
 def sentences(found: Findings) -> list[str]:
-    """Sentences on failures, one for every two candidates, then the Pareto fronts."""
+    """Sentences on the nominal model and on failures, one for every two candidates, then the Pareto fronts."""
     failures = [sentence for name in found.names if (sentence := failed(found, name))]
     alone = [_alone(one) for one in found.completions if one.only_candidate or one.only_baseline]
-    return [*failures, *alone, *(_between(found, *pair) for pair in found.pairs()), *map(_front, found.fronts)]
+    known = [found.nominal_model] if found.nominal_model else []
+    return [*known, *failures, *alone, *(_between(found, *pair) for pair in found.pairs()), *map(_front, found.fronts)]
 
 
 def failed(found: Findings, name: str) -> str:

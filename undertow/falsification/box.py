@@ -1,13 +1,12 @@
 """The box of what varies: coordinates of a departure from the nominal scenario, relative to the stated bounds."""
 
-import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from undertow.campaign.trials import put_value
+from undertow.campaign.varied_scenario import varied_scenario
 from undertow.core.errors import BadInput
 from undertow.scenario.build import Built
 from undertow.scenario.reading import Text, key_path
@@ -135,12 +134,9 @@ def _number_at(node: Any, path: Sequence[str | int]) -> float | None:
 
 
 def scenario_at(text: Text, values: Mapping[str, Any]) -> Text:
-    """The scenario with other numbers at some key paths.
+    """The scenario with other numbers at some key paths; the nominal model keeps those of the scenario.
 
     Raises:
         BadInput: a key path leads to nothing of the scenario.
     """
-    data = copy.deepcopy(text.data)
-    for key, value in values.items():
-        put_value(data, key, value)
-    return text._replace(data=data)
+    return text._replace(data=varied_scenario(text.data, values))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
+from undertow.campaign.varied_scenario import nominal_model_sentence
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.falsification.box import Box, box_of, scenario_at
@@ -71,6 +72,10 @@ class Falsified(NamedTuple):
     def values(self) -> dict[str, float | int]:
         """Numbers of the counter-example by key path; {} without one."""
         return self.box.values(self.violation.departure) if self.violation is not None else {}
+
+    def nominal_model(self) -> str:
+        """Sentence on what the controller knows of a plant that varies; empty where it does not."""
+        return nominal_model_sentence(self.evaluator.text.data, {axis.key: axis.nominal for axis in self.box.axes})
 
     def repeated(self) -> bool:
         """Whether the run of the counter-example by itself has the same robustness, bit for bit."""

@@ -176,5 +176,5 @@ def _check_vehicle(built: Built) -> None:
     with within(location=built.text.location):
         if not isinstance(built.closed_loop.plant, HybridVehicle):
             raise BadInput("plant", "be a vehicle with thrusters for a link by UDP", built.scenario.plant.kind)
-        if built.scenario.model.get("speed_sensor"):
+        if built.scenario.model.options.get("speed_sensor"):
             raise BadInput("model.speed_sensor", "be false: datagrams hold no speeds of propellers", "true")

@@ -60,6 +60,7 @@ def write_campaign(
         title,
         tag("h1", prose(title)),
         tag("p", f"{found['done']} of {found['trials']} trials", class_="lead"),
+        *([tag("p", prose(found["nominal_model"]))] if found["nominal_model"] else []),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("status", "Status of the trials", *_endings(found)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, found)),

@@ -207,9 +207,16 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         return made
 
     plant = make("plant")
-    known = lambda: factory.call(plant.model, scenario.model, folder=text.folder)
+    nominal, described = plant, {}
+    if scenario.model.plant is not None:
+        nominal, described["plant"] = one("plant", "model.plant", scenario.model.plant)
+    if scenario.model.follow:
+        described["follow"] = True
+    options = scenario.model.options
+    known = lambda: factory.call(nominal.model, options, folder=text.folder)
     with within("model"):
-        model, resolved["model"] = part_cache.part("model", scenario.model, (plant,), known)
+        model, of_model = part_cache.part("model", options, (nominal,), known)
+    resolved["model"] = of_model | described
     navigation = make("navigation")
     noise = velocity_noise_of(navigation, scenario.loop.dt)
     check_noise(navigation, noise, plant, own_parts(scenario, text.folder))

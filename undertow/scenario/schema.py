@@ -254,6 +254,25 @@ class Falsify(Strict):
     )
 
 
+class NominalModel(BaseModel):
+    """What the controller knows of the plant. Further keys are options of the plant's own method `model`."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    plant: Annotated[Part, _named("hybrid_vehicle")] | None = Field(
+        None, description="the plant of which the nominal model is made; default: the plant that is simulated"
+    )
+    follow: bool = Field(
+        False,
+        description="whether the nominal model has the numbers of the plant in each trial of a study that varies them; "
+        "default: those of the scenario",
+    )
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of the plant's method `model`."""
+        return dict(self.model_extra or {})
+
+
 class Scenario(Strict):
     """One closed loop."""
 
@@ -262,8 +281,9 @@ class Scenario(Strict):
         Part(kind="hybrid_vehicle"),
         description="the system that is controlled: for a vehicle with the options vehicle and thruster",
     )
-    model: dict[str, Any] = Field(
-        default_factory=dict, description="options of the nominal model, which the controller uses; default: the plant"
+    model: NominalModel = Field(
+        default_factory=NominalModel,  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
+        description="options of the nominal model, which the controller uses; default: the plant",
     )
     controller: Annotated[Part, BeforeValidator(_law)] = Field(
         Part.model_validate({"kind": "rcaf", "preset": "robust"}), description="the control law"

@@ -138,7 +138,7 @@ class Episodes:
         self._precision = built.scenario.precision
         self.dtype = np.dtype(self._precision)
         with runtime.on_processor(), runtime.in_precision(self._precision):
-            model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model, folder=text.folder)
+            model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model.options, folder=text.folder)
             self.interface = policy_interface_of(model, action, scale)
             plan = Plan(self.interface, weights, settings.dt, settings.method, settings.substeps)
             found, constant = variants_of(built, vary or {}, variants)

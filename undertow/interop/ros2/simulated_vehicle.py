@@ -151,5 +151,5 @@ def check_vehicle(built: Built) -> None:
             raise BadInput("plant", "be a vehicle with thrusters", built.scenario.plant.kind)
         if built.scenario.loop.kind != "sampled":
             raise BadInput("loop.kind", "be sampled", built.scenario.loop.kind)
-        if built.scenario.model.get("speed_sensor"):
+        if built.scenario.model.options.get("speed_sensor"):
             raise BadInput("model.speed_sensor", "be false: there is no message for the speeds of propellers", "true")
