@@ -6,6 +6,7 @@ import pytest
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.trials import trials
 from undertow.campaign.varied_scenario import nominal_model_sentence, varied_scenario
+from undertow.core.errors import BadInput
 from undertow.falsification.box import scenario_at
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -84,3 +85,12 @@ def test_falsification_does_not_tell_the_controller():
 def test_a_trial_is_repeated_from_its_resolved_scenario():
     built = build(from_data(campaign_of({}, vary=SPREAD).data(1)))
     assert masses(build(from_data(built.resolved))) == masses(built)
+
+
+def test_another_number_of_inputs_is_refused_with_the_remedy():
+    data = {
+        "plant": {"kind": "double_integrator", "axes": 1},
+        "reference": {"kind": "setpoint", "position": [0.0, 0.0]},
+    }
+    with pytest.raises(BadInput, match=r"2 outputs and 2 inputs.*follow: true"):
+        build(from_data(varied_scenario(data, {"plant.axes": 2})))

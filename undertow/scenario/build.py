@@ -31,7 +31,15 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
-from undertow.scenario.consistency import check_fit, check_noise, check_start, check_times, check_window, rounded_times
+from undertow.scenario.consistency import (
+    check_fit,
+    check_noise,
+    check_nominal_plant,
+    check_start,
+    check_times,
+    check_window,
+    rounded_times,
+)
 from undertow.scenario.faulted import faulted, without_faults
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
@@ -210,6 +218,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     nominal, described = plant, {}
     if scenario.model.plant is not None:
         nominal, described["plant"] = one("plant", "model.plant", scenario.model.plant)
+        check_nominal_plant(nominal, plant)
     if scenario.model.follow:
         described["follow"] = True
     options = scenario.model.options

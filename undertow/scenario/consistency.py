@@ -129,6 +129,18 @@ def check_noise(navigation: AbstractNavigation, noise: ArrayLike, plant: Abstrac
         checks.per_axis("velocity_noise", noise, axes)
 
 
+def check_nominal_plant(nominal: AbstractPlant, plant: AbstractPlant) -> None:
+    """Check that a plant of which the nominal model is made has the outputs and inputs of the one that is simulated.
+
+    Raises:
+        BadInput: it has others.
+    """
+    size = lambda one: f"{len(one.outputs)} outputs and {one.inputs()} inputs"
+    if size(nominal) != size(plant):
+        hint = "Write `model: {follow: true}` where a study varies them"
+        raise BadInput("model.plant", f"have {size(plant)}, as the simulated plant has", size(nominal), hint=hint)
+
+
 def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -> None:
     """Check that the parts agree on the number of outputs and can take a step together.
 
