@@ -5,7 +5,10 @@ import pytest
 from other_programs import ardupilot_bin, json_mcap, px4_ulg, ros2_bag
 from scipy.spatial.transform import Rotation
 
+from undertow.core.errors import BadInput
+from undertow.logs.log import Log
 from undertow.logs.mapping import mapping_of
+from undertow.logs.motion import inputs_of, motion_of
 from undertow.logs.read import read_log
 
 ROWS = 40
@@ -128,6 +131,30 @@ def test_ardupilot(tmp_path, core):
     np.testing.assert_array_equal(log["pulses"].values[:, :8], PULSES)
     units = {name: series.unit for name, series in log.signals.items()}
     assert units["attitude"] == "rad" and units["angular_velocity"] == "rad/s" and units["pulses"] == "us"
+
+
+def test_a_signal_that_is_missing_is_mapped(tmp_path):
+    """The error lists what the log has and shows the entry of a mapping, which then gives the signal."""
+    log = read_log(bin_file(tmp_path / "dive.bin"))
+    with pytest.raises(BadInput) as refused:
+        inputs_of(log, ("input", "commanded_input"))
+    assert str(refused.value) == (
+        "`log` must have the signal `input` or `commanded_input`, but is dive.bin, which has position, velocity, "
+        "attitude, angular_velocity, specific_force, depth, pulses. Add it to the mapping with which the file is read, "
+        "or was converted, by the file's own columns: `signals: {input: {topic: RCOU, columns: [C1, C2, ...], unit: "
+        "us, supply: 16}}`, one column per thruster; `supply` is in V"
+    )
+    entry = {"topic": "RCOU", "columns": ["C1", "C2"], "unit": "us", "supply": 16}
+    mapped = read_log(tmp_path / "dive.bin", mapping_of({"signals": {"input": entry}}))
+    offset = PULSES[:, :2] - 1500
+    close(inputs_of(mapped), np.where(abs(offset) > 25, offset / 25, 0.0), 1e-12)
+    kept = {name: series for name, series in log.signals.items() if name in ("position", "attitude", "velocity")}
+    with pytest.raises(
+        BadInput, match=r"which has position, velocity, attitude\. Add it.*: `signals: \{angular_velocity:"
+    ):
+        motion_of(Log(kept, "dive.csv", "CSV"))
+    with pytest.raises(BadInput, match=r"Did you mean `attitude`\?"):
+        log["atitude"]
 
 
 def test_ardupilot_as_pymavlink_reads_it(tmp_path):

@@ -169,7 +169,7 @@ def test_logs_that_cannot_be_scored(run):
     [
         ({"file": "missing.mcap"}, r"`controller.file` must be an existing file"),
         ({"file": "six.csv"}, r"`controller.commands` must have 8 inputs, as many as the vehicle has thrusters, but is those of 6"),
-        ({"file": "pulses.csv"}, r"`controller.file` must have the signal `commanded_input` or `input`.* map them to `input`"),
+        ({"file": "pulses.csv"}, r"`controller.file` must have the signal `commanded_input` or `input`.*: `signals: {input: {columns: \[pwm1, pwm2, ...\], unit: us, supply: 16}}`"),
         ({"file": "own.csv"}, r"`controller.mapping` must be given, but is own.csv"),
         ({"file": "own.csv", "mapping": {"time": "t", "signals": {"input": {"columns": "z"}}}}, r"`controller.mapping.signals.input.columns` must be in own.csv, but is z"),
         ({"file": "own.csv", "mapping": "m.yaml"}, r"`controller.mapping.signals.input.unit` must be one of V, mV, N, us, 1, % for `input`, but is rad \(m.yaml, line 2\)"),

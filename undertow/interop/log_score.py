@@ -97,7 +97,8 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
         raise BadInput("log", "have attitudes and velocities that are finite", f"{log.source}, where one never is")
     if inputs.values.shape[1] != plant.inputs():
         must = f"have {plant.inputs()} inputs, as many as the vehicle has thrusters"
-        raise BadInput("log", must, f"{log.source} with {inputs.values.shape[1]}", hint="Is it of another vehicle?")
+        hint = "Map one column per thruster to `input`, or take the vehicle of the log"
+        raise BadInput("log", must, f"{log.source} with {inputs.values.shape[1]}", hint=hint)
     stride = max(1, round(_CURVE / loop.dt))
     spacing = loop.dt * stride
     if min(horizons) < spacing * (1 - _ROUNDING):

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, nearest
+from undertow.logs.known_signals import SIGNALS
 
 # Median intervals from which on the time between two samples is a gap.
 _GAP = 5.0
@@ -157,10 +158,32 @@ class Log:
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
-def missing(log: Log, name: str) -> BadInput:
-    """The error for a log that lacks a signal."""
-    hint = did_you_mean(name, log.signals) if log.signals else "It has none: give a mapping"
-    return BadInput("log", f"have the signal `{name}`", f"{log.source}, which has not", hint=hint)
+def missing(log: Log, *names: str, hint: str = "") -> BadInput:
+    """The error for a log that lacks a signal, which may have any of these names.
+
+    Args:
+        log: without the signal.
+        names: of the signal, the usual one first.
+        hint: the remedy; "" for the one that follows from the usual name.
+    """
+    must = f"have the signal {' or '.join(f'`{name}`' for name in names)}"
+    got = f"{log.source}, which has {', '.join(log.signals) or 'none'}"
+    return BadInput("log", must, got, hint=hint or _how_to_add(log, names[0]))
+
+
+def _how_to_add(log: Log, name: str) -> str:
+    """How a log comes to have a signal: by a mapping, unless undertow wrote it, or the name means nothing."""
+    if name not in SIGNALS or log.format == "undertow":
+        return nearest(name, log.signals)
+    known = SIGNALS[name]
+    return mapping_hint(log, name, ", ".join(known.columns) or name, f"unit: {known.unit}")
+
+
+def mapping_hint(log: Log, name: str, columns: str, how: str, topic: str = "TOPIC") -> str:
+    """Sentence with a mapping that gives a log a signal, from columns of the file; a CSV file has no topics."""
+    where = "" if log.format == "CSV" else f"topic: {topic}, "
+    entry = f"`signals: {{{name}: {{{where}columns: [{columns}], {how}}}}}`"
+    return f"Add it to the mapping with which the file is read, or was converted, by the file's own columns: {entry}"
 
 
 def check_times(name: str, time: np.ndarray, source: str) -> None:

@@ -6,9 +6,11 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.logs import frames
-from undertow.logs.log import Log, Series
+from undertow.logs.default_mappings import DEFAULTS
+from undertow.logs.log import Log, Series, mapping_hint, missing
 
 _INPUTS = ("commanded_input", "input")
+_COMMANDS = {"pulses": "us", "duty": "1"}  # to speed controllers, and the unit that makes an input of them
 
 
 class LoggedMotion(NamedTuple):
@@ -33,14 +35,21 @@ def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS) -> Series:
     """
     found = next((log[name] for name in names if name in log), None)
     if found is None:
-        hint = ""
-        if "pulses" in log or "duty" in log:
-            hint = "It has commands to the speed controllers: map them to `input`, with their unit and the `supply`"
-        raise BadInput("log", f"have the signal `{names[0]}` or `{names[-1]}`", f"{log.source}, without", hint=hint)
+        raise missing(log, *names, hint=_input_hint(log))
     good = np.isfinite(found.values).all(axis=1)
     if good.sum() < 2:
         raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(good.sum())}")
     return found._replace(time=found.time[good], values=found.values[good])
+
+
+def _input_hint(log: Log) -> str:
+    """How to map an input: from the commands to speed controllers that the log has, or else from pulses by example."""
+    commands = next((name for name in _COMMANDS if name in log), "pulses")
+    usual = DEFAULTS[log.format].signals.get(commands) if log.format in DEFAULTS else None
+    columns, topic = (usual[0].columns, usual[0].topic) if usual else (("pwm1", "pwm2"), "TOPIC")
+    how = f"unit: {_COMMANDS[commands]}, supply: 16"
+    example = mapping_hint(log, "input", f"{columns[0]}, {columns[1]}, ...", how, topic)
+    return f"{example}, one column per thruster; `supply` is in V"
 
 
 def motion_of(log: Log) -> LoggedMotion:
