@@ -5,7 +5,7 @@ import importlib
 import numpy as np
 import pytest
 
-from undertow.checks.vehicle_lint import derived, facts_of, lint
+from undertow.checks.vehicle_lint import derived, facts_of, lint, mass
 from undertow.core import catalogue
 
 # Hull -> what is said about it, with the number that causes it; about layouts, below.
@@ -49,6 +49,29 @@ def test_published_vehicle(name, hull, vehicle):
     assert all(finding.level == "advice" for finding in findings)
     for finding in findings:
         assert expected[finding.rule] in finding.sentence()
+
+
+# Length, width and height of the hulls, m, rounded; they only matter where moments of inertia differ clearly.
+SIZES = {
+    "bluerov2": (0.457, 0.338, 0.254),
+    "bluerov2_heavy": (0.457, 0.575, 0.254),
+    "lauv": (1.8, 0.15, 0.15),
+    "npsauv2": (5.3, 1.0, 0.6),
+    "odin": (0.63, 0.63, 0.63),
+    "remus100": (1.33, 0.19, 0.19),
+    "rexrov": (2.6, 1.5, 1.6),
+}
+
+
+def test_no_published_vehicle_has_its_axes_exchanged():
+    """With its size, too, which the parts do not hold; the same with roll and yaw exchanged is found where they differ."""
+    exchanged = set()
+    for name, hull, vehicle in VARIANTS:
+        facts = facts_of(vehicle)._replace(size=np.array(SIZES[name]))
+        assert not any(mass.axes(facts)), (name, hull)
+        if any(mass.axes(facts._replace(inertia=facts.inertia[::-1, ::-1]))):
+            exchanged.add(name)
+    assert exchanged == {"bluerov2", "bluerov2_heavy", "rexrov"}
 
 
 def test_facts_have_the_vehicles_own_matrices():

@@ -58,6 +58,22 @@ SPOILT = {
     "negative inertia": ({"inertia": np.diag([-0.46, 0.23, 0.37])}, {"TRIANGLE"}, "principal inertia -0.46"),
     "inertia not symmetric": ({"inertia": coupled(SOUND.inertia, 0, 1, 0.01)}, {"SYMMETRY"}, "off by 0.01"),
     "inertia of a point": ({"inertia": SOUND.inertia / 40}, {"gyration"}, "Is the mass in grams?"),
+    "roll and yaw exchanged": (
+        {"inertia": SOUND.inertia[::-1, ::-1]},
+        {"axes"},
+        "`inertia` should be smaller in roll than in yaw, but is 0.37 against 0.26 kg m^2",
+    ),
+    "axes of a long box": (
+        {
+            "size": np.array([0.9, 0.5, 0.4]),
+            "mass": 20.0,
+            "weight": 196.4,
+            "buoyancy": 197.0,
+            "inertia": np.diag([0.98, 0.6, 0.85]),
+        },
+        None,
+        "In a uniform box of 0.9 x 0.5 x 0.4 m (`size`) it is 0.39 times as large",
+    ),
     "added mass in g": (
         {"added_mass": 1e3 * SOUND.added_mass},
         {"added_mass_size"},

@@ -11,8 +11,11 @@ from undertow.vehicles.facts import Facts
 _AXES = BODY_AXES[3:]
 # A uniform box has a radius of gyration of 0.58 of one with all its mass in the corners.
 _USUAL = (0.25, 0.8)
+_ORDER = "Are the axes forward, starboard, down, as `size` is length, width, height?"
 # Without a size: of the longest thruster arm or the cube root of the volume, whichever is larger.
 _USUAL_OF_SCALE = (0.05, 0.9)
+# Of two moments of a uniform box; where they are nearer to each other, equipment decides which one is larger.
+_CLEARLY_SMALLER = 0.8
 # Units in which an inertia may be given by mistake, per kg m^2.
 _UNITS = {1e3: "g m^2", 1e4: "kg cm^2", 1e6: "kg mm^2", 1e7: "g cm^2", 1e9: "g mm^2"}
 
@@ -57,8 +60,7 @@ def gyration(facts: Facts) -> Iterator[Finding]:
     if facts.size is None:
         limits, usual, basis = np.full(3, facts.scale), _USUAL_OF_SCALE, "Thruster arms and volume make the vehicle"
     else:
-        around = [facts.size[[1, 2]], facts.size[[0, 2]], facts.size[[0, 1]]]
-        limits = np.array([np.hypot(*sides) / 2 for sides in around])
+        limits = _corner_radii(facts.size)
         usual, basis = _USUAL, "All its mass in the corners of the hull would give"
     ratios = radii / limits
     i = int(np.argmax(np.maximum(ratios / usual[1], usual[0] / np.maximum(ratios, 1e-12))))
@@ -77,6 +79,29 @@ def gyration(facts: Facts) -> Iterator[Finding]:
         yield advice("gyration", "inertia", should, got, f"{because}. Is the mass in grams?")
 
 
+def _corner_radii(size: np.ndarray) -> np.ndarray:
+    """Radii of gyration of a hull with all its mass in the corners, m; those of a uniform box are 0.58 of them."""
+    return np.array([np.hypot(*np.delete(size, axis)) / 2 for axis in range(3)])
+
+
+def axes(facts: Facts) -> Iterator[Finding]:
+    """The moments of inertia must be in the order of those of a box of this size. Finds axes that are exchanged.
+
+    Nothing is said of an inertia that is not that of the hull at all, see `gyration`.
+    """
+    if facts.size is None or any(gyration(facts)):
+        return
+    given, box = np.diag(facts.inertia), _corner_radii(facts.size) ** 2
+    pairs = [(box[i] / box[j], i, j) for i in range(3) for j in range(3) if 0 < given[j] < given[i]]
+    ratio, i, j = min(pairs, default=(1.0, 0, 0))
+    if ratio < _CLEARLY_SMALLER:
+        should = f"be smaller in {_AXES[i]} than in {_AXES[j]}"
+        got = f"{given[i]:.4g} against {given[j]:.4g} kg m^2"
+        size = " x ".join(f"{side:.4g}" for side in facts.size)
+        hint = f"In a uniform box of {size} m (`size`) it is {ratio:.2g} times as large. {_ORDER}"
+        yield advice("axes", "inertia", should, got, hint)
+
+
 def _in_unit(ratios: np.ndarray, usual: tuple[float, float]) -> str:
     """The unit in which these numbers would be usual."""
     for factor, unit in _UNITS.items():
@@ -85,4 +110,4 @@ def _in_unit(ratios: np.ndarray, usual: tuple[float, float]) -> str:
     return "It is that of a larger vehicle"
 
 
-RULES = (mass_matrix, triangle, gyration)
+RULES = (mass_matrix, triangle, gyration, axes)
