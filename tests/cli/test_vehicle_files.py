@@ -11,8 +11,10 @@ from messages import named
 from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
+from undertow.loop.dataset import input_names
 from undertow.scenario.build import build
 from undertow.scenario.factory import make
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import read
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.vehicles import bluerov2_heavy
@@ -21,6 +23,7 @@ ROV = (Path(__file__).parents[2] / "examples" / "my_rov.yaml").read_text()
 FLIES = SCENARIO.replace("{kind: odin, mass: 125}", "my_rov.yaml").replace("position: [2, 3", "position: [0, 0")
 
 
+PARTS = PartCache()
 SMALL_PLANT = "vehicle: {kind: vehicles/my_rov.yaml, mass: 13.6}, thruster: linear_voltage, ledger: false"
 
 
@@ -195,6 +198,41 @@ MISTAKES = {
         "[6.36, 7.12, -18.68,",
         "`added_mass` must leave M = M_RB + M_A positive definite, but is such that its smallest eigenvalue is -5.18 (my_rov.yaml, line 18). With mass and inertia alone it would be: check the signs of the added mass",
     ),
+    "name of a thruster that breaks a line": (
+        "azimuth: 45}",
+        'azimuth: 45, name: "bow\\n<b>"}',
+        "`thrusters[1].name` must be of letters, digits, spaces and _ . -, and begin with a letter or digit, but is bow <b> (my_rov.yaml, line 26)",
+    ),
+    "name of a thruster that is a list": (
+        "azimuth: 45}",
+        "azimuth: 45, name: [bow]}",
+        "`thrusters[1].name` must be text, but is ['bow'] (my_rov.yaml, line 26)",
+    ),
+    "name of a thruster without end": (
+        "azimuth: 45}",
+        f"azimuth: 45, name: {'x' * 3000}}}",
+        "`thrusters[1].name` must be at most 24 characters long, but is 3000 long (my_rov.yaml, line 26)",
+    ),
+    "empty name of a thruster": (
+        "azimuth: 45}",
+        "azimuth: 45, name: ' '}",
+        "`thrusters[1].name` must be a name, but is empty (my_rov.yaml, line 26). Leave it out for the name that follows from the position",
+    ),
+    "two thrusters of one name": (
+        "azimuth: -45}\n  - {position: [0.156, -0.111, 0.085], azimuth: 45}",
+        "azimuth: -45, name: bow}\n  - {position: [0.156, -0.111, 0.085], azimuth: 45, name: Bow}",
+        "`thrusters[1].name` must differ from `thrusters[0].name`, but is Bow (my_rov.yaml, line 26)",
+    ),
+    "name of another thruster": (
+        "azimuth: -45}",
+        "azimuth: -45, name: T3}",
+        "`thrusters[0].name` must be a name that means nothing else among the targets of faults, but is T3 (my_rov.yaml, line 25)",
+    ),
+    "name of a quantity": (
+        "azimuth: -45}",
+        "azimuth: -45, name: depth}",
+        "`thrusters[0].name` must be a name that means nothing else among the targets of faults, but is depth (my_rov.yaml, line 25)",
+    ),
     "not YAML": ("r_g: [0, 0, 0] ", "r_g: [0, 0, 0 ", None),
     "direction of a corner": (
         "azimuth: -45}",
@@ -202,6 +240,23 @@ MISTAKES = {
         "`thrusters[0].direction` must have length 1, but is 1.41421 long (my_rov.yaml, line 25). Divide it by its length",
     ),
 }
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("target", "number"),
+    [("bow left", 2), ("t2 Bow Left", 2), ("T2", 2), ("thruster 2", 2), ("vertical stern port", 8), ("T9 bow", None)],
+)
+def test_own_names_of_thrusters_are_targets_of_faults(rov, tmp_path, target, number):
+    rov("azimuth: 45}", "azimuth: 45, name: bow left}")
+    (tmp_path / "s.yaml").write_text(f"{FLIES}faults: [{{target: {target}, mode: off}}]\n")
+    if number is None:
+        with pytest.raises(BadInput, match="its thrusters are T1 bow starboard, T2 bow left, T3 stern starboard"):
+            build(read(tmp_path / "s.yaml"), PARTS)
+        return
+    built = build(read(tmp_path / "s.yaml"), PARTS)
+    assert (built.resolved["faults"][0]["target"], built.resolved["faults"][0]["number"]) == ("thruster", number)
+    assert input_names(built.closed_loop.plant)[:2] == ("T1 bow starboard", "T2 bow left")
 
 
 @pytest.mark.full

@@ -1,5 +1,6 @@
 """Every published vehicle in every variant: what a body must satisfy, and the numbers of its data sheet."""
 
+import dataclasses
 import importlib
 
 import equinox as eqx
@@ -14,6 +15,7 @@ from undertow import vehicles
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.core.param import parameters
+from undertow.vehicles.thruster_labels import number_of
 from undertow.vehicles.vehicle import Vehicle
 
 # Mass (kg), smallest and largest eigenvalue of M, (B - W) / W (%), righting moment (N m/rad), smallest eigenvalue of
@@ -222,6 +224,33 @@ def test_thrusters_are_named_by_where_they_stand():
     assert names[:2] == ("T1 bow starboard", "T2 bow port") and names[-1] == "T8 vertical stern port"
     assert vehicles.remus100().thruster_names() == ("T1 stern",)
     assert vehicles.npsauv2().thruster_names() == ("T1 stern",)
+
+
+def test_own_names_of_thrusters_stand_where_the_others_do():
+    six = vehicles.bluerov2()
+    own = dataclasses.replace(six, own_thruster_names=("", "Bug", "", "", "lift-1", "lift-2"))
+    assert own.thruster_names() == (
+        six.thruster_names()[0],
+        "T2 Bug",
+        *six.thruster_names()[2:4],
+        "T5 lift-1",
+        "T6 lift-2",
+    )
+    assert own.with_thrusters((6, 1)).thruster_names() == ("T1 lift-2", "T2 " + six.thruster_names()[0][3:])
+    for names, says in (
+        (("one",), "`own_thruster_names` must be 6 names, one per thruster, or none, but is 1"),
+        (("a", "b", "c", "d", "e", "A"), r"`own_thruster_names\[5\]` must differ from `own_thruster_names\[0\]`"),
+    ):
+        with pytest.raises(BadInput, match=says):
+            dataclasses.replace(six, own_thruster_names=names)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("lift left", 3), ("LIFT  Left", 3), ("T3 lift left", 3), ("stern", None), ("", None), ("T1 stern", 1)],
+)
+def test_thrusters_are_found_by_their_names(text, number):
+    assert number_of(text, ("T1 stern", "T2 stern", "T3 lift left")) == number
 
 
 @pytest.mark.parametrize(

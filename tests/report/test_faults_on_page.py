@@ -10,8 +10,8 @@ def test_rows_of_faults():
         {"target": "thruster", "number": 3, "mode": "scale", "severity": 0.5, "onset": 20.0},
         {"target": "position", "mode": "nan", "onset": [1.0, 2.0], "duration": 3.0},
     ]
-    assert fault_rows(entries).rows == [
-        ("thruster 3", "scale", "0.5", "20 s", "to the end"),
+    assert fault_rows(entries, ["T1 bow", "T2 stern", "T3 lift left"]).rows == [
+        ("thruster T3 lift left", "scale", "0.5", "20 s", "to the end"),
         ("position", "nan", "-", "1 to 2 s", "3 s"),
     ]
 

@@ -1,12 +1,12 @@
 """Targets of faults: what a closed loop has that can fail, and how it is named.
 
 Names are those of quantities (`position`, `depth`), of sensors (`sensor dvl`, or `dvl` alone where no quantity has that
-name), of a thruster (`thruster 3`), `bus`, `plant` and `computation`. A plant that is no vehicle has `input 1` in place
-of thrusters.
+name), of a thruster (`thruster 3`, or the name that figures give it), `bus`, `plant` and `computation`. A plant that is
+no vehicle has `input 1` in place of thrusters.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import jax
@@ -20,6 +20,7 @@ from undertow.faults.quantities import OF_BODY, PROPELLER_SPEED, quantities_of
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.sensors.motion import motion_of
 from undertow.sensors.sensor import AbstractSensor
+from undertow.vehicles.thruster_labels import number_of, without_number
 
 # Sensor -> unit of its reading, usual size of an error.
 _SENSORS = {
@@ -117,35 +118,55 @@ def _motion(y: Measurement):
     return motion_of(y, y.velocity[:3], jnp.zeros(()))
 
 
-def named(
-    text: str, number: int | str | None, known: Mapping[str, FaultTarget]
-) -> tuple[FaultTarget, int | str | None]:
-    """The target that a text names, and its number: of a thruster, or of a sensor among those of its kind.
+def is_target(text: str) -> bool:
+    """Whether a text names a target of any vehicle, so that a thruster must not be called so."""
+    return _parsed(text, all_targets())[0] in all_targets()
 
-    Args:
-        text: such as `thruster 3`, `sensor dvl` or `position`.
-        number: given beside it; "random" for a thruster that is sampled; None where it is not given.
-        known: targets of the loop, by name.
 
-    Raises:
-        BadInput: the loop has no such target; the error names those it has.
-    """
+def _parsed(text: str, known: Mapping[str, FaultTarget]) -> tuple[str, str | None]:
+    """Name of a target as in `known`, where it is there, and the digits behind it."""
     parsed = re.fullmatch(r"(.*?)[\s_]*(\d+)?", " ".join(text.split()).lower())
     word, digits = (parsed.group(1), parsed.group(2)) if parsed else (text, None)
     word = _OTHER_WORDS.get(word, word)
     word = re.sub(r"^sensors?[\s_]+", "sensor ", word)
     if word not in known and f"sensor {word}" in known:
         word = f"sensor {word}"
+    return word, digits
+
+
+def named(
+    text: str, number: int | str | None, known: Mapping[str, FaultTarget], thrusters: Sequence[str] = ()
+) -> tuple[FaultTarget, int | str | None]:
+    """The target that a text names, and its number: of a thruster, or of a sensor among those of its kind.
+
+    Args:
+        text: such as `thruster 3`, `sensor dvl` or `position`, or the name of a thruster.
+        number: given beside it; "random" for a thruster that is sampled; None where it is not given.
+        known: targets of the loop, by name.
+        thrusters: their names, as figures show them: `T3 stern port`.
+
+    Raises:
+        BadInput: the loop has no such target; the error names those it has.
+    """
+    word, digits = _parsed(text, known)
+    if word not in known and (place := number_of(text, thrusters)) is not None:
+        word, digits = "thruster", str(place)
     if word == "random":
         hint = "Write `number: random` for a random thruster; undertow.faults.sampling makes entries of random kinds"
         raise BadInput("target", "be something that can fail", text, hint=hint)
     if word not in known:
-        hint = joined(nearest(word, known), f"This scenario has: {', '.join(known)}")
+        hint = joined(nearest(word, [*known, *thrusters, *map(without_number, thrusters)]), _listed(known, thrusters))
         raise BadInput("target", "be something that this scenario has and that can fail", text, hint=hint)
     target = known[word]
     if digits is not None and number is not None:
         raise BadInput("number", f"be left out: the target is `{text}`", number)
     return target, int(digits) if digits is not None else number
+
+
+def _listed(known: Mapping[str, FaultTarget], thrusters: Sequence[str]) -> str:
+    """Sentence with the targets of a scenario."""
+    of_thrusters = f"; its thrusters are {', '.join(thrusters)}" if thrusters else ""
+    return f"This scenario has: {', '.join(known)}{of_thrusters}"
 
 
 def checked_number(target: FaultTarget, number: int | str | None) -> int | str | None:

@@ -9,6 +9,7 @@ import xarray as xr
 
 from undertow.analysis.success import Success
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.report.figures.recorded import input_names
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
 from undertow.report.plotting import Plotted
@@ -87,7 +88,7 @@ def _page(
     certificate = certificate_of(run)
     sections = [replay, section("metrics", measured.title, _table(measured), _meanings(measured))]
     if faults := faults_of(run):
-        sections.append(section("faults", "Faults", _table(fault_rows(faults))))
+        sections.append(section("faults", "Faults", _table(fault_rows(faults, input_names(run)))))
     if (transitions := transitions_of(run)) is not None:
         sections.append(section("supervision", "Supervision", _table(transition_rows(transitions))))
     if certificate is not None:

@@ -88,12 +88,15 @@ def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
     return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, tuple(sentences))
 
 
-def fault_rows(faults: Sequence[Mapping[str, Any]]) -> RunTable:
-    """Faults of a run, as its scenario has them."""
+def fault_rows(faults: Sequence[Mapping[str, Any]], inputs: Sequence[str]) -> RunTable:
+    """Faults of a run, as its scenario has them, thrusters by their names: those of the inputs."""
     seconds = lambda value: f"{value:g} s" if isinstance(value, int | float) else f"{value[0]:g} to {value[1]:g} s"
     rows: list[tuple[str | float, ...]] = []
     for one in faults:
-        target = f"{one['target']} {one['number']}" if "number" in one else one["target"]
+        target, number = one["target"], one.get("number", "")
+        if target == "thruster" and isinstance(number, int):
+            number = inputs[number - 1]
+        target = f"{target} {number}".rstrip()
         severity, lasts = one.get("severity", "-"), one.get("duration")
         rows.append(
             (target, one["mode"], str(severity), seconds(one["onset"]), seconds(lasts) if lasts else "to the end")

@@ -20,6 +20,7 @@ from undertow.faults.of_computation import ComputationFault, computed, law_of_co
 from undertow.faults.of_sensors import SensorFault, SensorFaults
 from undertow.faults.targets import FaultTarget, checked_number, named, targets_of
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.dataset import input_names
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario import factory
 from undertow.scenario.schema import Fault
@@ -53,11 +54,12 @@ def faulted(
     if not entries:
         return loop, []
     known = targets_of(loop.plant, loop.navigation)
+    names = input_names(loop.plant) if "thruster" in known else ()
     groups: dict[str, list[Any]] = {"quantity": [], "input": [], "plant": [], "sensor": [], "computation": []}
     resolved = []
     for place, entry in enumerate(entries):
         with within(f"[{place}]"):
-            target, number = named(entry.target, entry.number, known)
+            target, number = named(entry.target, entry.number, known, names)
             number = checked_number(target, number)
             fault, options = made.get(place), {}
             if fault is None:

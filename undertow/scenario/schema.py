@@ -137,7 +137,8 @@ class Fault(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     target: str = Field(
         description="what fails: a quantity that the controller receives (position, attitude, velocity, angular_rate, "
-        "depth, propeller_speed), a sensor of the navigation (sensor dvl), thruster 3, bus, plant or computation"
+        "depth, propeller_speed), a sensor of the navigation (sensor dvl), thruster 3 or its name, bus, plant or "
+        "computation"
     )
     mode: str = Field(description="how, see `undertow list faults`, or ./file.py:function")
     severity: Range = Field(

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean, joined, known_key
 from undertow.core.measurement import BODY_AXES
+from undertow.faults.targets import is_target
 from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import checked
 from undertow.vehicles.facts import Facts
 from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
+from undertow.vehicles.thruster_labels import check_own
 from undertow.vehicles.vehicle import Vehicle
 
 _AXES, _SIX = "forward, starboard, down", ", ".join(BODY_AXES)
@@ -122,7 +124,7 @@ def printed_matrix(contents: Mapping[str, Any], thrusters: int) -> NDArray | Non
     return array
 
 
-_THRUSTER_KEYS = ("position", "direction", "azimuth", "elevation")
+_THRUSTER_KEYS = ("name", "position", "direction", "azimuth", "elevation")
 _FARTHEST = 1e9  # m
 
 
@@ -160,6 +162,29 @@ def _pose(name: str, entry: Any) -> tuple[NDArray, NDArray]:
             *(_angle(name, entry, key) for key in ("azimuth", "elevation"))
         )
     return _vector(name, entry, "position"), _vector(name, entry, "direction")
+
+
+def names_of(entries: list[dict[str, Any]]) -> tuple[str, ...]:
+    """Names of thrusters as given, "" for one without; () where none has one.
+
+    Raises:
+        BadInput: a name that cannot be shown, occurs twice, or means something else that can fail.
+    """
+    key = lambda j: f"thrusters[{j}].name"
+    names = tuple(
+        " ".join(checked(key(j), entry["name"], str, "").split()) if "name" in entry else ""
+        for j, entry in enumerate(entries)
+    )
+    for j, entry in enumerate(entries):
+        if "name" in entry and not names[j]:
+            raise BadInput(
+                key(j), "be a name", "empty", hint="Leave it out for the name that follows from the position"
+            )
+    check_own(names, key)
+    for j, name in enumerate(names):
+        if name and is_target(name):
+            raise BadInput(key(j), "be a name that means nothing else among the targets of faults", name)
+    return names if any(names) else ()
 
 
 def angles_of(entries: list[dict[str, Any]]) -> dict[str, float]:
@@ -281,7 +306,7 @@ def parse(contents: Mapping[str, Any]) -> VehicleData:
     return VehicleData(
         name=text_at(contents, "name", "vehicle"),
         hull=hull,
-        layout=Layout(source, positions, directions),
+        layout=Layout(source, positions, directions, names_of(contents["thrusters"])),
         size=vectors.get("size"),
         printed_matrix=printed_matrix(contents, len(positions)),
         water_density=numbers.get("water_density"),

@@ -38,6 +38,7 @@ class Layout(NamedTuple):
     source: str
     positions: ArrayLike  # m
     directions: ArrayLike  # unit vectors of positive thrust
+    names: tuple[str, ...] = ()  # of the vehicle's own; () for none, "" for a thruster without
 
 
 def choose(argument: str, name: str, variants: Mapping[str, Variant]) -> Variant:
@@ -71,6 +72,7 @@ def assemble(name: str, hull: Hull, layout: Layout) -> Vehicle:
         thruster_positions=np.asarray(layout.positions, dtype=float),
         thruster_directions=np.asarray(layout.directions, dtype=float),
         sources=sources | dict(hull.notes or {}),
+        own_thruster_names=layout.names,
     )
 
 

@@ -1,5 +1,7 @@
 """A vehicle as data: published numbers with their sources, and derived matrices."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,17 +14,15 @@ from undertow.core.errors import BadInput
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.runtime import double_outside_runs
 from undertow.vehicles.body import Body, rigid_body_mass
-
-_NEAR = 0.1  # share of the largest lever within which a thruster is in the middle
-_PUSHES, _ALONG = {1: "lateral", 2: "vertical"}, 0.9  # body axes, and the part of its direction along one of them
+from undertow.vehicles.thruster_labels import check_own, labels
 
 
 class Vehicle(eqx.Module):
     """Hull and thruster layout. Body axes forward, starboard, down; matrices positive.
 
     Raises:
-        BadInput: a value is not finite or of the wrong sign or size, or the mass matrix is not symmetric
-            positive definite.
+        BadInput: a value is not finite or of the wrong sign or size, the mass matrix is not symmetric positive
+            definite, or names of thrusters cannot be shown or are not one per thruster.
     """
 
     name: str = eqx.field(static=True)
@@ -40,6 +40,7 @@ class Vehicle(eqx.Module):
     thruster_positions: Float[Param, "N 3"] = param("m", "position of each thruster", symbol="r_j")
     thruster_directions: Float[Param, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
     sources: Sources = sources_field()
+    own_thruster_names: tuple[str, ...] = eqx.field(static=True, default=())  # () for none; "" for a thruster without
 
     @double_outside_runs
     def __check_init__(self):
@@ -76,6 +77,10 @@ class Vehicle(eqx.Module):
             raise BadInput(
                 "thruster_positions", "have one row (x, y, z) per thruster, like thruster_directions", shapes
             )
+        if len(self.own_thruster_names) not in (0, self.thrusters):
+            must = f"be {self.thrusters} names, one per thruster, or none"
+            raise BadInput("own_thruster_names", must, f"{len(self.own_thruster_names)}")
+        check_own(self.own_thruster_names, lambda j: f"own_thruster_names[{j}]")
         checks.finite("thruster_positions", self.thruster_positions, "m")
         if checks.known(self.thruster_directions):
             norms = np.linalg.norm(np.asarray(self.thruster_directions), axis=1)
@@ -88,18 +93,11 @@ class Vehicle(eqx.Module):
         return self.thruster_positions.shape[0]
 
     def thruster_names(self) -> tuple[str, ...]:
-        """T1, T2, ... with what the pose tells: `T5 vertical bow port` pushes along z, ahead of the origin, to port.
+        """T1, T2, ... each with its own name, or with what the pose tells: `T5 vertical bow port`.
 
-        One that pushes along y is `lateral`.
+        That one pushes along z, ahead of the origin, to port. One that pushes along y is `lateral`.
         """
-        positions, directions = np.asarray(self.thruster_positions), np.asarray(self.thruster_directions)
-        near = _NEAR * max(np.abs(positions).max(), 1e-9)
-        found = []
-        for number, ((x, y, _), direction) in enumerate(zip(positions, directions, strict=True), 1):
-            words = [word for axis, word in _PUSHES.items() if abs(direction[axis]) > _ALONG]
-            words += [word for at, word in ((x, "bow"), (-x, "stern"), (-y, "port"), (y, "starboard")) if at > near]
-            found.append(" ".join([f"T{number}", *words]))
-        return tuple(found)
+        return labels(self.thruster_positions, self.thruster_directions, self.own_thruster_names)
 
     @double_outside_runs
     def mass_matrix(self) -> Float[Array, "6 6"]:
@@ -139,11 +137,13 @@ class Vehicle(eqx.Module):
                 raise BadInput("thrusters", f"be numbers from 1 to {self.thrusters}", number)
         if len(set(numbers)) != len(numbers) or not len(numbers):
             raise BadInput("thrusters", "name one or more different thrusters", list(numbers))
-        index = jnp.asarray([int(number) - 1 for number in numbers])
-        return eqx.tree_at(
-            lambda v: (v.thruster_positions, v.thruster_directions),
+        places = [int(number) - 1 for number in numbers]
+        index = jnp.asarray(places)
+        return dataclasses.replace(
             self,
-            (self.thruster_positions[index], self.thruster_directions[index]),
+            thruster_positions=self.thruster_positions[index],
+            thruster_directions=self.thruster_directions[index],
+            own_thruster_names=tuple(self.own_thruster_names[place] for place in places if self.own_thruster_names),
         )
 
 
