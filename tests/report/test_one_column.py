@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from undertow.report.figures import run_figures, save
+from undertow.report.figures import run_figures, save, style
 from undertow.report.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures.one_column import WIDTH, one_column
 from undertow.report.figures.writing import pdf
@@ -55,6 +55,21 @@ def test_long_names_and_labels_are_not_cut():
     figure.dpi = 600
     drawn = figure.get_tightbbox(FigureCanvasAgg(figure).get_renderer())
     assert 0 <= drawn.x0 < drawn.x1 <= WIDTH
+
+
+def test_only_an_axis_that_is_shared_is_labelled_once():
+    """Panels of two quantities in turn, and of one quantity over two ranges, keep their labels; the upper ticks fit."""
+    figure = style.blank(6.0, 3.0)
+    for name, most in (("force, N", 3.0), ("speed, m/s", 3.0), ("force, N", 3.0), ("force, N", 3.0), ("force, N", 9.0)):
+        panel = style.place(figure, 0.6, 0.5, 4.0, 2.0)
+        panel.set_xlim(0.0, most)
+        panel.set_ylim(0.0, 1.0)
+        style.label(panel, name, "error, m")
+    figure = one_column(figure)
+    labels = [panel.get_xlabel() for panel in figure.axes]
+    assert labels == ["force, N", "speed, m/s", "", "force, N", "force, N"]
+    renderer, paper = FigureCanvasAgg(figure).get_renderer(), figure.get_size_inches()[1] * figure.dpi
+    assert figure.axes[0].yaxis.get_tightbbox(renderer).y1 <= paper + 0.5  # dots
 
 
 def test_files_and_their_bytes(make_run, tmp_path):

@@ -80,12 +80,11 @@ def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
 
 
 def _label_last(panels: list[Axes], across: int) -> None:
-    """Leave an x label that several panels share to the lowest of them in each column."""
-    seen: set[tuple[int, str]] = set()
-    for i, panel in reversed(list(enumerate(panels))):
-        if (i % across, panel.get_xlabel()) in seen:
+    """Leave an x axis that several panels below each other share to the lowest of them to label."""
+    axis = [(panel.get_xlabel(), panel.get_xlim()) for panel in panels]
+    for panel, own, below in zip(panels, axis, axis[across:], strict=False):
+        if own == below:
             panel.set_xlabel("")
-        seen.add((i % across, panel.get_xlabel()))
 
 
 def _wrap(panel: Axes) -> None:
@@ -121,8 +120,10 @@ def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, 
     ticks = [label.get_window_extent(renderer).x1 for label in panel.get_xticklabels() if label.get_visible()]
     if whole is None:
         return 0.0, 0.0, 0.0, 0.0
+    # Where a panel is moved to, a tick may stand at its upper edge.
+    letters = max((label.get_window_extent(renderer).height for label in panel.get_yticklabels()), default=0.0)
     left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
-    sides = left, right, whole.y1 - inner.y1, inner.y0 - whole.y0
+    sides = left, right, max(whole.y1 - inner.y1, letters / 2), inner.y0 - whole.y0
     edge = (_EDGE, 0.0, 0.0, 0.0)
     return tuple(max(side, 0.0) / panel.figure.dpi + more for side, more in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
 
