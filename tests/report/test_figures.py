@@ -1,13 +1,16 @@
 import threading
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from PIL import Image
 
 from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
 from undertow.report.figures.paper import effort, uncertainty
+from undertow.report.figures.prediction import prediction_plots
 from undertow.reproduction.thruster_response import thruster_response
 
 pytestmark = pytest.mark.full
@@ -38,6 +41,18 @@ def test_names_and_panels(figures):
     for name in ("fig09", "fig13"):
         titles = [p.get_title(loc="left") for p in figures[name].axes if p.get_title(loc="left")]
         assert titles == [f"T{n}" for n in range(1, 9)]
+
+
+def test_key_of_the_poles_covers_none():
+    """Poles in all corners of the panel: the key has no part of it, and names every operating point."""
+    corners = np.array([-100 + 100j, -100 - 100j, -0.01 + 100j, -0.01 - 100j, -100, -0.01])
+    points = tuple(SimpleNamespace(poles=corners, where=where) for where in ("calm", "mean load", "0.95 quantile"))
+    no_limit = SimpleNamespace(high=np.array([np.inf]))
+    figure = prediction_plots(SimpleNamespace(points=points, authority=no_limit))["poles"]()
+    (panel,), (key,) = figure.axes, figure.legends
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    assert panel.get_legend() is None and not key.get_window_extent(renderer).overlaps(panel.get_tightbbox(renderer))
+    assert [text.get_text() for text in key.get_texts()] == ["calm", "mean load", "0.95 quantile"]
 
 
 def test_every_panel_says_its_unit(figures):

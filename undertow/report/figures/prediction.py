@@ -27,9 +27,10 @@ def prediction_plots(prediction: Prediction) -> dict[str, Callable[[], Figure]]:
 
 
 def _poles(prediction: Prediction) -> Figure:
-    figure = style.blank(9.6, 4.2)
+    height, under_title = 4.4, 0.3  # in
+    figure = style.blank(9.6, height)
     style.head(figure, "Controllable closed-loop poles over the operating range", {})
-    panel = style.place(figure, 0.75, 0.55, 8.6, 3.1)
+    panel = style.place(figure, 0.75, 0.75, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
         marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
         panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=point.where)
@@ -39,7 +40,15 @@ def _poles(prediction: Prediction) -> Figure:
     panel.set_xlim(right=1.3 * right)
     panel.axvspan(0, 1.3 * right, color="#fbe3df", zorder=0)
     style.note(panel, "unstable", (1.0, 1.0), (-3, -3), ha="right", va="top", fontsize=style.SMALL)
-    panel.legend(fontsize=style.SMALL, loc="best", framealpha=1.0)
+    # Beside the panel: poles may be anywhere inside.
+    figure.legend(
+        handles=panel.get_legend_handles_labels()[0],
+        ncols=len(prediction.points),
+        fontsize=style.SMALL,
+        frameon=False,
+        loc="upper left",
+        bbox_to_anchor=(0.005, 1 - under_title / height),
+    )
     style.label(panel, "real part, 1/s", "imaginary part, rad/s")
     return figure
 
