@@ -11,6 +11,7 @@ import undertow as ut
 from undertow.campaign.campaign_schema import read_campaign
 from undertow.campaign.trials import trials
 from undertow.core.measurement import BODY_OUTPUTS, measurement_of_outputs
+from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.drift import drift_advice, drifts
 from undertow.navigation.observer import observer
 from undertow.reproduction import ablations
@@ -61,6 +62,30 @@ def test_top_speed_of_one_thruster_is_where_its_force_balances_linear_drag():
         assert held_speed(plant, np.zeros(6), np.array([speed, 0.0, 0.0])) == pytest.approx(held, abs=0.041)
     heavier = eqx.tree_at(lambda p: p.body.weight, plant, plant.body.weight + 5.0)  # it may also sink
     assert 30.0 / 20.0 < top_speed(heavier) <= 35.0 / 20.0 * (1 + 1e-9)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("reference", "start", "distance"),
+    [
+        (ut.references.circle(radius=2.0, depth=3.0), None, "3 m"),
+        (ut.references.circle(radius=2.0, depth=3.0), [0.0, 0.0, 1.9, 0.0, 0.0, 0.0], "1.1 m"),
+        (ut.references.circle(radius=2.0, depth=3.0), [0.0, 0.0, 2.1, 0.0, 0.0, 0.0], ""),
+        (ut.references.setpoint([0, 0, 3, 0, 0, 0]), None, ""),  # a step, which is meant
+        (ut.references.setpoint([0, 0, 3, 0, 0, 0], settling=10.0), None, ""),  # begins at the vehicle
+        (ut.references.setpoint([0, 0, 3, 0, 0, 0], settling=10.0, start=[4, 0, 3, 0, 0, 0]), None, "5 m"),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("thruster", [ut.thrusters.t200(), ut.thrusters.paper_table3()], ids=["limited", "unlimited"])
+def test_a_path_that_begins_more_than_1_m_from_the_vehicle(reference, start, distance, thruster):
+    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), thruster)
+    law = ut.controllers.pid(plant.model(), frequency=1.0)
+    loop = ClosedLoop(plant, law, reference, ut.disturbances.none(), ut.navigation.perfect()).starting_at(start)
+    said = [one for one in plausibility(loop, 40.0, start) if "begins" in one.says]
+    assert [one.says.startswith(f"`reference` begins {distance} from the vehicle: at ") for one in said] == (
+        [True] if distance else []
+    )
 
 
 @pytest.mark.full

@@ -179,6 +179,7 @@ ADVICE = {
     "step": ("s.yaml", "[2, 0, 1,", "[25, 0, 1,", ["25.02 m from the vehicle", "at most 1.32", "`settling`"]),
     "too fast": ("s.yaml", SETPOINT, "{kind: circle, radius: 20, period: 20}", ["6.28 m/s", "at most 1.32"]),
     "waypoints in time": ("s.yaml", SETPOINT, WAYPOINTS, ["ends at 20 s", "(s.yaml, line 9)", "at 80 s", "`loop.duration`"]),
+    "path from elsewhere": ("s.yaml", SETPOINT, "{kind: waypoints, points: [[0, 0, 3], [2, 0, 3]], speed: 0.5}", ["`reference` begins 3 m from the vehicle: at [0, 0, 3] m", "the vehicle starts at [0, 0, 0] m", "(s.yaml, line 5)", "`initial: {position: [0, 0, 3, 0, 0, 0]}`"]),
     "no compass, no position": ("s.yaml", "loop:", OBSERVER % "imu, dvl, depth", ["(s.yaml, line 8)", "0.013 m (north and east) and 0.051 degrees (yaw) in 20 s", "`position_fix` and `compass`"]),
     "long steps": ("s.yaml", "static", "electromechanical", ["0.437 ms", "10 ms", "(s.yaml, line 10)", "loop.substeps: 9"]),
     "radians of a thruster": ("my_rov.yaml", (": -45}", ": 45}", ": -135}", ": 135}"), (": -0.785}", ": 0.785}", ": -2.356}", ": 2.356}"), ["`thrusters[0].azimuth`", "-0.785", "-45 degrees in radians", "`thruster_matrix` contradicts", "(my_rov.yaml, line 25)", "Write -45"]),

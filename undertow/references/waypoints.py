@@ -48,7 +48,8 @@ class Waypoints(AbstractReference):
 def waypoints(points, speed: float = 0.5, heading: str = "fixed") -> Waypoints:
     """Smooth motion (C2) through waypoints, level, for a vehicle; at rest at the first (t = 0) and at the last.
 
-    For given times, or outputs other than these, see `recorded`.
+    Let the first be where the vehicle starts (`initial` of a scenario): from 1 m away on, `check` and `simulate` give
+    advice, for the run begins with an error of that size. For given times, or outputs other than these, see `recorded`.
 
     Args:
         points: rows (north, east, down), m.

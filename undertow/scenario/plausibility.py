@@ -26,6 +26,7 @@ _LONG = 1e6  # s, by when a reference that ends has ended
 _FULL_TURN = 2 * np.pi
 _RISES = 0.2  # m above the start; less is no mistake of sign
 _SPARE = 1.05  # a speed is too large from this multiple of the top speed on
+_JUMP = 1.0  # m from the vehicle; a path that begins farther away begins with an error of this size
 _FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
 _DIRECTIONS = 2000
 _AT_REST = 1e-3  # m/s
@@ -205,6 +206,7 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
     """Speeds and distances beyond the thrusters."""
     top = top_speed(plant)
     if not np.isfinite(top):
+        yield from _begins_elsewhere(desired)
         return
     flows = [one.velocity for one in _members(loop, Current)] + [one.mean for one in _members(loop, GaussMarkovCurrent)]
     flow = np.sum([np.asarray(one, dtype=float) for one in flows], axis=0) if flows else np.zeros(3)
@@ -236,6 +238,23 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
         hint = "Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
         at_limits = f"the thrusters are at their limits for {step / top:.3g} s or more"
         yield advice("reference", f"{says}: {at_limits}", hint)
+    else:
+        yield from _begins_elsewhere(desired)
+
+
+def _begins_elsewhere(desired: Motion):
+    """A path whose first point is not where the vehicle starts. A constant position is a step that is meant."""
+    first, start = desired.position[0], desired.start
+    distance = _size(first[:3] - start[:3])
+    if distance <= _JUMP or not np.ptp(desired.position[:, :3], axis=0).any():
+        return
+    listed = lambda values: f"[{', '.join(f'{value:.4g}' for value in values)}]"
+    says = (
+        f"`reference` begins {distance:.4g} m from the vehicle: at {listed(first[:3])} m (north, east, down), but the "
+        f"vehicle starts at {listed(start[:3])} m"
+    )
+    hint = f"Begin the path where the vehicle is, or write `initial: {{position: {listed(first)}}}`"
+    yield advice("reference", says, hint)
 
 
 def _members(loop: ClosedLoop, kind: type) -> list:
