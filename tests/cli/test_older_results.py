@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.scenario.finished_run import compare
+from undertow.scenario.finished_run import compare, shortened
 from undertow.scenario.provenance import checksum, content_hash
 
 
@@ -53,3 +53,16 @@ def test_missing_rates_do_not_hide_a_difference(written):
     other = labelled(position=np.array([1.0, 2.0]), lyapunov=np.array([4.0, 3.0]), lyapunov_rate=np.array([np.nan, -2]))
     found = compare(written(other), NOW)
     assert not found.equal and not found.explained
+
+
+def test_a_shortened_file_is_compared_with_the_whole_run(written):
+    """What it has left out is covered by the content hash; a difference there is told, too."""
+    short = shortened(NOW, ("position", "estimate"))
+    assert list(short.data_vars) == ["position"] and short.attrs["left_out"] == "lyapunov, lyapunov_rate"
+    assert short.attrs["checksum"] == checksum(short) and len(NOW.data_vars) == 3
+    found = compare(written(short), NOW)
+    assert found.equal
+    assert found.sentence == f"before.nc was repeated bit for bit (content hash {NOW.attrs['content_hash'][:12]})"
+    other = labelled(position=np.array([1.0, 2.0]), lyapunov=np.array([4.0, 3.5]), lyapunov_rate=np.array([np.nan, -1]))
+    found = compare(written(short), other)
+    assert not found.equal and found.sentence.endswith("Differences: series that it has left out")

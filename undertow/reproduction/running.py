@@ -20,11 +20,14 @@ from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
 from undertow.scenario.execute import Executed, execute, finished, gathered_of, save
+from undertow.scenario.finished_run import shortened
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.scenario.reading import dump
 
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
+# What `runs/` keeps of a run: the series of the paper's figures. Repeated from its file, the others come back.
+_KEPT = ("position", "reference", "input", "uncertainty", "estimate")
 _Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
 
 
@@ -173,7 +176,7 @@ def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path)
 
 
 def _saved(name: str, one: Executed, folder: Path) -> Executed:
-    save(one.dataset, folder / "runs" / f"{name}.nc")
+    save(shortened(one.dataset, _KEPT), folder / "runs" / f"{name}.nc")
     return one
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -183,7 +183,27 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+_LEFT_OUT = "left_out"  # attribute of a result: series that the run had and the file has not
 _SHOWN = 3  # of what differs
+
+
+def shortened(dataset: xr.Dataset, kept: Collection[str]) -> xr.Dataset:
+    """A result with some of its series only, to be written compressed; no number is changed.
+
+    Its content hash stays that of the whole run, so that a repetition is compared with all of it.
+
+    Args:
+        dataset: of the run.
+        kept: names of series; those that the run has not are ignored.
+    """
+    left_out = sorted(str(name) for name in dataset.data_vars if name not in kept)
+    short = dataset.drop_vars(left_out).copy()
+    for variable in short.variables.values():
+        if variable.dtype.kind in "fi":
+            variable.encoding = {"zlib": True, "shuffle": True, "complevel": 4}
+    short.attrs[_LEFT_OUT] = ", ".join(left_out)
+    short.attrs["checksum"] = checksum(short)
+    return short
 
 
 class Repetition(NamedTuple):
@@ -198,8 +218,11 @@ def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it used and whose checksum, if any, is correct."""
     with xr.open_dataset(path, engine="netcdf4") as earlier:
         before, held = dict(earlier.attrs), claims(earlier)
-    now = claims(repeated)
-    differing, added = [name for name, claim in held.items() if now.get(name) != claim], sorted(set(now) - set(held))
+    now, left_out = claims(repeated), set(before.get(_LEFT_OUT, "").split(", "))
+    differing = [name for name, claim in held.items() if now.get(name) != claim]
+    added = sorted(set(now) - set(held) - left_out)
+    if _LEFT_OUT in before and not differing and not added and before["content_hash"] != repeated.attrs["content_hash"]:
+        differing = ["series that it has left out"]
     code = _code(path, before)
     if not differing:
         which = f"in all its contents; new since then: {_listed(added)}" if added else _short(repeated)
