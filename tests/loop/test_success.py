@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics, accumulators, for_people, meanings, output_groups, results
-from undertow.analysis.success import judged
+from undertow.analysis.success import criterion_of, judged
 from undertow.campaign.task import NOT_JUDGED, run_trials
 from undertow.controllers.pid import pid
 from undertow.core.metric import Metric
@@ -79,6 +79,17 @@ def test_outputs_are_grouped_by_unit(units, groups):
 
 def test_tables_show_degrees():
     assert for_people(np.pi / 2, "rad") == (90.0, "deg") and for_people(2.0, "m") == (2.0, "m")
+
+
+def test_a_bang_bang_run_is_no_success_by_default():
+    known = KNOWN | {"saturated_fraction": Metric("", "")}
+    criterion = criterion_of(None, known)
+    steady = {"position_rms": 0.01, "attitude_rms": 0.01, "saturated_fraction": 0.78}
+    verdict = judged(criterion, steady)
+    assert verdict.sentence(known) == "tracking: not within saturated_fraction 0.25 (is 0.78)"
+    assert judged(criterion, steady | {"saturated_fraction": 0.125}).within  # one of eight thrusters at its limit
+    assert judged(criterion_of({"position_rms": 0.05}, known), steady).within
+    assert criterion_of(None, {"saturated_fraction": Metric("", "")}) == {}
 
 
 def test_the_judgement_and_its_words():

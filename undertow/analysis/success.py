@@ -10,6 +10,8 @@ from undertow.core.metric import Metric
 
 # Of tracking, in the steady window, where a scenario has no criterion of its own: 5 cm, and 0.05 rad (2.9 degrees).
 DEFAULT = {"position_rms": 0.05, "attitude_rms": 0.05}  # m, rad
+# A law that drives its inputs from limit to limit may track well for a while, but is no success on a vehicle.
+SATURATED = {"saturated_fraction": 0.25}
 
 
 class Success(NamedTuple):
@@ -47,7 +49,8 @@ def criterion_of(given: Mapping[str, float] | None, known: Mapping[str, Metric])
         BadInput: a metric that this plant does not have.
     """
     if given is None:
-        return {name: most for name, most in DEFAULT.items() if name in known}
+        tracking = {name: most for name, most in DEFAULT.items() if name in known}
+        return tracking | SATURATED if tracking else {}
     for name in given:
         if name not in known:
             must = "be a metric of this plant"

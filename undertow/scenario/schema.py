@@ -308,8 +308,8 @@ class Scenario(Strict):
     )
     success: dict[str, float] | None = Field(
         None,
-        description="metric -> what it must stay below in the steady window; default: position_rms 0.05 m and "
-        "attitude_rms 0.05 rad",
+        description="metric -> what it must stay below in the steady window; default: position_rms 0.05 m, "
+        "attitude_rms 0.05 rad and saturated_fraction 0.25",
     )
     requirements: dict[str, RunRequirement] = Field(
         default_factory=dict, description="what every run must keep: name -> a bound of a metric, or a temporal formula"
