@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.contracts import AbstractReference
 from undertow.core.errors import Advice, advice
 from undertow.disturbances.adding import Together
@@ -29,6 +30,7 @@ _SPARE = 1.05  # a speed is too large from this multiple of the top speed on
 _JUMP = 1.0  # m from the vehicle; a path that begins farther away begins with an error of this size
 _FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
 _DIRECTIONS = 2000
+_EASY, _LOOKS = 0.4, 41  # a motion through the water that is slower than this share of the top speed; instants
 _AT_REST = 1e-3  # m/s
 _SHARES = 101  # of a current, tried one after the other
 _WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
@@ -240,6 +242,20 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
         yield advice("reference", f"{says}: {at_limits}", hint)
     else:
         yield from _begins_elsewhere(desired)
+        yield from _too_demanding(loop, plant, duration, flow, (speed + drift) / top)
+
+
+def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow: np.ndarray, effort: float):
+    """A motion that takes more than the thrusters have, in the current; `effort` is its speed over the top speed."""
+    if effort < _EASY:
+        return
+    reserve = reference_reserve(plant.model(), loop.reference, duration, flow, samples=_LOOKS)
+    if reserve.share < 1:
+        says = (
+            f"the thrusters have {100 * reserve.share:.0f} % of what `reference` takes in this current at "
+            f"{reserve.time:.3g} s: the vehicle falls behind"
+        )
+        yield advice("reference", says, "Make it slower")
 
 
 def _begins_elsewhere(desired: Motion):
