@@ -60,14 +60,21 @@ class Certifier:
         self._plants = [_plant(trials, i) for i in once]
         pairs = zip(self._plants, once, strict=True)
         self._points = [self._operating_points(plant, trials.keys[i], first) for plant, i in pairs]
+        self._first = [
+            margins.equilibria(
+                training_loop.with_parts(plant, first), training_loop.settings.dt, self._position, points
+            )
+            for plant, points in zip(self._plants, self._points, strict=True)
+        ]
 
     def __call__(self, law: AbstractController) -> Certificate:
         """Certificate of a controller."""
         dt = self._training_loop.settings.dt
         radii: list[float] = []
         variants: list[str] = []
-        for name, plant, points in zip(self._variants, self._plants, self._points, strict=True):
-            found = margins.certify(self._training_loop.with_parts(plant, law), dt, self._position, points)
+        columns = zip(self._variants, self._plants, self._points, self._first, strict=True)
+        for name, plant, points, near in columns:
+            found = margins.certify(self._training_loop.with_parts(plant, law), dt, self._position, points, near)
             radii += [radius if np.isfinite(radius) else float("inf") for radius in found]
             variants += [name] * len(found)
         return Certificate(tuple(radii), tuple(variants))

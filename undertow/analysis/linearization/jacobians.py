@@ -6,7 +6,7 @@ gets the same.
 """
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -20,6 +20,8 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Load, Target, Water, known_acceleration
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
+
+Part = TypeVar("Part")
 
 # Arguments of `Parts.values`, in this order; and which signals it gives, as far as the law has them.
 INPUTS = ("plant", "law", "u", "load", "noise")
@@ -50,7 +52,7 @@ class Parts(NamedTuple):
         target: constant reference.
         plant_state, law_state: vectors back into the states of plant and law.
         sizes: length of each of `INPUTS`.
-        flow: of the water; None for none.
+        flow: of the water; None for a plant that is no vehicle.
     """
 
     loop: ClosedLoop
@@ -105,6 +107,7 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
         loop: the five roles.
         position: reference, m and rad.
         flow: velocity of the water past the vehicle, m/s, world axes; its forces change as the vehicle turns and moves.
+            None for water at rest, which takes the same compiled program.
     """
     law = theory_of(loop.controller).at_rest
     loop = loop if law is None else dataclasses.replace(loop, controller=law)
@@ -112,7 +115,7 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
-    x, z, found = _at_rest(loop, target, None if flow is None else as_array(flow))
+    x, z, found = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
     flat_x, plant_state = ravel_pytree(x)
     flat_z, law_state = ravel_pytree(z)
     axes, inputs = position.shape[0], loop.plant.inputs()
@@ -122,11 +125,11 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
 
 
 @eqx.filter_jit
-def _at_rest(loop: ClosedLoop, target: Target, velocity: Array | None) -> tuple[PyTree, PyTree, Flow | None]:
+def _at_rest(loop: ClosedLoop, target: Target, velocity: Array) -> tuple[PyTree, PyTree, Flow | None]:
     plant, zero = loop.plant, jnp.zeros(())
     x, unloaded = plant.initial_state(target.position, target.velocity), plant.no_load()
     z = loop.controller.init(plant.output(zero, x), target)
-    if velocity is None:
+    if plant.pose(x) is None:
         return x, z, None
     pushed = lambda load: plant.acceleration(zero, x, jnp.zeros(plant.inputs()), load)
     return x, z, Flow(velocity, pushed(_moved(unloaded, velocity)) - pushed(unloaded))
@@ -137,11 +140,14 @@ def _moved(unloaded: Load, velocity: Array) -> Load:
     return unloaded._replace(water=Water(velocity, jnp.zeros_like(velocity)))
 
 
-def without(loop: ClosedLoop, parameters: tuple[str, ...]) -> ClosedLoop:
-    """Same loop with every parameter of these names at zero: dead zones and resolutions have no slope."""
+def without(part: Part, parameters: tuple[str, ...]) -> Part:
+    """Same loop, or part of one, with every parameter of these names at zero.
+
+    Dead zones and resolutions have no slope.
+    """
     named = lambda realization: getattr(realization[-1], "name", "") in parameters
     return jax.tree_util.tree_map_with_path(
-        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, loop
+        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, part
     )
 
 

@@ -1,6 +1,6 @@
 """Robustness margins of the linearised loop: sampling, delay, lag and gain; its poles and its response to noise."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -109,19 +109,33 @@ def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray
     return small.signals[signal] @ inner + loop.direct[signal]["load"]
 
 
-def certify(loop: ClosedLoop, dt: float, position: Any, points: Iterable[OperatingConditions]) -> list[float]:
-    """Spectral radius of the closed loop at rest at each of some operating points; below 1 each is stable.
-
-    Loads that no input holds are left out; where none is held, the radius is infinite.
+def equilibria(
+    loop: ClosedLoop, dt: float, position: Any, points: Sequence[OperatingConditions], near: Sequence[Equilibrium] = ()
+) -> list[Equilibrium]:
+    """The closed loop at rest at each of some operating points, found or not.
 
     Args:
         loop: the five roles.
         dt: sampling time, s.
         position: of the reference, m and rad.
         points: what acts at each.
+        near: with another law of the same kind; see `equilibrium`.
     """
-    found = [at for one in points if (at := equilibrium(loop, dt, position, one.load, one.flow)).found]
-    return [spectral_radius(closed(at, dt)) for at in found] or [float("inf")]
+    begin = near or [None] * len(points)
+    return [equilibrium(loop, dt, position, one.load, one.flow, at) for one, at in zip(points, begin, strict=True)]
+
+
+def certify(
+    loop: ClosedLoop, dt: float, position: Any, points: Sequence[OperatingConditions], near: Sequence[Equilibrium] = ()
+) -> list[float]:
+    """Spectral radius of the closed loop at rest at each of some operating points; below 1 each is stable.
+
+    Loads that no input holds are left out; where none is held, the radius is infinite.
+
+    For the arguments see `equilibria`.
+    """
+    found = equilibria(loop, dt, position, points, near)
+    return [spectral_radius(closed(at, dt)) for at in found if at.found] or [float("inf")]
 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:
