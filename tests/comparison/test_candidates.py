@@ -95,7 +95,7 @@ def test_how_gains_came_about():
 def test_tuned_gains_are_those_of_the_file_beside(tmp_path):
     """Changed by hand since, they are not."""
     costs = {"given": {"held_out_cost": 3.0}, "tuned": {"held_out_cost": 1.5, "options": {"frequency": [2.5]}}}
-    data = {"method": "gradient", "evaluations": 40, "elapsed": 12.3, "finished": True, "gains": costs}
+    data = {"method": "gradient", "evaluations": 40, "elapsed": 12.3, "finished": True, "gains": costs, "kept": "tuned"}
     (tmp_path / "tuning.json").write_text(json.dumps(data))
     found = note({"kind": "pid", "frequency": [2.5]}, pid, tmp_path / "tuned.yaml")
     assert found.tuned
@@ -105,5 +105,9 @@ def test_tuned_gains_are_those_of_the_file_beside(tmp_path):
     )
     changed = note({"kind": "pid", "frequency": [2.6]}, pid, tmp_path / "tuned.yaml")
     assert not changed.tuned and "gains given in" in changed.sentence
+    costs["given"]["options"] = {"frequency": [2.0]}
+    (tmp_path / "tuning.json").write_text(json.dumps(data | {"kept": "given"}))
+    kept = note({"kind": "pid", "frequency": [2.0]}, pid, tmp_path / "tuned.yaml")
+    assert kept.tuned and "held-out cost 3, the gains before, which no others" in kept.sentence
     (tmp_path / "tuning.json").write_text("{")
     assert not note({"kind": "pid", "frequency": [2.5]}, pid, tmp_path / "tuned.yaml").tuned

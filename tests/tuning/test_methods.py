@@ -1,6 +1,7 @@
 """The methods on costs whose minimum is known; certificates and journals."""
 
 import json
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -118,18 +119,70 @@ def test_budget_ends_it(tmp_path):
             asked.costs(START[None])
 
 
+class Clock:
+    """A clock that somebody sets."""
+
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+class Compiling(Future):
+    """Something that takes some time on a clock and cannot be interrupted."""
+
+    def __init__(self, clock, seconds):
+        super().__init__()
+        self.clock, self.ends = clock, clock.now + seconds
+
+    def result(self, timeout=None):
+        assert timeout is not None, "would wait for ever"
+        self.clock.now += max(0.0, min(timeout, self.ends - self.clock.now))
+        if self.clock.now >= self.ends and not self.done():
+            self.set_result("program")
+        return super().result(timeout=0)
+
+
+def test_what_cannot_be_interrupted_is_left_when_the_budget_ends(tmp_path):
+    """Compiling takes 1,000 s of a budget of 60 s; every few seconds there is a word."""
+    clock, said = Clock(), []
+    checkpoint = Checkpoint(tmp_path / "j", "x", 60.0, False, started=95.0, clock=clock)
+    with pytest.raises(OutOfTime):
+        checkpoint.wait(Compiling(clock, 1000.0), "compiling", said.append)
+    assert clock.now == pytest.approx(155.0)  # 60 s after the start of the command
+    assert said[:2] == ["compiling: 15 s so far", "compiling: 25 s so far"] and len(said) == 6
+
+
+def test_what_ends_within_the_budget_is_used(tmp_path):
+    clock = Clock()
+    checkpoint = Checkpoint(tmp_path / "j", "x", 60.0, False, clock=clock)
+    assert checkpoint.wait(Compiling(clock, 35.0), "compiling", lambda words: None) == "program"
+    assert clock.now == 135.0
+    clock.now += 100.0
+    late: Future[str] = Future()
+    late.set_result("program")
+    assert checkpoint.wait(late, "compiling", lambda words: None) == "program"  # it is there
+
+
+def test_a_failure_while_waiting_is_told(tmp_path):
+    failed: Future[str] = Future()
+    failed.set_exception(TimeoutError("of its own"))
+    with pytest.raises(TimeoutError, match="of its own"):
+        Checkpoint(tmp_path / "j", "x", 60.0, False, clock=Clock()).wait(failed, "compiling", lambda words: None)
+
+
 def test_budget_in_evaluations(tmp_path):
-    """Points that were evaluated before take none, of a batch only as many as are left; a gradient takes one each."""
+    """Points that were evaluated before take none, of a batch only as many as are left; a gradient takes two each."""
     bowl = Bowl()
-    asked = Objective(bowl, stable, Checkpoint(tmp_path / "j", "bowl", 1e9, False), lambda best, count: None, most=8)
+    asked = Objective(bowl, stable, Checkpoint(tmp_path / "j", "bowl", 1e9, False), lambda best, count: None, most=11)
     points = np.random.default_rng(0).random((6, 3))
     first = asked.costs(points[:3])
     np.testing.assert_array_equal(asked.costs(points[[2, 0, 2]]), first[[2, 0, 2]])
     assert asked.evaluations == 3
     asked.slope(points[0])
-    assert asked.evaluations == 6
+    assert asked.evaluations == 9
     found = asked.costs(points[2:])
-    assert asked.evaluations == 8 and np.isfinite(found[:3]).all() and np.isinf(found[3])
+    assert asked.evaluations == 11 and np.isfinite(found[:3]).all() and np.isinf(found[3])
     np.testing.assert_array_equal(asked.costs(points[:5]), np.append(first, found[1:3]))  # nothing new
     for ask in (lambda: asked.costs(points[5:]), lambda: asked.slope(points[0])):
         with pytest.raises(OutOfTime):

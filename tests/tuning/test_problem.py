@@ -1,17 +1,19 @@
 """What is tuned, on what, and its slope."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from messages import named
 
-from undertow.analysis.linearization.jacobians import without
+from undertow.analysis.linearization.jacobians import Parts, without
 from undertow.controllers import pid
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.disturbances import current, sinusoid, wrench
 from undertow.disturbances.adding import Together
+from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation import observer
 from undertow.plants import hybrid_vehicle
@@ -20,6 +22,7 @@ from undertow.scenario.reading import from_data
 from undertow.sensors import depth, dvl, imu
 from undertow.thrusters import t200
 from undertow.tuning.checkpoint import Checkpoint
+from undertow.tuning.cost import shares
 from undertow.tuning.evaluator import Evaluation, Scaled
 from undertow.tuning.objective import Objective
 from undertow.tuning.problem import problem
@@ -46,16 +49,45 @@ def axis():
     """The problem, and its programs."""
     found = problem(from_data(AXIS))
     make = lambda point: found.law(found.options(point))
-    return found, Evaluation(found.training_loop, make, make(found.start), found.train)
+    examples = [make(found.start), make(np.zeros(2)), make(np.ones(2))]
+    return found, Evaluation(found.training_loop, make, examples, (found.train, found.held_out))
 
 
 @pytest.mark.slow
-def test_slope_equals_finite_differences(axis):
+def test_slope_by_differences_is_the_derivative_through_the_run(axis):
+    """Against forward differentiation of the same runs by XLA."""
+    found, evaluation = axis
+    plan, training_loop, trials = found.training_loop.plan(), found.training_loop, found.train
+
+    def cost(point, trial):
+        plant = jax.tree.map(lambda leaf: leaf[trial] if eqx.is_array(leaf) else leaf, trials.plants)
+        law = found.law(found.options(point))
+        run = training_loop.run(law, plant, trials.keys[trial], trials.sizes[trial])
+        options = {"duration": plan.steps * plan.dt, "dt": plan.dt, "record_every": 0}
+        outcome = sampled.simulate(run.loop, key=run.key, accumulators=run.accumulators, **options)
+        parts = shares(outcome.accumulated[0], outcome.ended, training_loop.duration)
+        return parts.cost(training_loop.weights)
+
+    point = np.array([0.5, 0.4])
+    exact = np.mean([jax.jacfwd(cost)(jnp.asarray(point), trial) for trial in range(trials.number)], axis=0)
+    np.testing.assert_allclose(evaluation.slope(point), exact, rtol=1e-3)
+
+
+def test_slope_at_a_bound_stays_inside(axis, monkeypatch):
     _, evaluation = axis
-    point, step = np.array([0.5, 0.4]), 1e-5
-    moved = np.concatenate([point + step * np.eye(2), point - step * np.eye(2)])
-    ahead, behind = np.split(evaluation.costs(moved), 2)
-    np.testing.assert_allclose(evaluation.slope(point), (ahead - behind) / (2 * step), rtol=1e-5)
+    monkeypatch.setattr(evaluation, "costs", lambda points: 3 * points[:, 0] + points[:, 1] + (points > 1).sum(axis=1))
+    np.testing.assert_allclose(evaluation.slope(np.array([1.0, 0.0])), [3.0, 1.0])
+
+
+def test_a_constant_that_changes_is_none(axis):
+    """With one example all numbers of the law are constants: for another law the program is compiled anew."""
+    found, evaluation = axis
+    make = lambda point: found.law(found.options(point))
+    fixed = Evaluation(found.training_loop, make, [make(found.start)], (found.train,))
+    points = np.array([found.start, [0.2, 0.9]])
+    expected = evaluation.costs(points)
+    assert abs(expected[1] / expected[0] - 1) > 1e-2
+    np.testing.assert_allclose([*fixed.costs(points[:1]), *fixed.costs(points[1:])], expected, rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -85,6 +117,19 @@ def test_the_same_number_whatever_the_batch(axis):
     alone = evaluation.total(evaluation.shares(laws[4:5], found.held_out.part(np.array([3]))))
     assert together.shape == (7, 3)
     np.testing.assert_allclose(together[4, 2], alone[0, 0], rtol=1e-12)
+
+
+def test_certificate_begins_where_the_first_law_rests(axis, monkeypatch):
+    """The same radii as from afar, with a fraction of the Jacobians."""
+    found, evaluation = axis
+    certifier = Certifier(found.training_loop, found.train, evaluation.law(found.start))
+    counted, differentiate = [], Parts.differentiate
+    monkeypatch.setattr(Parts, "differentiate", lambda *given: counted.append(1) or differentiate(*given))
+    law = evaluation.law(np.array([0.9, 0.1]))
+    radii, near = certifier(law).radii, len(counted)
+    monkeypatch.setattr(certifier, "_first", [[None] * len(points) for points in certifier._points])
+    np.testing.assert_allclose(radii, certifier(law).radii, rtol=1e-9)
+    assert near < 0.7 * (len(counted) - near)
 
 
 def test_seeds_are_held_out(axis):

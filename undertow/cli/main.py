@@ -5,6 +5,7 @@ import os
 import platform
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -170,13 +171,12 @@ def tune(
         str,
         typer.Option(
             metavar="METHOD",
-            help="gradient (quasi-Newton); search (differential evolution, for costs that are not smooth); or "
-            "evolution (mutation and selection around the best gains, for few evaluations).",
+            help="search (differential evolution); gradient (quasi-Newton); or evolution (mutation and selection "
+            "around the best gains, for few evaluations).",
         ),
-    ] = "gradient",
+    ] = "search",
     budget: Annotated[
-        float,
-        typer.Option(metavar="SECONDS", help="Time budget. Compiling and the initial design are always completed."),
+        float, typer.Option(metavar="SECONDS", help="Time budget of the whole command, compiling included.")
     ] = 240.0,
     resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted tuning.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")] = False,
@@ -186,13 +186,14 @@ def tune(
     """Tune the gains of a controller.
 
     The command simulates the closed loop with many candidate gains on a training set of seeds, disturbance sizes and
-    published parameter sets, and evaluates the best on held-out runs. It accepts only gains with a certificate of
-    stability. It writes tuned.yaml (a scenario with the gains), tuning.json and figures/. The section `tune` of the
-    scenario has the options.
+    published parameter sets, and evaluates the best on held-out runs, where the given gains are kept unless these are
+    better. It accepts only gains with a certificate of stability. It writes tuned.yaml (a scenario with the gains),
+    tuning.json and figures/. The section `tune` of the scenario has the options.
     """
+    started = time.perf_counter()
     from undertow.cli.tune import tune_scenario
 
-    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code, pdf)
+    return tune_scenario(scenario, out, method, budget, resume, overwrite, allow_code, pdf, started)
 
 
 @app.command()

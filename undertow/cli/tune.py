@@ -20,6 +20,7 @@ from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
+from undertow.tuning.cost import times_other
 from undertow.tuning.objective import Step
 from undertow.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
@@ -36,8 +37,12 @@ def tune_scenario(
     overwrite: bool,
     allow_code: bool,
     pdf: str | None,
+    started: float,
 ) -> int:
-    """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code.
+
+    The budget begins at `started`, of `time.perf_counter()`.
+    """
     check_pdf(pdf)
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
@@ -49,8 +54,8 @@ def tune_scenario(
         checkpoint_in(folder, _CHECKPOINT, "tune") as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
-            run = lambda: tune(text, checkpoint, method=method, budget=budget, resume=resume, say=say, watch=watch)
-            found = interruptible(run)
+            options: dict[str, Any] = {"method": method, "budget": budget, "started": started, "resume": resume}
+            found = interruptible(lambda: tune(text, checkpoint, **options, say=say, watch=watch))
         data = as_data(found)
         (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
@@ -99,16 +104,25 @@ def _table(found: Tuned) -> Table:
 
 def _sentences(found: Tuned) -> list[str]:
     given, *_, tuned = found.evaluated
+    kept = found.kept
     options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
     ending = "the search has converged" if found.finished else "the time budget is used up"
     if found.searched == 0:
         ending += ", and only the initial design (the given gains and points spread over their ranges) was evaluated"
-    return [
-        f"Tuned: {options}",
-        f"The held-out cost is {given.held_out_cost / tuned.held_out_cost:.3g} times smaller than with the given "
-        f"gains. {found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} "
-        f"s; {ending}.",
-    ]
+    if kept is given:
+        said = (
+            f"The given gains are kept: on held-out runs their cost is {given.held_out_cost:.4g}, and "
+            f"{tuned.held_out_cost:.4g} with the best that were found ({options})."
+        )
+    else:
+        uncertified = "" if given.certificate.holds else ", which have no certificate of stability"
+        said = (
+            f"Tuned: {options}\n"
+            f"The held-out cost is {times_other(tuned.held_out_cost, given.held_out_cost)} with the given gains"
+            f"{uncertified}."
+        )
+    spent = f"{found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} s"
+    return [f"{said} {spent}; {ending}."]
 
 
 def _short(value: Any) -> str:

@@ -10,6 +10,7 @@ from undertow.campaign.labels import words
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController
 from undertow.scenario import factory
+from undertow.tuning.cost import times_other
 from undertow.tuning.tunable_parameters import law_of
 
 _RULE = "gains from the rule of `controllers/bandwidths.py`"
@@ -81,16 +82,17 @@ def _searched(part: Mapping[str, Any], source: Path | None) -> TuningNote | None
     """What tuning.json beside a scenario says, if its gains are those of the controller; None otherwise."""
     try:
         found = json.loads((source or Path()).with_name("tuning.json").read_text(encoding="utf-8"))
-        given, tuned = found["gains"]["given"], found["gains"]["tuned"]
-        if any(part.get(name) != value for name, value in tuned["options"].items()):
+        kept = found["gains"][found["kept"]]
+        if any(part.get(name) != value for name, value in kept["options"].items()):
             return None
-        ratio = given["held_out_cost"] / tuned["held_out_cost"]
+        cost, before = kept["held_out_cost"], found["gains"]["given"]["held_out_cost"]
+        relation = f"{times_other(cost, before)} with the gains before"
+        if found["kept"] == "given":
+            relation = "the gains before, which no others that were found are better than"
         said = f"{found['evaluations']} evaluations in {found['elapsed']:.0f} s"
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError):
         return None  # of another program, or none
     ending = "" if found.get("finished") else ", stopped by its time budget"
     return TuningNote(
-        f"tuned by `undertow tune` ({found['method']}, {said}{ending}; held-out cost {tuned['held_out_cost']:.3g}, "
-        f"{ratio:.3g} times smaller than with the gains before)",
-        True,
+        f"tuned by `undertow tune` ({found['method']}, {said}{ending}; held-out cost {cost:.3g}, {relation})", True
     )

@@ -4,16 +4,22 @@ The methods are deterministic functions of the evaluations, so a tuning is resum
 evaluations come from the checkpoint as far as it goes. The result is the same as without the interruption, bit for bit.
 """
 
+import contextlib
 import json
 import os
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from undertow.core.errors import BadInput
+
+Result = TypeVar("Result")
+
+_BETWEEN_WORDS = 10.0  # s, between two lines about something that takes long
 
 _KEYS = ("what", "at", "answer", "elapsed")  # of an evaluation
 
@@ -30,18 +36,26 @@ class Checkpoint:
         about: identifies the tuning; an earlier checkpoint must have the same.
         budget: s, of all sessions together.
         resume: whether to continue an earlier checkpoint.
-        started: `time.perf_counter()` of the start, so that preparations count.
+        started: `clock()` of the start, so that preparations count; None for now.
         what: is resumed, for messages.
+        clock: gives the time, s.
 
     Raises:
         BadInput: there is nothing to resume, or another tuning; or there is an unfinished tuning without `resume`.
     """
 
     def __init__(
-        self, path: Path, about: str, budget: float, resume: bool, started: float | None = None, what: str = "tuning"
+        self,
+        path: Path,
+        about: str,
+        budget: float,
+        resume: bool,
+        started: float | None = None,
+        what: str = "tuning",
+        clock: Callable[[], float] = time.perf_counter,
     ):
-        self._path, self._budget = path, budget
-        self._started = time.perf_counter() if started is None else started
+        self._path, self._budget, self._clock = path, budget, clock
+        self._started = clock() if started is None else started
         self._known = _read(path, about, resume, what)
         self._asked, self._spent = 0, self._known[-1]["elapsed"] if self._known else 0.0
         self._longest: dict[str, float] = {}
@@ -53,12 +67,32 @@ class Checkpoint:
         """Time spent in all sessions, s."""
         if self._asked < len(self._known):
             return self._known[self._asked]["elapsed"]
-        return self._spent + time.perf_counter() - self._started
+        return self._spent + self._clock() - self._started
 
     @property
     def is_over(self) -> bool:
         """Whether the budget is used up."""
         return self.elapsed > self._budget
+
+    def wait(self, work: Future[Result], what: str, say: Callable[[str], None]) -> Result:
+        """The result of something that cannot be interrupted, such as compiling, in another thread.
+
+        Args:
+            work: what is waited for; it goes on alone where the budget ends first.
+            what: its name.
+            say: called with the name and the time so far, every few seconds.
+
+        Raises:
+            OutOfTime: the budget is used up before it is done.
+        """
+        while not work.done() and (left := self._budget - self.elapsed) > 0:
+            with contextlib.suppress(TimeoutError):
+                return work.result(timeout=min(_BETWEEN_WORDS, left))
+            if not work.done():
+                say(f"{what}: {self.elapsed:.0f} s so far")
+        if not work.done():
+            raise OutOfTime
+        return work.result()
 
     def ask(self, what: str, at: np.ndarray, compute: Callable[[], Any], must: bool = False) -> Any:
         """An evaluation, from the checkpoint or computed and written.

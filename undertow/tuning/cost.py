@@ -86,6 +86,11 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))
 
 
+def times_other(cost: float, other: float) -> str:
+    """A cost as a multiple of another one, in words that say which is smaller."""
+    return f"{other / cost:.3g} times smaller than" if cost < other else f"{cost / other:.3g} times larger than"
+
+
 def _bounded(x, most: float):
     """Approximately x while it is small, and below `most`."""
     return x / (1 + x / most)

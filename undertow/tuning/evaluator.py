@@ -1,6 +1,6 @@
-"""Evaluation of gains: many gains on many trials at once, and the gradient of their cost by forward differentiation."""
+"""Evaluation of gains: many gains on many trials at once, and the gradient of their cost by differences."""
 
-import concurrent.futures
+import contextlib
 import dataclasses
 import threading
 from collections.abc import Callable, Sequence
@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.analysis.linearization.jacobians import without
 from undertow.core import runtime
 from undertow.core.contracts import (
     AbstractController,
@@ -24,11 +23,12 @@ from undertow.core.contracts import (
     Water,
 )
 from undertow.core.param import Param, param
-from undertow.loop import sampled
+from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.simd_batch import Plan, Run
 from undertow.scenario.schema import Loop, Weights
 from undertow.tuning.cost import CostSums, Shares, shares
-from undertow.tuning.training_runs import Trials
+from undertow.tuning.training_runs import Trials, joined
 
 
 class Scaled(AbstractDisturbance):
@@ -55,12 +55,12 @@ class Scaled(AbstractDisturbance):
         return self.inner.jumps(duration)
 
 
-# Compiling dominates a short tuning; a lower optimisation level halves its time at the same speed.
-_COMPILER = {"xla_backend_optimization_level": "1"}
-
 AT_ONCE = 6  # gains per batch
-_STEPS = ("resolution", "dead_zone")  # parameters that make a smooth function piecewise constant
 _WORKERS = 2
+
+# Of a variable, for the central differences of the cost; the box is 1 wide. Quantised readings and dead zones make
+# small steps in the cost, which a shorter difference would take for a slope.
+_DIFFERENCE = 1e-3
 
 
 class TrainingLoop(NamedTuple):
@@ -78,53 +78,49 @@ class TrainingLoop(NamedTuple):
         loop = self.loop
         return dataclasses.replace(loop, plant=plant, controller=law, disturbance=Scaled(loop.disturbance, size))
 
-    def run(
-        self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""], smooth: bool = False
-    ) -> Shares:
-        """One run; `smooth` leaves out steps, for a meaningful gradient."""
+    def run(self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""]) -> Run:
+        """One run."""
         loop = self.with_parts(plant, law, size)
-        # The derivative of a quantised sensor is zero, as if it were disconnected.
-        loop = without(loop, _STEPS) if smooth else loop
-        outcome = sampled.simulate(
-            loop,
-            duration=self.duration,
-            dt=self.settings.dt,
-            key=key,
-            position=self.start[0],
-            velocity=self.start[1],
-            record_every=0,
-            accumulators=(self.sums,),
-            method=self.settings.method,
-            substeps=self.settings.substeps,
-        )
-        return shares(outcome.accumulated[0], outcome.ended, self.duration)
+        return Run(loop, (self.sums,), loop.outputs_at_start(*self.start), key)
+
+    def plan(self) -> Plan:
+        """Steps and integration of every run; nothing is recorded."""
+        settings = self.settings
+        steps = round(self.duration / settings.dt)
+        return Plan(steps, settings.dt, 0, (), settings.method, settings.substeps)
 
 
 class Evaluation:
-    """Compiled programs for one training loop and one number of trials per batch.
+    """The program of the runs of one training loop, made when it is first needed.
+
+    It is a SIMD batch, or one by XLA where that has no rule for a part. Numbers that are equal in all examples are
+    constants of a SIMD batch, which compiles sooner with them; where another one differs, it is compiled anew.
 
     Args:
         training_loop: what stays the same.
         make: point -> controller; may be traced.
-        like: a controller of that kind, at any point.
-        trials: training runs; held-out runs use batches of the same size, so that nothing is compiled twice.
+        examples: controllers of that kind that differ in all numbers that are tuned.
+        trials: sets of runs on which gains are evaluated, the training runs first.
     """
 
     def __init__(
         self,
         training_loop: TrainingLoop,
         make: Callable[[Any], AbstractController],
-        like: AbstractController,
-        trials: Trials,
+        examples: Sequence[AbstractController],
+        trials: Sequence[Trials],
     ):
-        self._training_loop, self._training = training_loop, trials
+        self._training_loop, self._training, self._plan = training_loop, trials[0], training_loop.plan()
         self._pool, self._lock = runtime.workers(_WORKERS), threading.Lock()
-        self._compilers = runtime.workers(_WORKERS)
-        self._programs: dict[str, concurrent.futures.Future[Any]] = {}
-        self._plant_rest = eqx.filter(trials.plants, eqx.is_array, inverse=True)
-        self._law_numbers, self._law_rest = eqx.partition(like, eqx.is_array)
-        self._numbers_at = lambda point: eqx.filter(make(point), eqx.is_array)
-        self._make = jax.jit(self._numbers_at)
+        self._law_numbers, self._law_rest = eqx.partition(examples[0], eqx.is_array)
+        self._make = jax.jit(lambda point: eqx.filter(make(point), eqx.is_array))
+        first = self._training.part(np.array([0]))
+        plant = jax.tree.map(lambda leaf: leaf[0] if eqx.is_array(leaf) else leaf, first.plants)
+        self._first = training_loop.run(examples[0], plant, first.keys[0], first.sizes[0])
+        self._tree = jax.tree.structure(eqx.filter(self._first, eqx.is_array))
+        columns = jax.tree.leaves(self._stacked(examples, joined(trials)))
+        self._constants = [column[0] if (column == column[0]).all() else None for column in columns]
+        self._program: simd_batch.BatchRunner | vmap_batch.BatchRunner | None = None
 
     def law(self, point: np.ndarray) -> AbstractController:
         """The controller of a point, unchecked."""
@@ -135,70 +131,76 @@ class Evaluation:
         return self.total(self.shares([self.law(point) for point in points], self._training)).mean(axis=1)
 
     def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
-        """Parts of the cost, arrays (laws, trials): in batches of one shape, on both cores."""
-        numbers = [self._numbers(law) for law in laws]
-        height, width = len(numbers), self._training.number
-        rows = [(numbers + numbers[:1] * AT_ONCE)[i : i + AT_ONCE] for i in range(0, height, AT_ONCE)]
-        columns = [[min(i + j, trials.number - 1) for j in range(width)] for i in range(0, trials.number, width)]
-        stacked = [jax.tree.map(lambda *each: jnp.stack(each), *row) for row in rows]
-        batches = [(laws_of_row, trials.part(np.array(column))) for laws_of_row in stacked for column in columns]
-        done = list(self._pool.map(lambda batch: self._batch(*batch), batches))
-        lines = [done[i : i + len(columns)] for i in range(0, len(done), len(columns))]
-        blocks = [jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=1), *line) for line in lines]
-        whole = jax.tree.map(lambda *pieces: np.concatenate(pieces, axis=0), *blocks)
-        return jax.tree.map(lambda part: part[:height, : trials.number], whole)
+        """Parts of the cost, arrays (laws, trials), on both cores."""
+        columns = jax.tree.leaves(self._stacked(laws, trials))
+        program, runs = self._program_of(columns), len(laws) * trials.number
+        pieces = [slice(begin, begin + self._width) for begin in range(0, runs, self._width)]
+        parts = self._pool.map(lambda piece: self._some(program, [column[piece] for column in columns]), pieces)
+        whole = jax.tree.map(lambda *several: np.concatenate(several), *parts)
+        return jax.tree.map(lambda part: part.reshape(len(laws), trials.number), whole)
+
+    def compile(self) -> None:
+        """Make the program now."""
+        with self._lock:
+            if self._program is None:
+                self._program = self._compiled()
 
     def total(self, parts: Shares) -> np.ndarray:
         """Cost of every run."""
         return np.asarray(parts.cost(self._training_loop.weights))
 
     def slope(self, point: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Gradient of the mean training cost, by forward differentiation; runs without a finite one count as zero."""
-        arguments = self._of_slope(point)
-        each = np.asarray(self._compiled("slope", self._slopes, *arguments)(*arguments))
-        return np.where(np.isfinite(each), each, 0.0).mean(axis=1)
+        """Gradient of the mean training cost by central differences, one-sided at a bound."""
+        steps = _DIFFERENCE * np.eye(len(point))
+        ahead, behind = (np.clip(point + side * steps, 0.0, 1.0) for side in (1.0, -1.0))
+        costs = self.costs(np.concatenate([ahead, behind]))
+        return (costs[: len(point)] - costs[len(point) :]) / np.diagonal(ahead - behind)
 
-    def precompile_slope(self, point: Float[np.ndarray, " k"]) -> None:
-        """Start to compile the gradient in the background."""
-        self._compiling("slope", self._slopes, *self._of_slope(point))
+    @property
+    def _width(self) -> int:
+        """Runs that are computed together."""
+        return AT_ONCE * self._training.number
 
-    def _of_slope(self, point: Float[np.ndarray, " k"]) -> tuple[Any, ...]:
-        trials = self._training
-        return jnp.asarray(point), eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes
+    def _some(self, program: simd_batch.BatchRunner | vmap_batch.BatchRunner, columns: list[np.ndarray]) -> Shares:
+        outcome = program.run(jax.tree.unflatten(self._tree, columns))
+        parts = shares(outcome.accumulated[0], jnp.asarray(outcome.ended), self._training_loop.duration)
+        return jax.tree.map(np.asarray, parts)
 
-    def _slopes(self, point, plants, keys, sizes):
-        """Shape (k, trials)."""
-        costs = lambda at: self._over_trials(self._numbers_at(at), plants, keys, sizes, True).cost(
-            self._training_loop.weights
+    def _stacked(self, laws: Sequence[AbstractController], trials: Trials) -> Run:
+        """The numbers of every law on every trial, with a leading axis over these runs."""
+        runs = len(laws) * trials.number
+        of_laws = lambda *leaves: np.repeat(np.stack(leaves), trials.number, axis=0)
+        of_trials = lambda leaf: np.concatenate([np.asarray(leaf)] * len(laws))
+        of_all = lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape))
+        varying = (
+            jax.tree.map(of_trials, eqx.filter(trials.plants, eqx.is_array)),
+            jax.tree.map(of_laws, *(self._numbers(law) for law in laws)),
+            of_trials(trials.sizes),
+            of_trials(trials.keys),
         )
-        along = lambda direction: jax.jvp(costs, (point,), (direction,))[1]
-        return jax.vmap(along)(jnp.eye(point.shape[0]))
-
-    def _over_trials(self, law, plants, keys, sizes, smooth: bool = False) -> Shares:
-        whole = eqx.combine(law, self._law_rest)
-        one = lambda plant, key, size: self._training_loop.run(
-            whole, eqx.combine(plant, self._plant_rest), key, size, smooth
-        )
-        return jax.vmap(one)(plants, keys, sizes)
-
-    def _many(self, laws, plants, keys, sizes) -> Shares:
-        return jax.vmap(lambda law: self._over_trials(law, plants, keys, sizes))(laws)
-
-    def _batch(self, laws, trials: Trials) -> Shares:
-        arguments = (laws, eqx.filter(trials.plants, eqx.is_array), trials.keys, trials.sizes)
-        return jax.tree.map(np.asarray, self._compiled("costs", self._many, *arguments)(*arguments))
+        same = jax.tree.map(of_all, eqx.filter(self._first, eqx.is_array))
+        places = lambda run: (run.loop.plant, run.loop.controller, run.loop.disturbance.size, run.key)
+        return eqx.tree_at(places, same, varying)
 
     def _numbers(self, law: AbstractController) -> Any:
         """Numbers of a controller in the shapes of the tuned ones: one gain for all axes becomes one per axis."""
-        spread = lambda number, like: jnp.broadcast_to(number, like.shape)
+        spread = lambda number, like: np.broadcast_to(np.asarray(number), like.shape)
         return jax.tree.map(spread, eqx.filter(law, eqx.is_array), self._law_numbers)
 
-    def _compiled(self, name: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        return self._compiling(name, function, *arguments).result()
-
-    def _compiling(self, name: str, function: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
-        compiled = lambda: jax.jit(function).lower(*arguments).compile(compiler_options=_COMPILER)  # pyright: ignore[reportArgumentType] - options of XLA
+    def _program_of(self, columns: Sequence[np.ndarray]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+        """The program; a new one where a constant of the present one differs in these runs."""
+        pairs = zip(self._constants, columns, strict=True)
+        constants = [shared if shared is None or (column == shared).all() else None for shared, column in pairs]
         with self._lock:
-            if name not in self._programs:
-                self._programs[name] = self._compilers.submit(compiled)
-            return self._programs[name]
+            others = any(a is not b for a, b in zip(constants, self._constants, strict=True))
+            if self._program is None or others:
+                self._constants = constants
+                self._program = self._compiled()
+            return self._program
+
+    def _compiled(self) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
+        if self._training_loop.settings.backend == "simd":
+            with contextlib.suppress(simd_batch.Unsupported):
+                constant = [shared is not None for shared in self._constants]
+                return simd_batch.BatchRunner(self._first, self._plan, constant)
+        return vmap_batch.BatchRunner(self._first, self._plan, self._width)

@@ -48,7 +48,7 @@ class Objective:
         certify: point -> certificate.
         checkpoint: keeps every evaluation.
         watch: called after every batch.
-        most: budget in evaluations, of which a gradient takes as many as there are parameters; a point that was
+        most: budget in evaluations, of which a gradient takes two for each parameter; a point that was
             evaluated before takes none. None for no such budget.
     """
 
@@ -122,11 +122,12 @@ class Objective:
         Raises:
             OutOfTime: the budget is used up.
         """
-        if self._most is not None:
-            if self.evaluations + len(point) > self._most:
-                raise OutOfTime
-            self.evaluations += len(point)
-        return np.asarray(self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist()))
+        evaluations = self.evaluations + 2 * len(point)
+        if self._most is not None and evaluations > self._most:
+            raise OutOfTime
+        found = self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist())
+        self.evaluations = evaluations
+        return np.asarray(found)
 
     def radius(self, point: np.ndarray) -> float:
         """Largest spectral radius of the loop at a point."""

@@ -89,6 +89,14 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
     )
 
 
+def joined(several: Sequence[Trials]) -> Trials:
+    """All trials of several sets."""
+    numbers = [(eqx.filter(one.plants, eqx.is_array), one.keys, one.sizes) for one in several]
+    arrays, keys, sizes = jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *numbers)
+    plants = eqx.combine(arrays, eqx.filter(several[0].plants, eqx.is_array, inverse=True))
+    return Trials(plants, keys, sizes, tuple(name for one in several for name in one.variants))
+
+
 def parameter_sets(built: Built) -> tuple[str, ...]:
     """Published parameter sets of the scenario's vehicle, its own first; empty where there is only one."""
     vehicle = built.resolved["plant"].get("vehicle")

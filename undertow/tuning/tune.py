@@ -1,13 +1,15 @@
 """Tune the controller of a scenario: certified gains, and their evaluation on held-out runs."""
 
+import contextlib
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from undertow.core import runtime
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput, within
 from undertow.scenario.build import in_its_precision
@@ -55,9 +57,16 @@ class Tuned(NamedTuple):
     searched: int  # points that were evaluated after the initial design
 
     @property
+    def kept(self) -> Evaluated:
+        """The tuned gains where they are better on held-out runs, or the given ones have no certificate; else these."""
+        given, *_, tuned = self.evaluated
+        better = tuned.held_out_cost < given.held_out_cost
+        return tuned if better or not given.certificate.holds else given
+
+    @property
     def scenario(self) -> dict[str, Any]:
-        """The scenario with the tuned gains."""
-        return self.problem.scenario(self.evaluated[-1].options or {})
+        """The scenario with the gains that are kept."""
+        return self.problem.scenario(self.kept.options or {})
 
 
 @in_its_precision
@@ -65,8 +74,9 @@ def tune(
     text: Text,
     checkpoint: Path,
     *,
-    method: str = "gradient",
+    method: str = "search",
     budget: float = 240.0,
+    started: float | None = None,
     evaluations: int | None = None,
     resume: bool = False,
     say: Callable[[str], None] = lambda stage: None,
@@ -77,35 +87,35 @@ def tune(
     Args:
         text: the scenario.
         checkpoint: file from which an interrupted tuning is resumed.
-        method: `gradient`, gradient descent by forward differentiation; `search`, differential evolution; or
+        method: `gradient`, quasi-Newton steps with the gradient by differences; `search`, differential evolution; or
             `evolution`, mutation and selection around the best point, for few evaluations.
-        budget: s, in total; the initial design is always evaluated, and a batch that has begun is completed.
+        budget: s, in total; the first half of the initial design is always evaluated, and a batch that has begun is
+            completed.
+        started: `time.perf_counter()` at which the budget begins; None for now.
         evaluations: budget in evaluations of gains instead, at least those of the initial design, so that the result
             does not depend on the speed of the machine. All of them are used: where the method has converged,
-            `evolution` goes on from the best point. A gradient counts as one for each parameter.
+            `evolution` goes on from the best point. A gradient counts as two for each parameter.
         resume: whether to resume from the checkpoint.
         say: called with the current stage.
         watch: called with the best so far after every batch.
 
     Raises:
-        BadInput: the scenario, or the checkpoint to resume, is invalid.
+        BadInput: the scenario, or the checkpoint to resume, is invalid; or the budget ends while the program of the
+            runs is compiled.
         NoCertificate: no point of the initial design has a certificate.
     """
     if evaluations is not None:
         if evaluations < INITIAL_DESIGN:
             raise BadInput("evaluations", f"be at least {INITIAL_DESIGN}, the initial design", evaluations)
         budget = math.inf
-    begun = time.perf_counter()
+    begun = time.perf_counter() if started is None else started
     say("building")
     task = problem(text)
     counted = {} if evaluations is None else {"evaluations": evaluations}
     asked = {"method": method, "tune": task.built.scenario.tune.model_dump(), **counted}
     about = text_hash(dump({**asked, **task.built.resolved}))
     notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
-    first, evaluation = _programs(task)
-    if method == "gradient" and not notes.is_over:
-        evaluation.precompile_slope(task.start)
-    certifier = Certifier(task.training_loop, task.train, first)
+    evaluation, certifier = _prepared(task, notes, budget, say)
     tried: dict[str, Certificate] = {}
 
     def certify(point: np.ndarray) -> Certificate:
@@ -115,18 +125,19 @@ def tune(
         return tried[words]
 
     objective = Objective(evaluation, certify, notes, watch, evaluations)
-    say("compiling and evaluating the initial design")
-    seed = task.built.scenario.seed
-    others = spread_points(INITIAL_DESIGN - 1, len(task.parameters), seed)
-    objective.costs(np.vstack([task.start, others]), must=True)  # otherwise slow compiling would leave no result
-    start = objective.best
+    seed, iterations = task.built.scenario.seed, task.built.scenario.tune.iterations
+    points = np.vstack([task.start, spread_points(INITIAL_DESIGN - 1, len(task.parameters), seed)])
+    say("evaluating the initial design")
+    objective.costs(points[:AT_ONCE], must=True)  # otherwise slow compiling would leave no result
+    finished = True
+    with contextlib.suppress(OutOfTime):
+        objective.costs(points[AT_ONCE:])
+    designed, start = objective.evaluations, objective.best
     if start is None:
         with within(location=text.location):
-            raise no_certificate(certifier(first), tried, INITIAL_DESIGN)
+            raise no_certificate(certifier(evaluation.law(task.start)), tried, designed)
     say("tuning")
-    finished = True
     try:
-        iterations = task.built.scenario.tune.iterations
         if method == "gradient":
             descend(objective, np.array(start.point), start.cost, iterations)
         elif method == "evolution":
@@ -153,7 +164,7 @@ def tune(
         rejected=objective.rejected,
         elapsed=notes.elapsed,
         finished=finished,
-        searched=objective.evaluations - INITIAL_DESIGN,
+        searched=objective.evaluations - designed,
     )
 
 
@@ -167,15 +178,42 @@ def compare_gains(text: Text, choices: Mapping[str, Mapping[str, Any]]) -> tuple
         BadInput: the scenario is invalid.
     """
     task = problem(text)
-    first, evaluation = _programs(task)
-    return _evaluate(task, evaluation, Certifier(task.training_loop, task.train, first), choices)
+    evaluation = _evaluation(task, [task.law(options) for options in choices.values()])
+    return _evaluate(task, evaluation, _certifier(task), choices)
 
 
-def _programs(task: Problem) -> tuple[AbstractController, Evaluation]:
-    """The controller with the given gains, and what evaluates others of its kind."""
+def _prepared(
+    task: Problem, notes: Checkpoint, budget: float, say: Callable[[str], None]
+) -> tuple[Evaluation, Certifier]:
+    """What evaluates gains and what certifies them, compiled.
+
+    Raises:
+        BadInput: the budget ends before they are; they go on in their threads until the process ends.
+    """
+    say("compiling")
+    evaluation, threads = _evaluation(task), runtime.workers(2)
+    program, certifier = threads.submit(evaluation.compile), threads.submit(_certifier, task)
+    try:
+        notes.wait(program, "compiling", say)
+        return evaluation, notes.wait(certifier, "finding the operating points of the certificate", say)
+    except OutOfTime:
+        hint = "Nothing was tuned. What is compiled now is not kept: give a longer budget"
+        must = "suffice for compiling the runs and finding the operating points of the certificate"
+        raise BadInput("--budget", must, f"{budget:g} s", hint=hint) from None
+    finally:
+        threads.shutdown(wait=False)
+
+
+def _evaluation(task: Problem, others: Sequence[AbstractController] = ()) -> Evaluation:
+    """What evaluates controllers of the kind that is tuned; `others` have further numbers than the tuned ones."""
     make = lambda point: task.law(task.options(point))
-    first = make(task.start)
-    return first, Evaluation(task.training_loop, make, first, task.train)
+    ends = [make(np.full(len(task.start), share)) for share in (0.0, 1.0)]
+    examples = [make(task.start), *ends, task.built.closed_loop.controller, *others]
+    return Evaluation(task.training_loop, make, examples, (task.train, task.held_out))
+
+
+def _certifier(task: Problem) -> Certifier:
+    return Certifier(task.training_loop, task.train, task.law(task.options(task.start)))
 
 
 def _evaluate(
@@ -197,14 +235,17 @@ def _evaluate(
 
 def as_scenario(found: Tuned) -> str:
     """YAML that `undertow simulate` takes, with the certificate above it."""
-    tuned = found.evaluated[-1]
+    kept = found.kept
+    origin = (
+        "Gains found by" if kept.name == "tuned" else "The given gains, better on held-out runs than those found by"
+    )
     sets = list(dict.fromkeys(name for name in found.problem.train.variants if name))
-    points = f"{len(tuned.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
+    points = f"{len(kept.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
     head = (
-        f"# Gains found by `undertow tune`, method {found.method}.\n"
-        f"# Certificate: the exactly linearised closed loop has a spectral radius of {tuned.certificate.worst:.6f},\n"
+        f"# {origin} `undertow tune`, method {found.method}.\n"
+        f"# Certificate: the exactly linearised closed loop has a spectral radius of {kept.certificate.worst:.6f},\n"
         f"# below 1, over one control step; this is the largest at {points}.\n"
-        f"# Cost {tuned.train_cost:.6g} on training runs, {tuned.held_out_cost:.6g} on held-out runs.\n"
+        f"# Cost {kept.train_cost:.6g} on training runs, {kept.held_out_cost:.6g} on held-out runs.\n"
     )
     return head + dump(found.scenario)
 
@@ -226,14 +267,22 @@ def as_data(found: Tuned) -> dict[str, Any]:
             name: {"variants": list(trials.variants), "sizes": np.asarray(trials.sizes).tolist()}
             for name, trials in sets.items()
         },
-        "gains": {one.name: _entries(one) for one in found.evaluated},
+        "gains": {one.name: _entries(one) | {"options": _written(found, one)} for one in found.evaluated},
+        "kept": found.kept.name,
         "history": [step._asdict() for step in found.steps],
     }
 
 
+def _written(found: Tuned, one: Evaluated) -> Mapping[str, Any]:
+    """The tuned options as a scenario with these gains has them."""
+    if one.options is not None:
+        return one.options
+    controller = found.problem.built.resolved["controller"]
+    return {name: controller.get(name) for name in found.evaluated[-1].options or {}}
+
+
 def _entries(one: Evaluated) -> dict[str, Any]:
     return {
-        "options": one.options,
         "train_cost": one.train_cost,
         "held_out_cost": one.held_out_cost,
         "spectral_radii": list(one.certificate.radii),
