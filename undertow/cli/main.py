@@ -113,12 +113,14 @@ def simulate(
         bool, typer.Option("--overwrite", help="Replace an earlier result in DIR, which is an error otherwise.")
     ] = False,
     prediction: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--prediction/--no-prediction",
-            help="Also predict the steady-state metrics from the linearised closed loop and compare.",
+            help="Also predict the steady-state metrics from the linearised closed loop and compare. Default: where "
+            "the run can have a prediction; --prediction says why it has none.",
+            show_default=False,
         ),
-    ] = True,
+    ] = None,
     allow_code: AllowCode = False,
     pdf: Pdf = None,
     video: Annotated[

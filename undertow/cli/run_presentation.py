@@ -1,5 +1,6 @@
 """What `simulate` adds when the results are written: figures, page, and the prediction beside the run."""
 
+import contextlib
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,10 +18,11 @@ from undertow.core.user_code import python_says
 from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.run_log import log_of_run
 from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.prediction.foregone import reason_without_prediction
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.report.plotting import Plotted, PlottingProcess
 from undertow.report.replay.replay_data import Replay, hull_size
-from undertow.report.run_page import shown, write_run_page
+from undertow.report.run_page import Shown, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.execute import Executed, write_metrics
@@ -41,12 +43,14 @@ class PredictedMetrics(NamedTuple):
 
     metrics: dict[str, float] | None
     why_not: str
+    foregone: bool = False  # known before anything was linearised
 
 
 def present(
     executed: Executed,
     plotting: PlottingProcess,
     predicting: Future[PredictedMetrics] | None,
+    asked: bool,
     draft: Draft,
     folder: Path,
     console: Console,
@@ -57,6 +61,7 @@ def present(
         executed: the run.
         plotting: plots its figures.
         predicting: predicts its metrics; None for no prediction.
+        asked: whether the user asked for it, and is told as well where there can be none.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.
@@ -72,13 +77,23 @@ def present(
     draft.publish()  # nobody waits for the prediction, which is added to the page
     console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
     if predicting is not None:
-        with stage(console, "prediction"):
-            predicted = predicting.result()
-        write_metrics(executed, draft.path, in_results(predicted))
-        write_run_page(page, executed.dataset, looks, predicted.metrics)
-        draft.publish()
-        _print_prediction(predicted, executed, console)
+        _add_prediction(executed, predicting, asked, draft, looks, console)
     return looks.replay
+
+
+def _add_prediction(
+    executed: Executed, predicting: Future[PredictedMetrics], asked: bool, draft: Draft, looks: Shown, console: Console
+) -> None:
+    """Add the prediction to the results and print it; nothing is printed where there can be none, unless asked for."""
+    foregone = predicting.done() and predicting.result().foregone
+    with contextlib.nullcontext() if foregone else stage(console, "prediction"):
+        predicted = predicting.result()
+    write_metrics(executed, draft.path, in_results(predicted))
+    if predicted.metrics is not None:
+        write_run_page(draft.path / "run.html", executed.dataset, looks, predicted.metrics)
+    draft.publish()
+    if asked or not foregone:
+        _print_prediction(predicted, executed, console)
 
 
 def _written(executed: Executed, plotting: PlottingProcess, draft: Draft) -> Plotted:
@@ -95,8 +110,7 @@ def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     """One sentence that compares the run with its prediction."""
     if predicted.metrics is None:
         return f"No prediction: {predicted.why_not}"
-    if executed.steady is None:
-        return "The prediction is for the steady window, which the run did not reach"
+    assert executed.steady is not None  # or there were no prediction
     zero = _NOTHING * max(predicted.metrics.values())
     compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > zero]
     departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
@@ -111,9 +125,14 @@ def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
     return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
 
 
+def predict(executed: Executed) -> PredictedMetrics:
+    """Metrics of the steady window of a run, or the reason why there are none: what takes no time first."""
+    why_not = reason_without_prediction(executed)
+    return PredictedMetrics(None, why_not, foregone=True) if why_not else _linearised(executed.built)
+
+
 @in_its_precision
-def predict(built: Built) -> PredictedMetrics:
-    """Metrics of the steady window of a scenario, or the reason why there are none."""
+def _linearised(built: Built) -> PredictedMetrics:
     try:
         return PredictedMetrics(*predicted(operating_point(built)))
     except BadInput as error:

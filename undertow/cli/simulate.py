@@ -20,7 +20,7 @@ from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
-from undertow.scenario.build import Built, build, own_parts
+from undertow.scenario.build import build, own_parts
 from undertow.scenario.execute import Executed, execute, write
 from undertow.scenario.finished_run import (
     Repetition,
@@ -42,13 +42,16 @@ def simulate(
     scenario: Path,
     out: Path | None,
     overwrite: bool,
-    prediction: bool,
+    prediction: bool | None,
     allow_code: bool,
     pdf: str | None,
     video: Path | None,
     rerun: Path | None,
 ) -> int:
-    """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code.
+
+    Without `prediction` (None) there is one where it says something.
+    """
     check_pdf(pdf)
     console = wide_console()
     with (
@@ -70,13 +73,13 @@ def simulate(
         repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         plotting.plot(folder / "run.nc", pdf)
-        predicting = thread.submit(_predicted, executed.built) if prediction else None
+        predicting = None if prediction is False else thread.submit(_predicted, executed)
         _print_results(executed, folder, console)
         code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
         # What only the rest needs is imported now: users read the results meanwhile.
         from undertow.cli.run_presentation import present
 
-        replay = present(executed, plotting, predicting, draft, folder, console)
+        replay = present(executed, plotting, predicting, bool(prediction), draft, folder, console)
     if video is not None and replay is not None:
         from undertow.report.replay.video import write_video
 
@@ -105,11 +108,11 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
         return interruptible(lambda: execute(built))
 
 
-def _predicted(built: Built) -> "PredictedMetrics":
+def _predicted(executed: Executed) -> "PredictedMetrics":
     """The prediction of a run, in another thread."""
     from undertow.cli.run_presentation import predict
 
-    return predict(built)
+    return predict(executed)
 
 
 def _print_results(executed: Executed, folder: Path, console: Console) -> None:
