@@ -164,6 +164,17 @@ def test_what_ends_within_the_budget_is_used(tmp_path):
     assert checkpoint.wait(late, "compiling", lambda words: None) == "program"  # it is there
 
 
+def test_earlier_sessions_leave_time_to_compile(tmp_path):
+    """Their evaluations took 50 s of 60 s; what compiles for ever is left all the same."""
+    clock = Clock()
+    before = Checkpoint(tmp_path / "j", "x", 60.0, False, started=clock.now - 50.0, clock=clock)
+    before.ask("costs", np.zeros(1), lambda: [1.0])
+    again = Checkpoint(tmp_path / "j", "x", 60.0, True, clock=clock)
+    assert again.wait(Compiling(clock, 35.0), "compiling", lambda words: None) == "program"
+    with pytest.raises(OutOfTime):
+        again.wait(Compiling(clock, 1000.0), "compiling", lambda words: None)
+
+
 def test_a_failure_while_waiting_is_told(tmp_path):
     failed: Future[str] = Future()
     failed.set_exception(TimeoutError("of its own"))

@@ -69,13 +69,10 @@ class Checkpoint:
             return self._known[self._asked]["elapsed"]
         return self._spent + self._clock() - self._started
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the budget is used up."""
-        return self.elapsed > self._budget
-
     def wait(self, work: Future[Result], what: str, say: Callable[[str], None]) -> Result:
         """The result of something that cannot be interrupted, such as compiling, in another thread.
+
+        Earlier sessions do not count: what they compiled is lost, and a resumed tuning must come to its evaluations.
 
         Args:
             work: what is waited for; it goes on alone where the budget ends first.
@@ -85,11 +82,12 @@ class Checkpoint:
         Raises:
             OutOfTime: the budget is used up before it is done.
         """
-        while not work.done() and (left := self._budget - self.elapsed) > 0:
+        elapsed = lambda: self._clock() - self._started
+        while not work.done() and (left := self._budget - elapsed()) > 0:
             with contextlib.suppress(TimeoutError):
                 return work.result(timeout=min(_BETWEEN_WORDS, left))
             if not work.done():
-                say(f"{what}: {self.elapsed:.0f} s so far")
+                say(f"{what}: {elapsed():.0f} s so far")
         if not work.done():
             raise OutOfTime
         return work.result()
