@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from undertow.cli.main import run
+
 pytestmark = pytest.mark.full
 
 ROBUST = """\
@@ -72,11 +74,18 @@ def test_a_run_is_put_beside_its_prediction(undertow, tmp_path):
         assert found["predicted"][name] == pytest.approx(found["steady"][name], rel=0.1)
 
 
-def test_what_no_linear_prediction_knows_is_named(undertow, tmp_path):
+def test_a_saturated_run_has_no_prediction_and_says_why_on_request(undertow, monkeypatch, capsys, tmp_path):
+    """Nothing is linearised for it."""
+    monkeypatch.setattr("undertow.cli.run_presentation.operating_point", None)
     (tmp_path / "s.yaml").write_text(ROBUST.replace("limit: 8", "limit: 1.7"))
     said = undertow("simulate", "--prediction", "s.yaml", "--out", "out")
-    assert "The run departs from the linear prediction by more than 10 %: position_rms by" in said.out
-    assert "Actuators were saturated" in said.out
+    assert said.out.endswith(
+        "No prediction: actuators were saturated 46 % of the time, which the linear model does not capture.\n"
+    )
+    assert run(["simulate", "s.yaml", "--out", "quiet"]) == 0
+    assert "rediction" not in capsys.readouterr().out
+    found = json.loads((tmp_path / "quiet" / "metrics.json").read_text())
+    assert found["predicted"] is None and found["not_predicted"].startswith("actuators were saturated")
 
 
 def test_mistakes_are_those_of_a_scenario(refused, tmp_path):

@@ -43,7 +43,7 @@ def test_a_motor_or_a_straight_curve_has_a_slope(thruster):
 
 def test_saturation_and_an_early_end():
     saturated = reason_without_prediction(run_of(STATIC, SWING + 3.0, saturated_fraction=0.25))
-    assert saturated == "actuators were saturated 25% of the time, which the linear model does not capture"
+    assert saturated == "actuators were saturated 25 % of the time, which the linear model does not capture"
     assert reason_without_prediction(run_of(STATIC, SWING + 3.0, saturated_fraction=0.02)) == ""
     early = SimpleNamespace(steady=None)
     assert reason_without_prediction(early) == "the run did not reach its steady window"

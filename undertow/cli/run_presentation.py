@@ -61,7 +61,7 @@ def present(
         executed: the run.
         plotting: plots its figures.
         predicting: predicts its metrics; None for no prediction.
-        asked: whether the user asked for it, and is told as well where there can be none.
+        asked: whether the user asked for it: the reason is printed as well where there can be none.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.

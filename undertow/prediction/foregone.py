@@ -19,7 +19,7 @@ def reason_without_prediction(executed: Executed) -> str:
         return "the run did not reach its steady window"
     saturated = executed.steady.get("saturated_fraction", 0.0)
     if saturated >= _SATURATED:
-        return f"actuators were saturated {saturated:.0%} of the time, which the linear model does not capture"
+        return f"actuators were saturated {100 * saturated:.0f} % of the time, which the linear model does not capture"
     return _flat_thrust(executed)
 
 
