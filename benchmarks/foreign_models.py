@@ -86,8 +86,8 @@ def scenario_of(task: str, plant: str, model: str, law: str, rate: int, readings
 
 
 @double_outside_runs
-def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int]) -> Errors:
-    """Runs of loops of one kind, as one SIMD batch."""
+def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int], substeps: int = 1) -> Errors:
+    """Runs of loops of one kind, as one SIMD batch, with some integration steps of the plant per `dt`, s."""
     metrics = (Metrics(START, DURATION, loops[0].plant.output_units),)
     runs = [
         simd_batch.Run(loop, metrics, loop.outputs_at_start(None, None), jax.random.PRNGKey(seed))
@@ -101,7 +101,7 @@ def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int]) -> Err
     numbers = jax.tree.unflatten(jax.tree.structure(arrays[0]), stacked)
     one = eqx.combine(jax.tree.map(lambda leaf: leaf[0], numbers), rest[0])
     constant = [bool((same == same[:1]).all()) for same in stacked]
-    plan = simd_batch.Plan(round(DURATION / dt), dt, round(RECORD / dt), ("position", "reference"))
+    plan = simd_batch.Plan(round(DURATION / dt), dt, round(RECORD / dt), ("position", "reference"), substeps=substeps)
     outcome = simd_batch.BatchRunner(one, plan, constant, runs=len(runs)).run(numbers)
     state = jax.tree.map(np.asarray, outcome.accumulated[0])
     time = np.asarray(outcome.time)[0]

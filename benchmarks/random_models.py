@@ -29,6 +29,7 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import from_data
+from undertow.scenario.step_size import step_advice
 
 # Factors on the nominal vehicle: lowest, highest, and whether they are spread evenly in their logarithm.
 FACTORS = {
@@ -39,6 +40,7 @@ FACTORS = {
     "righting": (0.0, 5.0, False),
 }
 _UPSIDE_DOWN = np.pi / 2  # rad
+_SUBSTEPS = 4  # that fast decays by drag are integrated
 
 
 class Combination(NamedTuple):
@@ -105,7 +107,7 @@ def scenario_of(one: Combination, rate: int, law: str) -> dict[str, Any]:
             {"kind": "waves", "height": one.height * v.waves, "period": 5, "depth": 3},
         ],
         "navigation": "observer" if one.readings else "perfect",
-        "loop": {"dt": 1 / rate, "duration": DURATION, "record": RECORD},
+        "loop": {"dt": 1 / rate, "substeps": _SUBSTEPS, "duration": DURATION, "record": RECORD},
         "success": {"position_rms": v.position, "orientation_rms": v.orientation},
     }
 
@@ -139,7 +141,10 @@ def built_of(one: Combination, rate: int, law: str, cache: PartCache) -> Built:
 
 def warnings(built: Built) -> list[str]:
     """Advice on loop, reference and load that `check`, `simulate` and `analyze` give before the run."""
-    found = (*plausibility(built.closed_loop, DURATION, None), *flow_advice(built))
+    plant = built.closed_loop.plant
+    assert isinstance(plant, HybridVehicle)
+    of_steps = step_advice(plant, built.scenario.loop)
+    found = (*of_steps, *plausibility(built.closed_loop, DURATION, None), *flow_advice(built))
     return [one.sentence for one in found if "Angles" not in one.hint]
 
 
@@ -157,7 +162,7 @@ def main() -> None:
     for _, group in itertools.groupby(order, key=Combination.group):
         some = list(group)
         each = [built_of(one, options.rate, options.law, cache) for one in some]
-        errors = run_all([one.closed_loop for one in each], 1 / options.rate, range(len(each)))
+        errors = run_all([one.closed_loop for one in each], 1 / options.rate, range(len(each)), _SUBSTEPS)
         done += zip(some, each, _rows(errors), strict=True)
     _report(done, options.list)
 

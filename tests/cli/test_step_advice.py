@@ -2,16 +2,19 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import undertow as ut
 from undertow.core.status import Status
+from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.scenario.build import build
 from undertow.scenario.consistency import rounded_times
 from undertow.scenario.execute import execute
 from undertow.scenario.schema import Loop
 from undertow.scenario.step_size import fastest_decay, step_advice
 from undertow.thrusters import first_order, linear_voltage, t200
+from undertow.vehicles import bluerov2, bluerov2_heavy
 
 SCENARIO = """
 plant: {{vehicle: odin, thruster: {{kind: t200, fidelity: electromechanical}}, ledger: false}}
@@ -32,15 +35,25 @@ def test_decay_of_the_winding_is_that_of_its_time_constant():
 
 
 def test_advice_says_how_many_substeps_are_enough():
-    said = step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01))
+    plant = lambda **options: hybrid_vehicle(bluerov2_heavy(), t200(**options))
+    winding = plant(fidelity="electromechanical")
+    said = step_advice(winding, Loop(dt=0.01))
     assert len(said) == 1 and "Use loop.substeps: 9 or more" in said[0].hint
-    assert not step_advice(t200(fidelity="electromechanical"), Loop(dt=0.01, substeps=9))
-    assert not step_advice(t200(), Loop(dt=0.01))
-    assert not step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01, method="adaptive"))
-    assert (
-        "a loop.dt of at most"
-        in step_advice(t200(fidelity="electromechanical"), Loop(kind="continuous", dt=0.01))[0].hint
-    )
+    assert not step_advice(winding, Loop(dt=0.01, substeps=9))
+    assert not step_advice(plant(), Loop(dt=0.01))
+    assert not step_advice(winding, Loop(kind="continuous", dt=0.01, method="adaptive"))
+    assert "a loop.dt of at most" in step_advice(winding, Loop(kind="continuous", dt=0.01))[0].hint
+
+
+def test_advice_where_the_damping_of_the_hull_is_too_fast():
+    """Roll of BlueROV2 in set hkpolyu: 25 N m s/rad over the inertia with added mass; rk4 is stable up to 2.785."""
+    plant = hybrid_vehicle(bluerov2(parameters="hkpolyu"), t200())
+    damping, mass = plant.body.linear_damping[3, 3], plant.body.mass_matrix[3, 3]
+    enough = int(np.ceil(0.05 * float(damping / mass) / 2.785))
+    assert enough > 1
+    (said,) = step_advice(plant, Loop(dt=0.05))
+    assert "the hull has, by its damping," in said.says and f"loop.substeps: {enough} or more" in said.hint
+    assert not step_advice(plant, Loop(dt=0.05, substeps=enough))
 
 
 @pytest.mark.slow

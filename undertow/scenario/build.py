@@ -91,7 +91,7 @@ class Built(NamedTuple):
         for sentence in plant.advice():
             yield advice("plant.thruster" if sentence in of_thruster else "plant", sentence.rstrip("."))
         if isinstance(plant, HybridVehicle):
-            yield from step_advice(plant.thruster, loop)
+            yield from step_advice(plant, loop)
         yield from rounded_times(loop)
         if self.scenario.precision == "float32" and loop.method != "adaptive":
             if loop.duration / loop.dt > _EXACT_INTEGERS:

@@ -13,8 +13,10 @@ from undertow.core.status import Status
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.continuous import flow
 from undertow.loop.outcome import Outcome
+from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.schema import Loop
 from undertow.thrusters.thruster import AbstractThruster
+from undertow.vehicles.body import Body
 
 # Largest step times decay rate at which a method is stable.
 _LIMITS = {"rk4": 2.785, "euler": 2.0}
@@ -23,19 +25,28 @@ _LIMITS = {"rk4": 2.785, "euler": 2.0}
 _LOOKS = 9
 
 
-def step_advice(thruster: AbstractThruster, loop: Loop) -> tuple[Advice, ...]:
-    """Advice when steps are too long for the linearised thrusters at rest."""
+def step_advice(plant: HybridVehicle, loop: Loop) -> tuple[Advice, ...]:
+    """Advice when steps are too long for the linearised thrusters at rest, or for the linear damping of the hull."""
     if loop.method not in _LIMITS:
         return ()
-    rate, step = fastest_decay(thruster), loop.dt / loop.substeps
+    step = loop.dt / loop.substeps
+    rates = {"thrusters have": fastest_decay(plant.thruster), "hull has, by its damping,": _hull_decay(plant.body)}
+    name, rate = max(rates.items(), key=lambda item: item[1])
     longest = _LIMITS[loop.method] / rate if rate else np.inf
     if step <= longest:
         return ()
     says = (
-        f"the thrusters have a time constant of {1e3 / rate:.3g} ms, for which integration steps above "
-        f"{1e3 * longest:.3g} ms are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically"
+        f"the {name} a time constant of {1e3 / rate:.3g} ms, for which integration steps above {1e3 * longest:.3g} ms "
+        f"are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically"
     )
-    return (advice("loop.dt", says, f"Use {_remedy(loop, longest)}, or another fidelity level"),)
+    other = ", or another fidelity level" if name.startswith("thrusters") else ""
+    return (advice("loop.dt", says, f"Use {_remedy(loop, longest)}{other}"),)
+
+
+def _hull_decay(body: Body) -> float:
+    """Fastest decay of the velocities of a hull by its linear damping, 1/s."""
+    decays = np.linalg.eigvals(np.asarray(body.inverse_mass_matrix) @ np.asarray(body.linear_damping))
+    return float(np.abs(decays).max())
 
 
 def _remedy(loop: Loop, longest: float) -> str:
