@@ -1,5 +1,6 @@
 """Depth from pressure."""
 
+from undertow.sensors.gauss_markov import correlated_errors
 from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
@@ -21,6 +22,8 @@ def depth(
     resolution: float = 1e-3,
     delay: float = 0.0,
     dropout: float = 0.0,
+    correlated_noise: float | None = None,
+    correlation_time: float | None = None,
 ) -> Depth:
     """Depth below the surface, by a pressure sensor at the body origin.
 
@@ -31,5 +34,8 @@ def depth(
         resolution: step of the reading, m; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
+        correlated_noise: standard deviation of a further error of the depth, a first-order Gauss-Markov process, m.
+        correlation_time: of it, s: time in which its correlation falls to 1/e.
     """
-    return Depth(Sampling(period, noise, bias, resolution, delay, dropout))
+    errors = correlated_errors(correlated_noise, correlation_time)
+    return Depth(Sampling(period, noise, bias, resolution, delay, dropout, errors=errors))

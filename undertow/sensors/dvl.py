@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 
 from undertow.numerics.linear_algebra import matvec
+from undertow.sensors.gauss_markov import correlated_errors
 from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractVelocitySensor
@@ -27,6 +28,8 @@ def dvl(
     resolution: float = 1e-3,
     delay: float = 0.05,
     dropout: float = 0.0,
+    correlated_noise: float | None = None,
+    correlation_time: float | None = None,
 ) -> DVL:
     """Velocity over the ground from four acoustic beams. Defaults are those of a small device near the bottom.
 
@@ -37,5 +40,9 @@ def dvl(
         resolution: step of the reading, m/s; 0 for none.
         delay: until a sample is delivered, s.
         dropout: probability that a ping finds no bottom.
+        correlated_noise: standard deviation of a further error of each component, a first-order Gauss-Markov process,
+            m/s.
+        correlation_time: of it, s: time in which its correlation falls to 1/e.
     """
-    return DVL(Sampling(period, noise, bias, resolution, delay, dropout))
+    errors = correlated_errors(correlated_noise, correlation_time, 3)
+    return DVL(Sampling(period, noise, bias, resolution, delay, dropout, errors=errors))

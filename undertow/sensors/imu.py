@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 
+from undertow.sensors.gauss_markov import correlated_errors
 from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractVelocitySensor
@@ -30,6 +31,8 @@ def imu(
     force_bias: float = 0.0,
     delay: float = 0.0,
     dropout: float = 0.0,
+    correlated_angle_noise: float | None = None,
+    correlation_time: float | None = None,
 ) -> IMU:
     """Gyroscopes, accelerometers and the inclination fused from them. Defaults are those of cheap MEMS devices.
 
@@ -43,7 +46,11 @@ def imu(
         force_bias: likewise of the specific force, m/s^2; an error of roll of 0.01 rad acts like 0.1 m/s^2.
         delay: until a sample is delivered, s.
         dropout: probability that a sample is lost.
+        correlated_angle_noise: standard deviation of a further error of roll and pitch, a first-order Gauss-Markov
+            process, rad.
+        correlation_time: of it, s: time in which its correlation falls to 1/e.
     """
     noise = [angle_noise] * 2 + [rate_noise] * 3 + [force_noise] * 3
     bias = [angle_bias] * 2 + [rate_bias] * 3 + [force_bias] * 3
-    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout))
+    errors = correlated_errors(correlated_angle_noise, correlation_time, 2, "correlated_angle_noise")
+    return IMU(Sampling(period, noise, bias, delay=delay, dropout=dropout, errors=errors))

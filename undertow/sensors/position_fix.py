@@ -1,5 +1,6 @@
 """Position fixes: acoustic positioning (USBL, LBL), or a satellite receiver at the surface."""
 
+from undertow.sensors.gauss_markov import correlated_errors
 from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
@@ -21,6 +22,8 @@ def position_fix(
     resolution: float = 0.0,
     delay: float = 0.2,
     dropout: float = 0.0,
+    correlated_noise: float | None = None,
+    correlation_time: float | None = None,
 ) -> PositionFix:
     """North and east at a low rate.
 
@@ -31,5 +34,8 @@ def position_fix(
         resolution: step of the reading, m; 0 for none.
         delay: until a fix is delivered, s.
         dropout: probability that a fix is lost.
+        correlated_noise: standard deviation of a further error of each, a first-order Gauss-Markov process, m.
+        correlation_time: of it, s: time in which its correlation falls to 1/e.
     """
-    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout))
+    errors = correlated_errors(correlated_noise, correlation_time, 2)
+    return PositionFix(Sampling(period, noise, bias, resolution, delay, dropout, errors=errors))

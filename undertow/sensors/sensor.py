@@ -4,6 +4,7 @@ import abc
 from typing import ClassVar
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.sensors.motion import Motion
@@ -24,6 +25,21 @@ class AbstractSensor(eqx.Module):
     @abc.abstractmethod
     def reading(self, motion: Motion) -> Reading:
         """Reading without error, of one axis."""
+
+    def error_slopes(self, motion: Motion) -> Float[Array, "width errors"]:
+        """Slopes of a reading in the correlated errors of `sampling`; by itself each is added to one of the entries.
+
+        `motion.actuator` is None where a filter knows nothing of the actuators.
+        """
+        assert self.sampling.errors is not None
+        return jnp.eye(len(self.reading(motion)), len(self.sampling.errors.deviation))
+
+    def check(self, motion: Motion) -> None:
+        """Check that a motion has what this sensor measures, or what disturbs it.
+
+        Raises:
+            BadInput: it has not.
+        """
 
 
 class AbstractVelocitySensor(AbstractSensor):
