@@ -65,9 +65,21 @@ def test_every_bit_is_that_of_the_batch_compiler(tmp_path, kind, precision):
     assert not re.search(r"\b(malloc|calloc|free|printf)\b", (tmp_path / "navigation.c").read_text())
 
 
-@pytest.mark.parametrize("kind", ["observer", "kalman"])
-def test_a_loop_in_c_is_the_loop_in_python(tmp_path, kind):
-    scenario = SCENARIO | {"navigation": {"kind": kind, "sensors": SENSORS}}
+DISTURBED = [
+    "imu",
+    {"kind": "dvl", "correlated_noise": 0.01, "correlation_time": 2},
+    "depth",
+    {"kind": "compass", "soft_iron": 0.05, "interference": 1e-3},
+    {"kind": "position_fix", "delay": 0.2},
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "sensors"),
+    [("observer", SENSORS), ("kalman", SENSORS), pytest.param("kalman", DISTURBED, marks=pytest.mark.slow)],
+)
+def test_a_loop_in_c_is_the_loop_in_python(tmp_path, kind, sensors):
+    scenario = SCENARIO | {"navigation": {"kind": kind, "sensors": sensors}}
     export_navigation(build(from_data(scenario))).write(tmp_path)
     (tmp_path / "loop.c").write_text(LOOP)
     flags = ["-O1", "-std=c99", "-ffp-contract=off"]

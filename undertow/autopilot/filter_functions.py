@@ -1,6 +1,5 @@
 """The functions of a navigation filter that is stepped: its start, and a step with the readings that have arrived."""
 
-import re
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -8,9 +7,8 @@ import jax.numpy as jnp
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import AbstractPlant
 from undertow.core.measurement import measurement_of_pose
-from undertow.navigation.from_sensors import AbstractFilter, Received
+from undertow.navigation.from_sensors import AbstractFilter, Received, sensor_names
 from undertow.sensors.motion import motion_of
-from undertow.sensors.sensor import AbstractSensor
 
 
 class EstimatedMotion(NamedTuple):
@@ -56,7 +54,9 @@ class FilterFunctions:
         self.pose = EstimatedMotion(jnp.zeros(3), jnp.zeros(6), jnp.array([1.0, 0, 0, 0]))
         still = motion_of(self._measurement(self.pose), jnp.zeros(3), jnp.zeros(()))
         self.at_rest = [sensor.reading(still) for sensor in self.filter.sensors]
-        self.sensors = {name: one.size for name, one in zip(_names(self.filter.sensors), self.at_rest, strict=True)}
+        self.sensors = {
+            name: one.size for name, one in zip(sensor_names(self.filter.sensors), self.at_rest, strict=True)
+        }
         self.delays = [float(sensor.sampling.delay) for sensor in self.filter.sensors]
         self.nothing = tuple(Received(0 * one, jnp.asarray(False), jnp.zeros(())) for one in self.at_rest)
 
@@ -74,13 +74,3 @@ class FilterFunctions:
 
     def _measurement(self, pose: EstimatedMotion):
         return measurement_of_pose(pose.position, pose.attitude, pose.velocity, self._report)
-
-
-def _names(sensors: tuple[AbstractSensor, ...]) -> list[str]:
-    """A name for each sensor: that of its class in lower case, with a number from the second on."""
-    found: list[str] = []
-    for sensor in sensors:
-        plain = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(sensor).__name__).lower()
-        same = sum(name == plain or name.startswith(f"{plain}_") for name in found)
-        found.append(f"{plain}_{same + 1}" if same else plain)
-    return found

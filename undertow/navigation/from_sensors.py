@@ -1,6 +1,7 @@
 """Navigation of a vehicle from its sensors, whose readings are simulated; a filter estimates the motion from them."""
 
 import abc
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,12 +13,14 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
+from undertow.navigation.consistency import normalised_square
 from undertow.numerics.number import Number
 from undertow.numerics.random_keys import numbered
+from undertow.sensors.gauss_markov import Disturbed
 from undertow.sensors.imu import IMU
 from undertow.sensors.motion import motion_of
 from undertow.sensors.sampling import Reading, SensorState
-from undertow.sensors.sensor import AbstractSensor, AbstractVelocitySensor
+from undertow.sensors.sensor import AbstractDisturbedSensor, AbstractSensor, AbstractVelocitySensor, error_slopes
 
 # (m/s)^2 s; smaller densities count as no noise.
 _NOISELESS = 1e-20
@@ -64,6 +67,18 @@ class AbstractFilter(eqx.Module):
         """What the sensors do not measure, and how far its estimate drifts in `duration` (s)."""
 
 
+class AbstractCovarianceFilter(AbstractFilter):
+    """A filter that says how large the errors of its estimate are."""
+
+    @abc.abstractmethod
+    def errors(self, state: PyTree, truth: Measurement) -> Float[Array, " errors"]:
+        """True errors of the estimated attitude, velocity and position, each an axis or more, of units of its own."""
+
+    @abc.abstractmethod
+    def error_covariance(self, state: PyTree) -> Float[Array, "errors errors"]:
+        """Covariance of these errors by the account of the filter."""
+
+
 class AbstractSensorFaults(eqx.Module):
     """Faults of sensors: what a filter receives instead of what they deliver."""
 
@@ -87,6 +102,7 @@ class SensorNavigationState(NamedTuple):
     filter: Any
     ignored: Int[Array, ""]  # readings so far that were not finite
     faults: Any = ()  # state of the faults of the sensors; () without any
+    errors: Any = ()  # of the estimate, of a filter that says how large they are; () of others
 
 
 class SensorNavigation(AbstractInformedNavigation):
@@ -97,8 +113,9 @@ class SensorNavigation(AbstractInformedNavigation):
     faults: AbstractSensorFaults | None = None
 
     def realize(self, key):
-        """A key for each sensor, and one more for their faults where there are any."""
-        return jax.random.split(key, len(self.filter.sensors) + (self.faults is not None))
+        """A key for each sensor, then one for their faults and one for their correlated errors, where there are any."""
+        count, disturbed = len(self.filter.sensors), any(count_errors(one) for one in self.filter.sensors)
+        return jax.random.split(key, count + (self.faults is not None) + disturbed)
 
     def velocity_noise(self, dt):
         """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
@@ -113,24 +130,32 @@ class SensorNavigation(AbstractInformedNavigation):
             raise BadInput("", "be used on a vehicle", f"a plant of {truth.position.shape[0]} outputs", hint=hint)
         motion = motion_of(truth, truth.velocity[:3], jnp.zeros(()))
         readings = [sensor.reading(motion) for sensor in self.filter.sensors]
-        chances = _chances(realization[: len(readings)], jnp.full(len(readings), -1), readings)
+        for sensor in self.filter.sensors:
+            if isinstance(sensor, AbstractDisturbedSensor):
+                sensor.check(motion)
+        before_the_first = jnp.full(len(readings), -1)
+        chances = _chances(realization[: len(readings)], before_the_first, readings)
+        of_errors = _error_chances(realization[-1], before_the_first, self.filter.sensors, motion.position.dtype)
         states = tuple(
-            sensor.sampling.init(reading, chance[:-1])
-            for sensor, reading, chance in zip(self.filter.sensors, readings, chances, strict=True)
+            sensor.sampling.init(reading, chance[:-1], error_chance)
+            for sensor, reading, chance, error_chance in zip(
+                self.filter.sensors, readings, chances, of_errors, strict=True
+            )
         )
         start = self.filter.start(truth)
         faults = () if self.faults is None else self.faults.init(readings)
-        return SensorNavigationState(jnp.zeros(()), motion.velocity, states, start, jnp.zeros((), dtype=int), faults)
+        ignored, errors = jnp.zeros((), dtype=int), self._errors(start, truth)
+        return SensorNavigationState(jnp.zeros(()), motion.velocity, states, start, ignored, faults, errors)
 
     def measure(self, realization, state: SensorNavigationState, t, truth: Measurement):
         received, states, velocity = self.sample(realization, state, t, truth)
         faults = state.faults
         if self.faults is not None:
-            received, faults = self.faults.received(realization[-1], faults, t, received)
+            received, faults = self.faults.received(realization[len(received)], faults, t, received)
         lost = [one.fresh & ~jnp.isfinite(one.reading).all() for one in received]
         estimated = self.filter.update(state.filter, t - state.time, received)
         ignored = state.ignored + sum(jnp.where(one, 1, 0) for one in lost)
-        after = SensorNavigationState(t, velocity, states, estimated, ignored, faults)
+        after = SensorNavigationState(t, velocity, states, estimated, ignored, faults, self._errors(estimated, truth))
         return self.filter.measurement(estimated), after
 
     def sample(self, realization, state: SensorNavigationState, t, truth: Measurement):
@@ -139,10 +164,15 @@ class SensorNavigation(AbstractInformedNavigation):
         readings = [sensor.reading(motion) for sensor in self.filter.sensors]
         numbers = jnp.stack([sensor.sampling.number(t) for sensor in self.filter.sensors])
         chances = _chances(realization[: len(readings)], numbers, readings)
+        of_errors = _error_chances(realization[-1], numbers, self.filter.sensors, motion.position.dtype)
+        disturbed = [
+            None if chance is None else Disturbed(error_slopes(sensor, motion), chance)
+            for sensor, chance in zip(self.filter.sensors, of_errors, strict=True)
+        ]
         deliveries = [
-            sensor.sampling.deliver(states, t, reading, chance)
-            for sensor, states, reading, chance in zip(
-                self.filter.sensors, state.sensors, readings, chances, strict=True
+            sensor.sampling.deliver(states, t, reading, chance, errors)
+            for sensor, states, reading, chance, errors in zip(
+                self.filter.sensors, state.sensors, readings, chances, disturbed, strict=True
             )
         ]
         received = tuple(
@@ -152,10 +182,20 @@ class SensorNavigation(AbstractInformedNavigation):
         return received, tuple(states for _, states in deliveries), motion.velocity
 
     def signals(self):
-        return self.filter.signals()
+        found = self.filter.signals()
+        if isinstance(self.filter, AbstractCovarianceFilter):
+            meaning = "normalised estimation error squared of position, velocity and attitude; 9 is as the filter says"
+            found = found | {"nees": Signal((), "1", meaning)}
+        return found
 
     def diagnostics(self, state: SensorNavigationState):
-        return self.filter.diagnostics(state.filter)
+        found = self.filter.diagnostics(state.filter)
+        if isinstance(self.filter, AbstractCovarianceFilter):
+            found = found | {"nees": normalised_square(state.errors, self.filter.error_covariance(state.filter))}
+        return found
+
+    def _errors(self, estimated: PyTree, truth: Measurement) -> Any:
+        return self.filter.errors(estimated, truth) if isinstance(self.filter, AbstractCovarianceFilter) else ()
 
     def advice(self, duration: float = 60.0) -> tuple[str, ...]:
         """What the sensors do not measure, and how far its estimate drifts in `duration` (s)."""
@@ -163,6 +203,22 @@ class SensorNavigation(AbstractInformedNavigation):
 
     def ignored(self, state: SensorNavigationState):
         return state.ignored
+
+
+def count_errors(sensor: AbstractSensor) -> int:
+    """Number of the correlated errors of a sensor."""
+    errors = sensor.sampling.errors
+    return 0 if errors is None else len(errors.deviation)
+
+
+def sensor_names(sensors: Sequence[AbstractSensor]) -> list[str]:
+    """A name for each sensor: that of its class in lower case, with a number from the second on."""
+    found: list[str] = []
+    for sensor in sensors:
+        plain = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(sensor).__name__).lower()
+        same = sum(name == plain or name.startswith(f"{plain}_") for name in found)
+        found.append(f"{plain}_{same + 1}" if same else plain)
+    return found
 
 
 def check_sensors(sensors: Sequence[AbstractSensor]) -> None:
@@ -185,3 +241,13 @@ def _chances(keys, numbers, readings) -> list:
     normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
     together = jax.vmap(normal)(keys, numbers)
     return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
+
+
+def _error_chances(key, numbers, sensors: Sequence[AbstractSensor], dtype) -> list[Array | None]:
+    """Standard normal numbers for the correlated errors of each sensor; None for one that has none."""
+    counts = [count_errors(sensor) for sensor in sensors]
+    if not any(counts):
+        return [None] * len(sensors)
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (max(counts),), dtype=dtype)
+    together = jax.vmap(normal)(jax.random.split(key, len(sensors)), numbers)
+    return [row[:count] if count else None for row, count in zip(together, counts, strict=True)]

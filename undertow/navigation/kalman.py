@@ -18,9 +18,11 @@ from undertow.core.contracts import Measurement
 from undertow.core.measurement import body_of, measurement_of_outputs, measurement_of_pose
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
+from undertow.navigation.consistency import InnovationMonitor, innovation_monitor
+from undertow.navigation.from_sensors import AbstractCovarianceFilter, Received, SensorNavigation, check_sensors
 from undertow.navigation.motion_history import MotionHistory, resting, spacing_for
 from undertow.navigation.observability import Sensed, drift_sentences
+from undertow.navigation.sensor_errors import Covariance, all_errors, error_states, faded, packing
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.number import Number
 from undertow.numerics.rotations import (
@@ -36,27 +38,23 @@ from undertow.numerics.rotations import (
     rotation_from_quaternion,
     skew,
 )
+from undertow.sensors.gauss_markov import CorrelatedErrors, ErrorValues
 from undertow.sensors.imu import IMU
-from undertow.sensors.motion import Motion, gravity
+from undertow.sensors.motion import Motion, gravity, motion_of
 from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractSensor, error_slopes
 
 # Errors of the state, in world axes but for the biases; slices of the covariance. That of the velocity is the error of
 # the velocity in body axes, turned: the truth is exp(attitude error) (velocity + error). So what a DVL reads does not
 # depend on the heading, and noise in the estimated velocity tells the filter nothing about the heading. (With the error
 # of the velocity in world axes it does, and a filter without a compass believes in a heading that nothing measured.)
 ATTITUDE, GYRO_BIAS, VELOCITY, FORCE_BIAS, POSITION = (slice(3 * i, 3 * i + 3) for i in range(5))
-_SIZE = 15
-_UPPER = tuple(index.astype(np.int32) for index in np.triu_indices(_SIZE))  # a width that both precisions have
-_WHERE = np.zeros((_SIZE, _SIZE), dtype=np.int32)  # of each entry of the covariance among those of its upper triangle
-_WHERE[_UPPER] = _WHERE.T[_UPPER] = np.arange(len(_UPPER[0]))
+_SIZE = 15  # correlated errors of the sensors follow
 
 _MOST_TOLERATED = 2.0**20  # a lasting jump of 1000 gates is believed, nothing beyond
 _FASTEST, _STRONGEST = 35.0, 160.0  # rad/s, m/s^2: full scale of MEMS devices; what is larger was not measured
 _USUAL_DELAY = 0.5  # s
 _LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
-
-Covariance = Float[Array, "15 15"]
 
 
 class KalmanState(NamedTuple):
@@ -67,18 +65,19 @@ class KalmanState(NamedTuple):
     velocity: Vector3  # m/s, world
     gyro_bias: Vector3  # rad/s
     force_bias: Vector3  # m/s^2
-    covariance: Float[
-        Array, "120"
-    ]  # upper triangle, of the errors of attitude, gyro bias, velocity, force bias, position
+    # Upper triangle, of the errors of attitude, gyro bias, velocity, force bias, position, and those of the sensors.
+    covariance: Float[Array, " entries"]
     rates: Vector3  # last reading of the gyroscopes, rad/s
     force: Vector3  # last reading of the accelerometers, m/s^2
     actuator: Any
     history: MotionHistory
     tolerance: Float[Array, " sensors"]  # factor of the gate's square: doubled by every rejection in a row
     rejected: Int[Array, ""]  # readings so far
+    monitor: InnovationMonitor
+    sensor_errors: ErrorValues | None = None  # correlated errors of all sensors; None where the filter has none
 
 
-class Kalman(AbstractFilter):
+class Kalman(AbstractCovarianceFilter):
     """Strapdown inertial navigation whose errors are estimated by an extended Kalman filter.
 
     It takes every sensor that an undertow scenario can have, those of a user too: what a sensor would read at the
@@ -106,6 +105,7 @@ class Kalman(AbstractFilter):
     gate: Float[Param, ""] = param("", "standard deviations beyond which a reading is rejected")
     noise_scale: Float[Param, ""] = param("", "assumed over stated standard deviations of the sensors")
     longest_delay: Float[Param, ""] = param("s", "of readings; older ones are taken to be of that age")
+    sensor_error_states: bool = eqx.field(static=True, default=True)  # for the correlated errors of the sensors
 
     def __check_init__(self):
         check_sensors(self.sensors)
@@ -117,19 +117,22 @@ class Kalman(AbstractFilter):
     def start(self, y: Measurement) -> KalmanState:
         body, still = body_of(y), jnp.zeros(3)
         reports = any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors)
+        errors = self._sensor_errors()
         return KalmanState(
             y.position[:3],
             body.attitude,
             y.velocity[:3],
             still,
             still,
-            jnp.diag(self.initial_deviations() ** 2)[_UPPER],
+            self._initial_covariance()[packing(self._size()).upper],
             body.nu[3:],
             matvec(body.rotation.T, -gravity()),
             y.actuator if reports else None,
             resting(body.attitude),
             jnp.ones(len(self.sensors)),
             jnp.zeros((), dtype=int),
+            innovation_monitor([self._compared(sensor, y) for sensor in self.sensors]),
+            None if errors is None else jnp.zeros(len(errors.deviation)),
         )
 
     def update(self, state: KalmanState, elapsed: Number, received: tuple[Received, ...]) -> KalmanState:
@@ -139,7 +142,7 @@ class Kalman(AbstractFilter):
         new = lambda read, old, most: jnp.where(inertial.fresh & (jnp.abs(read) <= most), read, old)
         rates = new(inertial.reading[2:5], state.rates, _FASTEST)
         force = new(inertial.reading[5:], state.force, _STRONGEST)
-        covariance = state.covariance[_WHERE]
+        covariance = self.covariance(state)
         turning = (rates + state.rates) / 2 - state.gyro_bias
         half = rotation_from_quaternion(_turned(state.attitude, elapsed / 2 * turning))
         acceleration = matvec(half, force - state.force_bias) + gravity()
@@ -155,12 +158,16 @@ class Kalman(AbstractFilter):
             history=history,
         )
         covariance = self._spread(covariance, elapsed, half, state.velocity, imu)
+        errors = self._sensor_errors()
+        if errors is not None and state.sensor_errors is not None:
+            covariance = faded(covariance, errors, elapsed)
+            state = state._replace(sensor_errors=errors.kept(elapsed) * state.sensor_errors)
         for i, (sensor, one) in enumerate(zip(self.sensors, received, strict=True)):
             if isinstance(sensor, PropellerSpeed):
                 state = state._replace(actuator=_propellers(state.actuator, sensor, one))
             else:
                 state, covariance = self._corrected(state, covariance, i, one)
-        return state._replace(covariance=covariance[_UPPER])
+        return state._replace(covariance=covariance[packing(len(covariance)).upper])
 
     def measurement(self, state: KalmanState) -> Measurement:
         rotation = rotation_from_quaternion(state.attitude)
@@ -168,13 +175,32 @@ class Kalman(AbstractFilter):
         return measurement_of_pose(state.position, state.attitude, nu, state.actuator)
 
     def covariance(self, state: KalmanState) -> Covariance:
-        """Covariance of the errors of attitude (rad, world axes), gyro bias, velocity (world), force bias, position."""
-        return state.covariance[_WHERE]
+        """Covariance of the errors of attitude (rad, world axes), gyro bias, velocity (world), force bias, position.
+
+        Behind them are the correlated errors of the sensors.
+        """
+        return state.covariance[packing(self._size()).where]
+
+    def errors(self, state: KalmanState, truth: Measurement):
+        """Errors of attitude (rad, world axes), velocity (m/s, in the axes of the estimate), position (m)."""
+        body = body_of(truth)
+        turn = quaternion_product(body.attitude, conjugate(state.attitude))
+        turn = jnp.where(turn[0] < 0, -turn, turn)
+        turned_back = matvec(rotation_from_quaternion(turn).T, truth.velocity[:3])
+        return jnp.concatenate([2 * turn[1:], turned_back - state.velocity, truth.position[:3] - state.position])
+
+    def error_covariance(self, state: KalmanState):
+        covariance = self.covariance(state)
+        rows = jnp.concatenate([covariance[ATTITUDE], covariance[VELOCITY], covariance[POSITION]])
+        return jnp.concatenate([rows[:, ATTITUDE], rows[:, VELOCITY], rows[:, POSITION]], axis=1)
 
     def signals(self):
         return {
             "navigation_deviation": Signal(("axis",), "[axis]", "standard deviation of the estimate by the filter"),
             "rejected_readings": Signal((), "1", "readings so far that were too far from the estimate"),
+            "innovation_rms": Signal(("sensor",), "1", "rms of the normalised innovations over 30 s; 1 as assumed"),
+            "innovation_correlation": Signal(("sensor",), "1", "correlation of successive innovations; 0 as assumed"),
+            "inconsistent_sensors": Signal(("sensor",), "1", "1 where innovations contradict what the filter assumes"),
         }
 
     def diagnostics(self, state: KalmanState):
@@ -185,7 +211,20 @@ class Kalman(AbstractFilter):
         slopes = angles(jnp.eye(3)).T
         of_angles = (slopes[:, :, None] * slopes[:, None, :] * covariance[ATTITUDE, ATTITUDE][None]).sum((1, 2))
         variances = jnp.concatenate([jnp.diag(covariance)[POSITION], of_angles])
-        return {"navigation_deviation": jnp.sqrt(variances), "rejected_readings": state.rejected}
+        periods = jnp.stack([jnp.asarray(sensor.sampling.period, dtype=float) for sensor in self.sensors])
+        return {
+            "navigation_deviation": jnp.sqrt(variances),
+            "rejected_readings": state.rejected,
+            "innovation_rms": state.monitor.rms(),
+            "innovation_correlation": state.monitor.correlation(),
+            "inconsistent_sensors": state.monitor.inconsistent(periods),
+        }
+
+    def _compared(self, sensor: AbstractSensor, y: Measurement) -> int:
+        """Entries of a reading of a sensor that the filter compares with the estimate."""
+        if isinstance(sensor, PropellerSpeed):
+            return 0
+        return 2 if isinstance(sensor, IMU) else sensor.reading(motion_of(y, y.velocity[:3], jnp.zeros(()))).size
 
     def advice(self, duration):
         # One program: by itself each of its hundred operations would be compiled.
@@ -198,7 +237,7 @@ class Kalman(AbstractFilter):
         sensed = []
         for sensor in self.sensors:
             if not isinstance(sensor, PropellerSpeed):
-                slopes = _expected(level, sensor, 0.0)[1]
+                slopes = _expected(level, sensor, 0.0, None)[1]
                 sensed.append((slopes, self.variance(sensor, len(slopes)), jnp.asarray(sensor.sampling.period)))
         of_rates, of_force = self.inertial_noise(next(one for one in self.sensors if isinstance(one, IMU)))
         one = jnp.ones(3)
@@ -211,6 +250,22 @@ class Kalman(AbstractFilter):
         whole = [tilt, tilt, heading, *[biased] * 3, *[self.velocity_deviation] * 3]
         whole += [*[self.force_bias_deviation] * 3, *[self.position_deviation] * 3]
         return jnp.stack([jnp.asarray(one, dtype=float) for one in whole])
+
+    def _sensor_errors(self) -> CorrelatedErrors | None:
+        """Correlated errors of the sensors that are states of this filter."""
+        return all_errors(self.sensors, self.noise_scale) if self.sensor_error_states else None
+
+    def _size(self) -> int:
+        """Number of states."""
+        errors = self._sensor_errors()
+        return _SIZE if errors is None else _SIZE + len(errors.deviation)
+
+    def _initial_covariance(self) -> Covariance:
+        errors = self._sensor_errors()
+        deviations = self.initial_deviations()
+        if errors is not None:
+            deviations = jnp.concatenate([deviations, errors.deviation])
+        return jnp.diag(deviations**2)
 
     def inertial_noise(self, imu: IMU) -> tuple[Vector3, Vector3]:
         """Densities of the noise of gyroscopes, (rad/s)^2 s, and accelerometers, (m/s^2)^2 s."""
@@ -242,7 +297,7 @@ class Kalman(AbstractFilter):
         in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density[None, None, :]).sum(-1)
         turning = in_world(of_rates)
         sideways = _product(across, turning)  # noise of the gyroscopes turns the velocity in body axes
-        gained = jnp.zeros((_SIZE, _SIZE))
+        gained = jnp.zeros(covariance.shape)
         gained = (
             gained.at[ATTITUDE, ATTITUDE].set(turning).at[GYRO_BIAS, GYRO_BIAS].set(self.gyro_drift**2 * jnp.eye(3))
         )
@@ -256,27 +311,35 @@ class Kalman(AbstractFilter):
         """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none."""
         sensor = self.sensors[i]
         reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
-        expected, slopes = _expected(state, sensor, jnp.minimum(one.age, self.longest_delay))
+        states = error_states(self.sensors, _SIZE)[i] if state.sensor_errors is not None else None
+        expected, slopes = _expected(state, sensor, jnp.minimum(one.age, self.longest_delay), states)
         error = reading - expected
         for entry in sensor.angles:
             error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
         there = jnp.isfinite(reading)
         error, posterior = jnp.where(there, error, 0.0), covariance
-        correction, square = jnp.zeros(_SIZE), jnp.zeros(())
+        correction, square, normalised = jnp.zeros(len(covariance)), jnp.zeros(()), []
+        diagonal = np.eye(len(covariance), dtype=bool)
         for k, variance in enumerate(self.variance(sensor, len(reading))):
             shared = _product(posterior, slopes[k])
             total = (slopes[k] * shared).sum() + variance
             left = error[k] - (slopes[k] * correction).sum()
             gain, share = shared / jnp.sqrt(total), jnp.where(there[k], 1.0, 0.0)
             square = square + share * left**2 / total
+            normalised.append(share * left / jnp.sqrt(total))
             correction = correction + share * left / total * shared
             posterior = posterior - share * gain[:, None] * gain[None, :]
             least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
-            posterior = jnp.where(_DIAGONAL, jnp.maximum(posterior, least[:, None]), posterior)
+            posterior = jnp.where(diagonal, jnp.maximum(posterior, least[:, None]), posterior)
         count, tolerance = jnp.where(there, 1.0, 0.0).sum(), state.tolerance[i]
         known = one.fresh & (count > 0)
         taken = known & (square <= self.gate**2 * count * tolerance)
         following = jnp.where(taken, 1.0, jnp.where(known, jnp.minimum(2 * tolerance, _MOST_TOLERATED), tolerance))
+        # One reading far away says nothing of the others: it counts as at the gate.
+        most = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
+        innovation = jnp.clip(jnp.stack(normalised), -most, most)
+        innovation = jnp.where(jnp.isnan(innovation), most, innovation)
+        monitor = state.monitor.updated(i, innovation, count, known, sensor.sampling.period)
         correction = jnp.where(taken, correction, 0.0)
         turn = quaternion_of_turn(correction[ATTITUDE])
         turned = quaternion_product(turn, state.attitude)
@@ -288,11 +351,12 @@ class Kalman(AbstractFilter):
             force_bias=state.force_bias + correction[FORCE_BIAS],
             tolerance=state.tolerance.at[i].set(following),
             rejected=state.rejected + jnp.where(known & ~taken, 1, 0),
+            monitor=monitor,
+            sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[_SIZE:],
         )
         return after, jnp.where(taken, posterior, covariance)
 
 
-_DIAGONAL = np.eye(_SIZE, dtype=bool)
 _DEVIATIONS = (
     "position_deviation",
     "velocity_deviation",
@@ -305,18 +369,28 @@ _DEVIATIONS = (
 )
 
 
-def _expected(state: KalmanState, sensor: AbstractSensor, age: Number):
-    """What a sensor would have read `age` (s) ago, and its slopes in the errors of now, [entries, 15].
+def _expected(state: KalmanState, sensor: AbstractSensor, age: Number, of_errors: slice | None):
+    """What a sensor would have read `age` (s) ago, and its slopes in the errors of now, [entries, states].
 
     What the biases changed in the meantime is not kept in the slopes: age^2 / 2 times a force bias, some millimetres in
-    a second.
+    a second. With correlated errors that of the accelerometers is. Such errors are those of the reading that arrives: a
+    delayed one is as correlated with the next.
+
+    Args:
+        state: of the filter.
+        sensor: which.
+        age: s.
+        of_errors: states of the correlated errors of this sensor; None where those of no sensor are states.
     """
     past = state.history.at(age)
     then = quaternion_product(state.attitude, quaternion_product(conjugate(state.history.attitude), past.attitude))
     rotation, fallen = rotation_from_quaternion(then), age * gravity()
+    estimated = jnp.zeros(0)
+    if of_errors is not None and state.sensor_errors is not None:
+        estimated = state.sensor_errors[of_errors.start - _SIZE : of_errors.stop - _SIZE]
 
     def read(errors):
-        turn, faster, moved = errors[:3], errors[3:6], errors[6:]
+        turn, faster, moved = errors[:3], errors[3:6], errors[6:9]
         velocity = state.velocity + faster + cross(turn, state.velocity)
         turned = rotation + _product(skew(turn), rotation)
         # What accelerated the body since then is turned with it, gravity is not.
@@ -331,13 +405,21 @@ def _expected(state: KalmanState, sensor: AbstractSensor, age: Number):
             actuator=state.actuator,
         )
         reading = sensor.reading(motion)
+        if len(estimated):
+            reading = reading + matvec(error_slopes(sensor, motion), estimated + errors[9:])
         return reading[:2] if isinstance(sensor, IMU) else reading
 
-    none = jnp.zeros(9)
+    none = jnp.zeros(9 + len(estimated))
     slopes, zero = jax.jacfwd(read)(none), jnp.zeros
     of = lambda errors: slopes[:, errors]
     rows = slopes.shape[0]
     whole = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
+    if of_errors is not None and state.sensor_errors is not None:
+        # Where tilt is known from the accelerometers alone, a late velocity without this would tell it from their bias.
+        faster, moved = age * rotation, age**2 / 2 * rotation
+        whole[3] = _product(of(slice(3, 6)), faster) + _product(of(slice(6, 9)), moved)
+        last = _SIZE + len(state.sensor_errors)
+        whole += [zero((rows, of_errors.start - _SIZE)), of(slice(9, None)), zero((rows, last - of_errors.stop))]
     return read(none), jnp.concatenate(whole, axis=1)
 
 
@@ -385,6 +467,7 @@ def kalman(
     gate: float = 5.0,
     noise_scale: float = 1.0,
     longest_delay: float | None = None,
+    sensor_error_states: bool = True,
 ) -> SensorNavigation:
     """Navigation of a vehicle from its sensors, by an error-state Kalman filter. For the sampled loop.
 
@@ -405,6 +488,8 @@ def kalman(
         noise_scale: standard deviations that the filter assumes, over those of the sensors.
         longest_delay: age of readings back to which the motion is kept, s; older ones are taken to be of that age. None
             for twice the longest delay of the sensors, at least half a second.
+        sensor_error_states: whether the correlated errors of the sensors, iron and currents of a compass included, are
+            states of the filter. Without, it neglects them.
     """
     sensors = tuple(sensors)
     check_sensors(sensors)
@@ -412,5 +497,5 @@ def kalman(
     longest: Any = max(_USUAL_DELAY, 2 * max(delays)) if longest_delay is None else longest_delay
     of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
     of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
-    filter = Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest)
+    filter = Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest, sensor_error_states)
     return SensorNavigation(filter=filter)

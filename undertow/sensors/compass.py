@@ -18,7 +18,7 @@ from undertow.core.param import Param, param
 from undertow.sensors.gauss_markov import CorrelatedErrors, correlated_errors
 from undertow.sensors.motion import Motion
 from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.sensors.sensor import AbstractDisturbedSensor
 
 # s; the thrusters that carry the sum of the currents change, and with them where its field points. Chosen.
 _INTERFERENCE_TIME = 60.0
@@ -37,7 +37,7 @@ class ThrusterCurrents(eqx.Module):
         return self.coefficient * (motion.actuator.speed**2).sum()
 
 
-class Compass(AbstractSensor):
+class Compass(AbstractDisturbedSensor):
     """Yaw, rad."""
 
     fixes = ("yaw",)

@@ -26,16 +26,20 @@ class AbstractSensor(eqx.Module):
     def reading(self, motion: Motion) -> Reading:
         """Reading without error, of one axis."""
 
+
+class AbstractDisturbedSensor(AbstractSensor):
+    """A sensor whose correlated errors depend on the motion, such as a compass in the field of its vehicle."""
+
+    @abc.abstractmethod
     def error_slopes(self, motion: Motion) -> Float[Array, "width errors"]:
-        """Slopes of a reading in the correlated errors of `sampling`; by itself each is added to one of the entries.
+        """Slopes of a reading in the correlated errors of `sampling`.
 
         `motion.actuator` is None where a filter knows nothing of the actuators.
         """
-        assert self.sampling.errors is not None
-        return jnp.eye(len(self.reading(motion)), len(self.sampling.errors.deviation))
 
+    @abc.abstractmethod
     def check(self, motion: Motion) -> None:
-        """Check that a motion has what this sensor measures, or what disturbs it.
+        """Check that a true motion has what disturbs this sensor.
 
         Raises:
             BadInput: it has not.
@@ -48,3 +52,11 @@ class AbstractVelocitySensor(AbstractSensor):
     @abc.abstractmethod
     def velocity_noise(self) -> Float[Array, "6"]:
         """Standard deviation of each reading of u, v, w (m/s), p, q, r (rad/s); infinite for entries that it lacks."""
+
+
+def error_slopes(sensor: AbstractSensor, motion: Motion) -> Float[Array, "width errors"]:
+    """Slopes of a reading in the correlated errors of a sensor: each is added to one entry unless it says otherwise."""
+    if isinstance(sensor, AbstractDisturbedSensor):
+        return sensor.error_slopes(motion)
+    assert sensor.sampling.errors is not None
+    return jnp.eye(len(sensor.reading(motion)), len(sensor.sampling.errors.deviation))
