@@ -49,6 +49,7 @@ class MetricsState(NamedTuple):
     saturated: Scalar
     weights_peak: PerAxis | None  # None for a law without weights
     bad_readings: Scalar
+    nees: Scalar | None  # sum over samples; None without a filter that says how large its errors are
     settling: "Settling"
     previous: Any  # (t, input, supply, inside) of the sample before
 
@@ -153,6 +154,7 @@ class Metrics(AbstractAccumulator):
             saturated=zero,
             weights_peak=axes if "weights" in signals else None,
             bad_readings=zero,
+            nees=zero if "nees" in signals else None,
             settling=Settling(zero, axes, axes, axes, zero, zero),
             previous=(zero, jnp.zeros_like(signals["input"]), zero, zero),
         )
@@ -182,6 +184,7 @@ class Metrics(AbstractAccumulator):
             saturated=state.saturated + inside * signals["saturated"].mean(),
             weights_peak=weights_peak,
             bad_readings=jnp.maximum(state.bad_readings, inside * signals["bad_readings"].astype(inside.dtype)),
+            nees=None if state.nees is None else state.nees + inside * signals["nees"],
             settling=state.settling.updated(t, signals, t <= self.stop + _HAIR),
             previous=(t, applied, supply, inside),
         )
@@ -214,6 +217,8 @@ class Metrics(AbstractAccumulator):
             "saturated_fraction": state.saturated / count,
             "bad_readings": state.bad_readings,
         }
+        if state.nees is not None:
+            found["nees"] = state.nees / count
         return {name: np.where(np.isnan(count), np.nan, value) for name, value in found.items()}
 
     def per_axis(self, state: MetricsState) -> dict[str, list[float]]:
@@ -334,7 +339,7 @@ _OF_OUTPUTS = {
 _TURN = "orientation_rms"
 _WHICH = {"position": "outputs in m", "attitude": "outputs in rad", _ALL: "outputs that share another unit"}
 
-# In the order of tables. `Metrics` has those up to `bad_readings`; the others are known once a run is over.
+# In the order of tables. `Metrics` has those up to `nees`; the others are known once a run is over.
 MEANINGS = {
     of_group(group, name): Metric(
         metric.unit.replace("[axis]", next((unit for unit, named in _GROUPS.items() if named == group), "[axis]")),
@@ -360,6 +365,11 @@ MEANINGS = {
     ),
     "saturated_fraction": Metric("", "share of the time, mean over inputs, at which an input is saturated"),
     "bad_readings": Metric("", "number of readings that were not finite, left out or replaced by expected values"),
+    "nees": Metric(
+        "",
+        "normalised estimation error squared of position, velocity and attitude, mean; 9 where the errors of the "
+        "navigation filter are as large as it says",
+    ),
     "energy_balance_residual": Metric(
         "", "residual of the energy balance as a share of the energy supplied, due to rounding"
     ),
@@ -390,6 +400,7 @@ def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, 
     own_groups = {of_group(group, name) for group in output_groups(plant.output_units) for name in possible}
     others = {of_group(group, name) for group in (*_GROUPS.values(), _ALL) for name in _OF_OUTPUTS} - own_groups
     others |= set() if euler_places(plant.outputs) else {_TURN}
+    others |= set() if "nees" in signals else {"nees"}
     found = {name: metric for name, metric in MEANINGS.items() if name not in others}
     for metric in own:
         for name, meaning in metric.metrics().items():

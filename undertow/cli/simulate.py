@@ -27,6 +27,7 @@ from undertow.scenario.finished_run import (
     certificate_of,
     compare,
     metrics_of,
+    navigation_of,
     requirements_of,
     transitions_of,
 )
@@ -127,6 +128,8 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
         console.print(terminal_table(certificate_rows(certificate, window)))
     if (transitions := transitions_of(executed.dataset)) is not None:
         console.print(terminal_table(transition_rows(transitions)))
+    for finding in (navigation_of(executed.dataset) or {"findings": ()})["findings"]:
+        typer.echo(f"Advice: {finding}.", err=True)
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
     console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     for name, one in requirements_of(executed.dataset).items():

@@ -21,9 +21,17 @@ from undertow.report.run_tables import (
     fault_rows,
     memory_rows,
     metrics_rows,
+    navigation_rows,
     transition_rows,
 )
-from undertow.scenario.finished_run import certificate_of, faults_of, metrics_of, transitions_of, window_of
+from undertow.scenario.finished_run import (
+    certificate_of,
+    faults_of,
+    metrics_of,
+    navigation_of,
+    transitions_of,
+    window_of,
+)
 
 _DIGITS = 4
 
@@ -91,6 +99,10 @@ def _page(
         sections.append(section("faults", "Faults", _table(fault_rows(faults, input_names(run)))))
     if (transitions := transitions_of(run)) is not None:
         sections.append(section("supervision", "Supervision", _table(transition_rows(transitions))))
+    if (navigated := navigation_of(run)) is not None:
+        assumed = navigation_rows(navigated)
+        below = [tag("p", prose(one)) for one in assumed.sentences]
+        sections.append(section("navigation", assumed.title, _table(assumed), *below))
     if certificate is not None:
         hypotheses = certificate_rows(certificate, window)
         below = [tag("p", prose(one)) for one in hypotheses.sentences]

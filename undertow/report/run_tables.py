@@ -104,6 +104,38 @@ def fault_rows(faults: Sequence[Mapping[str, Any]], inputs: Sequence[str]) -> Ru
     return RunTable("Faults", ("target", "mode", "severity", "onset", "duration"), rows)
 
 
+def navigation_rows(navigated: Mapping[str, Any]) -> RunTable:
+    """What the navigation filter assumed of each sensor, its innovations, and whether it was as accurate as it said."""
+    listed = lambda values: ", ".join(dict.fromkeys(f"{value:.3g}" for value in values)) or "-"
+    times = lambda one: ", ".join(
+        dict.fromkeys("constant" if time is None else f"{time:.3g}" for time in one["correlation_time"])
+    )
+    rows: list[tuple[str | float, ...]] = [
+        (
+            one["sensor"],
+            listed(one["noise"]),
+            listed(one["correlated"]),
+            times(one) or "-",
+            one["innovation_rms"],
+            one["innovation_correlation"],
+            _share(one["inconsistent"]),
+        )
+        for one in navigated["sensors"]
+    ]
+    head = ("sensor", "noise", "correlated error", "over (s)", "innovations", "correlation", "inconsistent for")
+    nees = navigated["nees"]
+    said = "is not known before the steady window" if nees is None else f"is {nees:.3g}"
+    sentences = (
+        f"NEES, the normalised estimation error squared of position, velocity and attitude, {said}; 9 is expected.",
+        "Noise and correlated errors are the standard deviations that the filter assumed, in the units of the "
+        "readings. Innovations are the rms of normalised ones and the correlation of successive ones over 30 s, at "
+        "worst or, where they are consistent, at the end; 1 and 0 are as assumed. A constant error that no other "
+        "sensor contradicts is in none of them.",
+        *(f"{one}." for one in navigated["findings"]),
+    )
+    return RunTable("Navigation filter", head, rows, sentences)
+
+
 def transition_rows(transitions: Sequence[Transition]) -> RunTable:
     """Transitions of the supervisor: when, to which state, and why."""
     rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]

@@ -11,6 +11,7 @@ import xarray as xr
 
 from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
+from undertow.analysis.navigation_consistency import navigation_consistency
 from undertow.analysis.success import Success, judged
 from undertow.analysis.temporal.requirements import Requirement, contiguous, needed_signals
 from undertow.analysis.temporal.requirements import judged as required
@@ -105,6 +106,8 @@ def label(loop: ClosedLoop, outcome: Outcome, how: Measuring, attributes: dict[s
         kept = contiguous(outcome.signals, needed_signals(how.requirements))
         found = required(how.requirements, kept, how.record, steady or {}, int(status), ended, how.duration)
         dataset.attrs["requirements"] = to_json({name: one._asdict() for name, one in found.items()})
+    if (navigated := navigation_consistency(loop, dataset, steady)) is not None:
+        dataset.attrs["navigation"] = to_json(navigated)
     if (supervised := state_in(outcome.final[1])) is not None:
         dataset.attrs["transitions"] = to_json([one._asdict() for one in transitions(supervised.log)])
     dataset.attrs["content_hash"] = content_hash(dataset)
@@ -146,6 +149,11 @@ def requirements_of(dataset: xr.Dataset) -> dict[str, Any]:
 def certificate_of(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Certificate of a run from its attributes; None for a controller without one, and in older files."""
     return json.loads(dataset.attrs["certificate"]) if "certificate" in dataset.attrs else None
+
+
+def navigation_of(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """What a navigation filter assumed, and whether it was as accurate; None without one that says, as `observer`."""
+    return json.loads(dataset.attrs["navigation"]) if "navigation" in dataset.attrs else None
 
 
 def transitions_of(dataset: xr.Dataset) -> list[Transition] | None:

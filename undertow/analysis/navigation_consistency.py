@@ -1,0 +1,88 @@
+"""Whether the navigation filter of a finished run was as accurate as it said, and what it assumed of its sensors."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.from_sensors import SensorNavigation, sensor_names
+from undertow.navigation.kalman import Kalman
+from undertow.sensors.propeller_speed import PropellerSpeed
+from undertow.sensors.sensor import AbstractSensor
+
+_EXPECTED = 9  # mean of the normalised square of errors of three positions, three velocities and three angles
+_TOO_LARGE = 2  # times as much; the mean of a run departs less by chance
+
+
+def navigation_consistency(
+    loop: ClosedLoop, run: xr.Dataset, metrics: Mapping[str, Any] | None
+) -> dict[str, Any] | None:
+    """What the filter assumed, and what its innovations and the truth say of it; None for a loop without such a filter.
+
+    Args:
+        loop: the closed loop that was run.
+        run: its dataset.
+        metrics: of the steady window; None where the run did not reach it.
+
+    Returns:
+        `sensors`: name, assumed standard deviations, and innovations of each; `nees`, or None; `findings`: sentences.
+    """
+    navigation = loop.navigation
+    if not (isinstance(navigation, SensorNavigation) and isinstance(navigation.filter, Kalman)):
+        return None
+    own, found = navigation.filter, []
+    for i, (name, sensor) in enumerate(zip(sensor_names(own.sensors), own.sensors, strict=True)):
+        if not isinstance(sensor, PropellerSpeed):
+            found.append({"sensor": name} | _assumed(own, sensor) | _innovations(run, i))
+    nees = None if metrics is None else metrics.get("nees")
+    return {"sensors": found, "nees": nees, "findings": _findings(found, nees)}
+
+
+def _assumed(own: Kalman, sensor: AbstractSensor) -> dict[str, list[float]]:
+    """Standard deviations that the filter assumes: of the noise of each entry, and of the correlated errors."""
+    scale, sampling = float(np.asarray(own.noise_scale)), sensor.sampling
+    plain = lambda values, factor=1.0: (factor * np.ravel(np.asarray(values, dtype=float))).tolist()
+    found = {"noise": plain(sampling.noise, scale), "correlated": [], "correlation_time": []}
+    errors = sampling.errors
+    if own.sensor_error_states and errors is not None:
+        found |= {"correlated": plain(errors.deviation, scale), "correlation_time": plain(errors.correlation_time)}
+    return found
+
+
+def _innovations(run: xr.Dataset, sensor: int) -> dict[str, float]:
+    """Innovations of a sensor where they contradict the filter most, or at the end where they never do."""
+    of_sensor = lambda name: run[name].values[:, sensor]
+    flagged = of_sensor("inconsistent_sensors") > 0
+    worst = lambda name: float(of_sensor(name)[flagged].max() if flagged.any() else of_sensor(name)[-1])
+    return {
+        "innovation_rms": worst("innovation_rms"),
+        "innovation_correlation": worst("innovation_correlation"),
+        "inconsistent": float(flagged.mean()),
+    }
+
+
+def _findings(sensors: list[dict[str, Any]], nees: float | None) -> list[str]:
+    """Sentences about a filter that is surer than it may be."""
+    contradicted = [one for one in sensors if one["inconsistent"] > 0]
+    found = []
+    if contradicted:
+        each = ", ".join(
+            f"those of {one['sensor']} are {one['innovation_rms']:.2g} times as large as it assumes and correlated by "
+            f"{one['innovation_correlation']:.2f} from one reading to the next"
+            for one in contradicted
+        )
+        found.append(
+            f"The navigation filter is inconsistent with its innovations: {each}. State such errors in the "
+            "sensors (`correlated_noise`, `correlation_time`; of a compass `hard_iron`, `soft_iron`, `interference`), "
+            "or raise its `noise_scale`"
+        )
+    if nees is not None and nees > _TOO_LARGE * _EXPECTED:
+        unseen = "" if contradicted else ", and no innovation shows it"
+        found.append(
+            f"The errors of the navigation filter are {math.sqrt(nees / _EXPECTED):.2g} times as large as it says "
+            f"(`nees` is {nees:.3g}, {_EXPECTED} is expected){unseen}"
+        )
+    return found
