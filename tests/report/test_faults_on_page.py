@@ -1,6 +1,6 @@
 """A run's page lists its faults and the transitions of its supervisor."""
 
-from undertow.report.run_tables import fault_rows, transition_rows
+from undertow.report.run_tables import fault_rows, navigation_rows, transition_rows
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
@@ -21,3 +21,14 @@ def test_rows_of_transitions():
         [Transition(10.05, State.DEGRADED, "saturated", 2.0, 0.0), Transition(11, State.ACTIVE, "", 0, 0)]
     )
     assert rows.rows == [("10.05 s", "DEGRADED", "saturated: 2, limit 0"), ("11 s", "ACTIVE", "")]
+
+
+def test_rows_of_a_navigation_filter():
+    """What it assumed, its innovations, NEES with the number that is expected, and what was found."""
+    sensor = {"sensor": "compass", "noise": [0.01], "correlated": [0.05, 0.05], "correlation_time": [None, None]}
+    found = {"innovation_rms": 1.7, "innovation_correlation": 0.4, "inconsistent": 0.25}
+    shown = navigation_rows({"sensors": [sensor | found], "nees": 45.0, "findings": ["It is wrong"]})
+    assert shown.rows == [("compass", "0.01", "0.05", "constant", 1.7, 0.4, "25.0 %")]
+    assert "is 45; 9 is expected" in shown.sentences[0] and shown.sentences[-1] == "It is wrong."
+    early = navigation_rows({"sensors": [], "nees": None, "findings": []})
+    assert "is not known before the steady window" in early.sentences[0]
