@@ -8,6 +8,7 @@ from good_scenario import SCENARIO, SMALL
 from ruamel.yaml import YAML
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
+from undertow.analysis.success import DEFAULT, SATURATED
 from undertow.scenario.provenance import checksum, content_hash
 
 pytestmark = pytest.mark.full
@@ -36,7 +37,7 @@ def test_files_of_a_run(ran, whole_figures, tmp_path):
     units = ("[axis]", "[axis]/s", "[axis]/s^2")  # of plants whose outputs are neither in m nor in rad
     defined = {name for name, metric in MEANINGS.items() if metric.unit not in units}
     assert set(metrics["whole"]) == {*defined, *PER_AXIS.values()} == set(metrics["steady"])
-    assert metrics["success"]["criterion"] == {"position_rms": 0.05, "attitude_rms": 0.05}
+    assert metrics["success"]["criterion"] == DEFAULT | SATURATED
     resolved = YAML(typ="safe", pure=True).load((folder / "scenario.yaml").read_text())
     assert resolved["controller"]["adaptation"] == 100.0
     with xr.open_dataset(folder / "run.nc") as dataset:
