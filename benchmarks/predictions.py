@@ -55,10 +55,10 @@ def main() -> None:
         prediction = predict(executed)
         steady = executed.steady or {}
         simulated = [float(steady.get(name, np.nan)) for name in _METRICS]
-        foretold = [float((prediction.metrics or {}).get(name, np.nan)) for name in _METRICS]
-        ratios = np.array(foretold) / np.array(simulated)
+        predicted = [float((prediction.metrics or {}).get(name, np.nan)) for name in _METRICS]
+        ratios = np.array(predicted) / np.array(simulated)
         within.append(bool((np.abs(ratios - 1) < 0.2).all()))
-        values = zip((1e3, np.degrees(1)), foretold, simulated, strict=True)
+        values = zip((1e3, np.degrees(1)), predicted, simulated, strict=True)
         numbers = "  ".join(f"{scale * one:>9.4g} {scale * other:>9.4g}" for scale, one, other in values)
         print(f"{vehicle:<16}{law:<22}{rate:>4}{sea:>5}  {numbers}  {comparison(prediction, executed)}", flush=True)
     print(f"{sum(within)} of {len(within)} loops are predicted within 20 % in both")

@@ -113,7 +113,7 @@ def scenario_of(one: Combination, rate: int, law: str) -> dict[str, Any]:
 
 
 def changed(plant: HybridVehicle, factors: dict[str, float]) -> HybridVehicle:
-    """The plant with factors on its numbers; the law is not told."""
+    """The plant with factors on its numbers, of which the law knows nothing."""
     vehicle, thruster = plant.vehicle, plant.thruster
     factor = lambda name: factors.get(name, 1.0)
     vehicle = dataclasses.replace(

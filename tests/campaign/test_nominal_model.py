@@ -66,7 +66,7 @@ def test_the_controller_is_told_the_nominal_plant_in_every_trial():
 def test_the_nominal_model_follows_where_the_scenario_asks_for_it():
     several = campaign_of({"follow": True}, vary=SPREAD)
     true, known = np.array([masses(build(from_data(several.data(i)))) for i in range(3)]).T
-    assert np.array_equal(true, known) and "is told the plant of each trial" in several.nominal_model()
+    assert np.array_equal(true, known) and "knows the plant of each trial" in several.nominal_model()
 
 
 def test_a_sweep_is_not_told_but_a_variant_is():

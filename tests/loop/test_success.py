@@ -120,7 +120,8 @@ def test_completed_is_not_success():
     found = execute(SCENARIO)
     error = found.steady["position_rms"]
     assert found.status is Status.OK and found.dataset.attrs["status"] == "completed"
-    assert found.success.criterion == {"position_rms": 0.05} and found.success.within == (error < 0.05)
+    assert found.success.criterion == {"position_rms": 0.05, "saturated_fraction": 0.25}
+    assert found.success.within == (error < 0.05)
     for most, within in ((1.01 * error, True), (0.99 * error, False)):
         assert execute(SCENARIO | {"success": {"position_rms": most}}).success.within is within
     assert execute(SCENARIO | {"success": {}}).success is None

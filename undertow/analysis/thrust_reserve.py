@@ -10,7 +10,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import linprog
 
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
@@ -155,6 +154,8 @@ def _share(effect, required, low, high, lost, axes) -> float:
 
 def _most(gain: np.ndarray, zero: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     """Largest gain . f with `zero` f = 0 and f between its limits."""
+    from scipy.optimize import linprog  # a third of a second, which scenarios far from their limits need not wait for
+
     bounds = list(zip(low, high, strict=True))
     rows = {"A_eq": zero, "b_eq": np.zeros(len(zero))} if len(zero) else {}
     found = linprog(-gain, bounds=bounds, **rows)

@@ -1,4 +1,4 @@
-"""A scenario with other values at some key paths. The controller is told the nominal plant, not that of the trial."""
+"""A scenario with other values at some key paths. The controller knows the nominal plant, not that of the trial."""
 
 import copy
 import itertools
@@ -50,13 +50,13 @@ def nominal_model_sentence(data: Mapping[str, Any], values: Mapping[str, Any], k
         return ""
     keys = " and ".join(filter(None, (", ".join(varied[:-1]), varied[-1])))
     if (data.get("model") or {}).get("follow"):
-        return f"The controller is told the plant of each trial: its nominal model follows {keys}."
+        return f"The controller knows the plant of each trial: its nominal model follows {keys}."
     verb = "varies" if len(varied) == 1 else "vary"
-    return f"The controller is told the nominal plant of the scenario: {keys} {verb} in the simulated plant alone."
+    return f"The controller knows the nominal plant of the scenario: {keys} {verb} in the simulated plant alone."
 
 
 def _unknown(values: Mapping[str, Any], known: Container[str]) -> list[str]:
-    """Key paths of values that a controller is not told: numbers and published parameter sets of the plant."""
+    """Key paths of values that a controller does not know: numbers and published parameter sets of the plant."""
     return [key for key, value in values.items() if key not in known and _is_number_of_plant(key, value)]
 
 

@@ -49,9 +49,9 @@ class AbstractActuatorModel(eqx.Module):
     def advance(self, state: PyTree, u: Inputs, dt: Float[Array, ""]) -> PyTree:
         """State one sampling time later, with the input held."""
 
+    @abc.abstractmethod
     def dead_zone(self) -> Float[Array, ""]:
         """Largest input without effect, as a share of the limit of the input."""
-        return jnp.zeros(())
 
     @abc.abstractmethod
     def quasi_static(self) -> "AbstractActuatorModel":
@@ -99,6 +99,9 @@ class DirectActuator(AbstractMemorylessActuator):
 
     def command(self, state, force, rate):
         return force / self.gain
+
+    def dead_zone(self):
+        return jnp.zeros(())
 
 
 class LaggedActuator(AbstractActuatorModel):

@@ -169,6 +169,9 @@ class AxialFlowCurve(AbstractMemorylessActuator):
     def command(self, state, force, rate) -> PerThruster:
         return self.thruster.steady_voltage(force)
 
+    def dead_zone(self):
+        return jnp.zeros(())  # `command` is beyond that of the propeller, and the lag smooths what is left
+
 
 def _positive_root(a: PerThruster, b: PerThruster, c: PerThruster) -> PerThruster:
     """x >= 0 with a x^2 + b x = c, for a > 0 and c >= 0; slope 0 at c = 0 where b is not positive."""
