@@ -16,6 +16,7 @@ their reference, and have status completed. About ten minutes on two cores.
 import argparse
 import dataclasses
 import itertools
+import sys
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -56,6 +57,14 @@ class Combination(NamedTuple):
     def group(self) -> tuple[str, str, bool]:
         """What runs of one program share."""
         return self.vehicle, self.reference, self.readings
+
+
+class Run(NamedTuple):
+    """A combination that was run."""
+
+    combination: Combination
+    errors: Errors  # of one run
+    advice: list[str]  # where it is lost: what `check` says of it beforehand
 
 
 def references(reach: float, speed: float) -> dict[str, dict[str, Any]]:
@@ -160,37 +169,40 @@ def main() -> None:
     order = sorted(combinations(options.runs, options.seed), key=Combination.group)
     cache, done = PartCache(), []
     for _, group in itertools.groupby(order, key=Combination.group):
-        some = list(group)
-        each = [built_of(one, options.rate, options.law, cache) for one in some]
-        errors = run_all([one.closed_loop for one in each], 1 / options.rate, range(len(each)), _SUBSTEPS)
-        done += zip(some, each, _rows(errors), strict=True)
+        done += runs_of(list(group), options.rate, options.law, cache)
+        print(f"{len(done)} of {options.runs} runs", file=sys.stderr)
     _report(done, options.list)
 
 
-def _rows(errors: Errors) -> list[Errors]:
-    return [Errors(*(np.array([column[i]]) for column in errors)) for i in range(len(errors.position))]
+def runs_of(some: list[Combination], rate: int, law: str, cache: PartCache) -> list[Run]:
+    """Combinations of one group, run at once."""
+    each = [built_of(one, rate, law, cache) for one in some]
+    errors = run_all([one.closed_loop for one in each], 1 / rate, range(len(each)), _SUBSTEPS)
+    alone = [Errors(*(column[i : i + 1] for column in errors)) for i in range(len(each))]
+    of_lost = [warnings(built) if found.lost()[0] else [] for built, found in zip(each, alone, strict=True)]
+    return [Run(*one) for one in zip(some, alone, of_lost, strict=True)]
 
 
-def _report(done: list[tuple[Combination, Built, Errors]], listed: bool) -> None:
+def _report(done: list[Run], listed: bool) -> None:
     print(
         f"{'vehicle':<16}{'runs':>5}{'lost':>6}{'warned':>8}{'bad':>5}{'median mm':>11}{'90 %':>9}{'upside down':>13}"
     )
-    warned = [bool(found.lost()[0] and warnings(built)) for _, built, found in done]
     for vehicle in (*VEHICLES, "all"):
-        rows = [i for i, (one, *_) in enumerate(done) if vehicle in (one.vehicle, "all")]
-        errors = Errors(*(np.concatenate(column) for column in zip(*(done[i][2] for i in rows), strict=True)))
+        some = [one for one in done if vehicle in (one.combination.vehicle, "all")]
+        errors = Errors(*(np.concatenate(column) for column in zip(*(one.errors for one in some), strict=True)))
         position = np.sort(1e3 * errors.position)
         print(
-            f"{vehicle:<16}{len(rows):>5}{errors.lost().sum():>6}{sum(warned[i] for i in rows):>8}"
+            f"{vehicle:<16}{len(some):>5}{errors.lost().sum():>6}{sum(bool(one.advice) for one in some):>8}"
             f"{errors.bad().sum():>5}{np.median(position):>11.1f}{position[int(0.9 * len(position))]:>9.1f}"
             f"{((errors.farthest > _UPSIDE_DOWN) & ~errors.ended).sum():>13}"
         )
-    for one, built, found in done if listed else ():
+    for combination, found, advice in done if listed else ():
         if found.bad()[0]:
-            factors = ", ".join(f"{name} {value:.3g}" for name, value in one.factors.items())
-            where = f"{one.vehicle}, {one.reference}, {'readings' if one.readings else 'perfect'}, {factors}"
+            factors = ", ".join(f"{name} {value:.3g}" for name, value in combination.factors.items())
+            measured = "readings" if combination.readings else "perfect"
+            where = f"{combination.vehicle}, {combination.reference}, {measured}, {factors}"
             size = f"{found.position[0]:.3g} m, {found.attitude[0]:.2g} rad rms, {found.farthest[0]:.2g} rad"
-            print(f"{where}: {size}{', ended' if found.ended[0] else ''}", *warnings(built), sep="\n    ")
+            print(f"{where}: {size}{', ended' if found.ended[0] else ''}", *advice, sep="\n    ")
 
 
 if __name__ == "__main__":

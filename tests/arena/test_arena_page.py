@@ -63,9 +63,11 @@ def test_tables(board):
     assert lines[-1] == "pid,delay,odin,10.0,,,0.5,3,3"
 
 
-def test_rank_is_by_error():
-    good, bad = standing("good", (0.1, 0.1, 0.1), 3), standing("bad", (0.2, 0.2, 0.2), 3)
-    assert [one.score.name for one in ranked([bad, good])] == ["good", "bad"]
+def test_rank_is_by_lost_trials_and_then_by_error():
+    good, bad = standing("good", (0.2, 0.2, 0.2), 3), standing("bad", (0.3, 0.3, 0.3), 3)
+    loses = standing("loses", (0.01, 0.01, 10.0), 3)
+    assert loses.score.error < good.score.error
+    assert [one.score.name for one in ranked([bad, loses, good])] == ["good", "bad", "loses"]
 
 
 @pytest.mark.full

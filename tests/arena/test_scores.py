@@ -33,6 +33,8 @@ def test_score_is_the_geometric_mean_of_medians():
     assert score.error == pytest.approx(math.sqrt(each.prod()), rel=1e-12)
     assert score.mean([STATION]) == pytest.approx(each[0]) and math.isnan(score.mean([]))
     assert score.within == pytest.approx(2 / 6) and score.lost == pytest.approx(1 / 6)
+    more = result([0.2] * 30)  # every task counts the same, whatever its trials
+    assert scored("law", {STATION: one, MOTION: more}).lost == pytest.approx(1 / 6)
     assert score.low <= score.error <= score.high
     assert score.activity == pytest.approx(0.2)
 

@@ -1,11 +1,12 @@
 """A law as it enters the arena: one campaign whose variants are the tasks, and the folder that keeps its results."""
 
+import itertools
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.arena.tasks import CELLS, VERSION, scenario_keys
+from undertow.arena.tasks import CELLS, VERSION, Keys, scenarios
 from undertow.arena.tuned_gains import Gains, controller_of
 from undertow.campaign.campaign_schema import validate
 from undertow.campaign.prepare import Prepared, prepare_campaign
@@ -46,15 +47,10 @@ def folder_of(out: Path, name: str) -> Path:
     return out / LAWS / in_letters(name)
 
 
-def variant(cell: Cell) -> str:
-    """Name of the variant of a task on a vehicle."""
-    return f"{cell[0]} {cell[1]}"
-
-
 def prepare_entry(
     law: Candidate, trials: int, cells: Sequence[Cell] = CELLS, gains: Gains | None = None
 ) -> tuple[Entry, Prepared]:
-    """The campaign of a law: a variant for every task and vehicle that it accepts.
+    """The campaign of a law: variants for every task and vehicle that it accepts.
 
     Args:
         law: the law.
@@ -68,31 +64,38 @@ def prepare_entry(
     Raises:
         BadInput: the law accepts no task, or the campaign cannot be built.
     """
-    scenarios = {cell: scenario_keys(*cell) | {"controller": controller_of(law, cell[1], gains)} for cell in cells}
+    each = {cell: with_law(cell, law, gains) for cell in cells}
     refused: dict[Cell, str] = {}
     try:
-        prepared = campaign_of({variant(cell): keys for cell, keys in scenarios.items()}, trials)
+        prepared = campaign_of(dict(itertools.chain(*(of_cell.items() for of_cell in each.values()))), trials)
     except BadInput:
-        refused = {cell: why for cell in cells if (why := _why_not(scenarios[cell]))}
+        refused = {cell: why for cell in cells if (why := _why_not(each[cell]))}
         if len(refused) in (0, len(cells)):
             raise
-        accepted = {variant(cell): keys for cell, keys in scenarios.items() if cell not in refused}
-        prepared = campaign_of(accepted, trials)
+        accepted = [of_cell.items() for cell, of_cell in each.items() if cell not in refused]
+        prepared = campaign_of(dict(itertools.chain(*accepted)), trials)
     sentences = {} if gains is None else gains.sentences
     return Entry(law.name, VERSION, law.changes["controller"], tuple(cells), refused, sentences), prepared
 
 
-def campaign_of(scenarios: dict[str, dict[str, Any]], trials: int) -> Prepared:
+def with_law(cell: Cell, law: Candidate, gains: Gains | None) -> dict[str, Keys]:
+    """The scenarios of a task on a vehicle with a law, by their names."""
+    controller = controller_of(law, cell[1], gains)
+    return {name: keys | {"controller": controller} for name, keys in scenarios(*cell).items()}
+
+
+def campaign_of(variants: dict[str, Keys], trials: int) -> Prepared:
     """A campaign whose variants are whole scenarios with the same keys."""
-    data = {"scenario": next(iter(scenarios.values())), "trials": trials, "variants": scenarios}
+    data = {"scenario": next(iter(variants.values())), "trials": trials, "variants": variants}
     text = from_data(data)
     return prepare_campaign(validate(text), text)
 
 
-def _why_not(keys: dict[str, Any]) -> str:
-    """Why a scenario cannot be built; empty where it can."""
+def _why_not(each: dict[str, Keys]) -> str:
+    """Why one of the scenarios cannot be built; empty where all can."""
     try:
-        build(from_data(keys))
+        for keys in each.values():
+            build(from_data(keys))
     except BadInput as error:
         return str(error)
     return ""

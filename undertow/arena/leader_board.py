@@ -92,8 +92,8 @@ def board_of(out: Path) -> Board:
 
 
 def ranked(standings: Sequence[Standing]) -> list[Standing]:
-    """Best first."""
-    return sorted(standings, key=lambda one: one.score.error)
+    """Those that lose fewest vehicles first, and among those the one with the least error."""
+    return sorted(standings, key=lambda one: (one.score.lost, one.score.error))
 
 
 _HEAD = ("law", "error / tolerance", "within tolerance", "lost", "against robust", "input variation (%/s)", "step (us)")

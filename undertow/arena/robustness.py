@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.arena.entry import campaign_of
-from undertow.arena.scores import METRICS, trial_errors
-from undertow.arena.tasks import Keys, motion_keys
+from undertow.arena.scores import trial_errors
+from undertow.arena.tasks import METRICS, Keys, motion_keys
 from undertow.arena.tuned_gains import Gains, controller_of
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.prepare import Prepared

@@ -11,15 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.arena.entry import Cell, Entry, variant
-from undertow.arena.tasks import scenario_keys
+from undertow.arena.entry import Cell, Entry
+from undertow.arena.tasks import METRICS, scenarios, tolerances
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.store_results import Results, load
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 
 FINEST, LOST = 0.01, 10.0
-METRICS = ("position_rms", "orientation_rms")
 _RESAMPLES, _SHARES = 1000, (2.5, 97.5)  # of the interval of a score
 
 
@@ -51,10 +50,11 @@ class Score(NamedTuple):
 
     Attributes:
         name: of the law.
-        error: geometric mean, over tasks and vehicles, of the median error in tolerances: what the rank is by.
+        error: geometric mean, over tasks and vehicles, of the median error in tolerances: what the rank is by where
+            as few are lost.
         low, high: 95 % interval, from resampling the trials of every cell.
-        within: share of the trials with position and orientation within their tolerances.
-        lost: share of the trials that failed or had ten times the tolerance.
+        within: share of the trials with position and orientation within their tolerances; every cell counts the same.
+        lost: share of the trials that failed or had ten times the tolerance, likewise.
         activity: geometric mean of the median variation of the inputs, as a share of their limit per second.
         cells: task and vehicle -> its trials.
     """
@@ -102,7 +102,8 @@ def score_of(entry: Entry, folder: Path) -> Score:
     except OSError as error:
         hint = f"Run the arena again for {entry.name} with --overwrite"
         raise BadInput("--out", "have results that can be read", str(error).partition(";")[0], hint=hint) from None
-    every = {cell: _refused(results.campaign.trials) for cell in entry.refused}
+    trials = results.campaign.trials
+    every = {cell: _refused(trials * len(scenarios(*cell))) for cell in entry.refused}
     every |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
     return scored(entry.name, {cell: every[cell] for cell in entry.cells})
 
@@ -112,8 +113,8 @@ def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
     random = np.random.default_rng(0)
     medians = [np.median(_resampled(random, cell.errors), axis=1) for cell in cells.values()]
     low, high = np.percentile(np.exp(np.mean(np.log(medians), axis=0)), _SHARES)
-    every = np.concatenate([cell.errors for cell in cells.values()])
-    within = np.concatenate([_within(cell, one) for one, cell in cells.items()])
+    within = [np.mean(_within(result, cell)) for cell, result in cells.items()]
+    lost = [np.mean(result.errors >= LOST) for result in cells.values()]
     active = [float(np.nanmedian(cell.activity)) for cell in cells.values() if np.isfinite(cell.activity).any()]
     return Score(
         name,
@@ -121,16 +122,10 @@ def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
         float(low),
         float(high),
         float(np.mean(within)),
-        float(np.mean(every >= LOST)),
+        float(np.mean(lost)),
         geometric_mean([max(one, 1e-9) for one in active]),
         cells,
     )
-
-
-def tolerances(cell: Cell) -> tuple[float, ...]:
-    """Tolerances of position (m) and orientation (rad)."""
-    success = scenario_keys(*cell)["success"]
-    return tuple(success[name] for name in METRICS)
 
 
 def _resampled(random: np.random.Generator, errors: np.ndarray) -> np.ndarray:
@@ -138,7 +133,7 @@ def _resampled(random: np.random.Generator, errors: np.ndarray) -> np.ndarray:
 
 
 def _within(result: CellResult, cell: Cell) -> np.ndarray:
-    position, orientation = tolerances(cell)
+    position, orientation = tolerances(*cell)
     return (result.position <= position) & (result.orientation <= orientation)  # NaN is not
 
 
@@ -150,19 +145,21 @@ def _refused(trials: int) -> CellResult:
 def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, CellResult]:
     """The trials of a campaign by task and vehicle."""
     combinations, rows = results.combinations, results.rows
-    number = {name: place for place, (name,) in enumerate(map(results.named, range(len(cells))))}
+    names = {cell: tuple(scenarios(*cell)) for cell in cells}
+    variants = range(sum(map(len, names.values())))
+    number = {name: place for place, (name,) in enumerate(map(results.named, variants))}
     found = {}
     for cell in cells:
-        mine = combinations == number[variant(cell)]
+        mine = np.isin(combinations, [number[name] for name in names[cell]])
         if not mine.any():
             hint = "Run the arena again for this law, which continues"
-            raise BadInput("--out", "have trials of every task", f"none of {variant(cell)} for {law}", hint=hint)
+            raise BadInput("--out", "have trials of every task", f"none of {' on '.join(cell)} for {law}", hint=hint)
         column = lambda name, mine=mine: rows[name].values[mine].astype(float)
         status = rows["status"].values[mine]
         position, orientation = map(column, METRICS)
         words = [_word(code) for code in status[status != int(Status.OK)].tolist()]
         found[cell] = CellResult(
-            trial_errors(position, orientation, tolerances(cell)),
+            trial_errors(position, orientation, tolerances(*cell)),
             position,
             orientation,
             column("input_variation") / VEHICLES[cell[1]].limit,

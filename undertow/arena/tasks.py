@@ -1,12 +1,15 @@
-"""The twelve tasks of the arena. A change of any of them, or of a vehicle, is another version of the arena."""
+"""The fifteen tasks of the arena. A change of any of them, or of a vehicle, is another version of the arena."""
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from undertow.arena.vehicles import VEHICLES, ArenaVehicle
 
-VERSION = 1
+VERSION = 2
+
+METRICS = ("position_rms", "orientation_rms")  # those that have tolerances
 
 Keys = dict[str, Any]  # keys of a scenario
 
@@ -27,12 +30,14 @@ class Task(NamedTuple):
         keys: those of the scenario in which it differs from the others, for a vehicle.
         vehicles: that have it.
         orientation: tolerance of the angle between attitude and reference, rad, where it is not that of the vehicle.
+        foreign: whether each published set of the vehicle is simulated under each other one as the model.
     """
 
     question: str
     keys: Callable[[ArenaVehicle], Keys]
     vehicles: tuple[str, ...] = tuple(VEHICLES)
     orientation: float | None = None
+    foreign: bool = False
 
 
 def _plant(v: ArenaVehicle, name: str) -> Keys:
@@ -128,6 +133,21 @@ def _underactuated(v: ArenaVehicle) -> Keys:
     return {"reference": _motion(v), "disturbance": [_current(v)], "plant.thrusters": list(v.two_lost)}
 
 
+def _at_rate(rate: float) -> Callable[[ArenaVehicle], Keys]:
+    """A motion and a current that are fast enough for a wrong model to matter, with a controller of this rate, Hz."""
+
+    def keys(v: ArenaVehicle) -> Keys:
+        current = _current(v) | {"velocity": [2 * one for one in v.current]}
+        return {"reference": _motion(v, 1.5), "disturbance": [current], "loop": _LOOP | {"dt": 1 / rate}}
+
+    return keys
+
+
+def _foreign_model(rate: float) -> Task:
+    question = f"follow a fast motion at {rate:g} Hz with the model of another publication"
+    return Task(question, _at_rate(rate), tuple(name for name, v in VEHICLES.items() if v.sets), foreign=True)
+
+
 TASKS: Mapping[str, Task] = {
     "station_keeping": Task("keep station in waves and a current", _station_keeping),
     "current_step": Task("keep station when a current sets in at once", _current_step),
@@ -149,17 +169,42 @@ TASKS: Mapping[str, Task] = {
         _underactuated,
         orientation=math.radians(90),
     ),
+    "foreign_20_hz": _foreign_model(20),
+    "foreign_50_hz": _foreign_model(50),
+    "foreign_100_hz": _foreign_model(100),
 }
 
 
-def scenario_keys(task: str, vehicle: str) -> Keys:
-    """The keys of the scenario of a task on a vehicle, but for the controller.
+def scenarios(task: str, vehicle: str) -> dict[str, Keys]:
+    """The scenarios of a task on a vehicle, but for the controller, by the names that they have in a campaign.
 
-    Every one of them is given, so that tasks can be the variants of one campaign.
+    There is one, or one for each pair of published sets where the task has foreign models.
     """
+    keys = _scenario_keys(task, vehicle)
+    if not TASKS[task].foreign:
+        return {f"{task} {vehicle}": keys}
+    return {
+        f"{task} {vehicle} {true} under {model}": keys
+        | {
+            "plant": keys["plant"] | {"vehicle": {"kind": vehicle, "parameters": true}},
+            "model": {"vehicle": {"kind": vehicle, "parameters": model}},
+        }
+        for true, model in itertools.permutations(VEHICLES[vehicle].sets, 2)
+    }
+
+
+def tolerances(task: str, vehicle: str) -> tuple[float, float]:
+    """Tolerances of position (m) and orientation (rad)."""
+    v = VEHICLES[vehicle]
+    return v.position, TASKS[task].orientation or v.orientation
+
+
+def _scenario_keys(task: str, vehicle: str) -> Keys:
+    """Every key is given, so that tasks can be the variants of one campaign."""
     v, one = VEHICLES[vehicle], TASKS[task]
     plant = _plant(v, vehicle)
-    keys = {"navigation": "perfect", "faults": [], "model": {}, "steady": {"start": _START}} | one.keys(v)
+    usual = {"navigation": "perfect", "faults": [], "model": {}, "steady": {"start": _START}, "loop": _LOOP}
+    keys = usual | one.keys(v)
     for option in ("thruster", "thrusters"):
         if (value := keys.pop(f"plant.{option}", None)) is not None:
             plant[option] = value
@@ -167,8 +212,8 @@ def scenario_keys(task: str, vehicle: str) -> Keys:
         keys["disturbance"] = [*keys["disturbance"], _NEAR]
     if keys["model"].keys() - {"thruster"}:
         keys["model"] = {"vehicle": {"kind": vehicle, **keys["model"]}}
-    success = {"position_rms": v.position, "orientation_rms": one.orientation or v.orientation}
-    return keys | {"plant": plant, "success": success, "loop": _LOOP}
+    success = dict(zip(METRICS, tolerances(task, vehicle), strict=True))
+    return keys | {"plant": plant, "success": success}
 
 
 def motion_keys(vehicle: str, speed: float = 1.0) -> Keys:
@@ -178,7 +223,7 @@ def motion_keys(vehicle: str, speed: float = 1.0) -> Keys:
         "plant": _plant(v, vehicle),
         "reference": _motion(v, speed),
         "disturbance": [_current(v)],
-        "success": {"position_rms": v.position, "orientation_rms": v.orientation},
+        "success": dict(zip(METRICS, (v.position, v.orientation), strict=True)),
         "steady": {"start": _START},
         "loop": _LOOP,
     }

@@ -22,6 +22,7 @@ class ArenaVehicle(NamedTuple):
         position: tolerance of the position error, rms per axis, m.
         orientation: tolerance of the angle between attitude and reference, rms, rad. Large for a vehicle whose pitch
             follows from its motion.
+        sets: published parameter sets, each of which the tasks with foreign models simulate under each other one.
     """
 
     thruster: dict[str, Any]
@@ -37,6 +38,7 @@ class ArenaVehicle(NamedTuple):
     model: dict[str, Any]
     position: float
     orientation: float = math.radians(5)
+    sets: tuple[str, ...] = ()
 
     @property
     def limit(self) -> float:
@@ -60,6 +62,7 @@ VEHICLES = {
         payload={"mass": 3, "weight": 20, "point": [0.15, 0, 0.1]},
         model={"parameters": "wu2018"},
         position=0.05,
+        sets=("vonbenzon2022", "wu2018", "px4", "ng2024", "gazebo_box_drag"),
     ),
     "bluerov2": ArenaVehicle(
         thruster=_T200,

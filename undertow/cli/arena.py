@@ -8,11 +8,11 @@ from typing import NamedTuple
 import typer
 from rich.console import Console
 
-from undertow.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, write_entry
+from undertow.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, with_law, write_entry
 from undertow.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
 from undertow.arena.robustness import FOLDER, prepare_robustness
-from undertow.arena.tasks import CELLS, TASKS, scenario_keys
-from undertow.arena.tuned_gains import Gains, controller_of, tuned_gains
+from undertow.arena.tasks import CELLS, TASKS
+from undertow.arena.tuned_gains import Gains, tuned_gains
 from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.run_campaign import STORE
@@ -127,7 +127,7 @@ def _cells(tasks: str | None, vehicles: str | None) -> tuple[Cell, ...]:
         asked.append(names)
     found = tuple((task, vehicle) for task, vehicle in CELLS if task in asked[0] and vehicle in asked[1])
     if not found:
-        hint = "`pitch_turn` is for bluerov2_heavy and odin"
+        hint = "`pitch_turn` is for bluerov2_heavy and odin, foreign models for bluerov2_heavy"
         raise BadInput("--tasks", "be tasks that one of the vehicles has", f"{tasks} with {vehicles}", hint=hint)
     return found
 
@@ -174,10 +174,10 @@ def _trials(console: Console, prepared: Prepared, folder: Path, workers: int) ->
 def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
     """Write the scenario of every task, which `undertow simulate` runs."""
     folder.mkdir(exist_ok=True)
-    for task, vehicle in cells:
-        text = dump(scenario_keys(task, vehicle) | {"controller": controller_of(law, vehicle, gains)})
-        said = f"# {law.name} in task {task} on {vehicle}: {TASKS[task].question}.\n"
-        (folder / f"{task}-{vehicle}.yaml").write_text(said + text, encoding="utf-8")
+    for cell in cells:
+        for name, keys in with_law(cell, law, gains).items():
+            said = f"# {law.name} in task {cell[0]} on {cell[1]}: {TASKS[cell[0]].question}.\n"
+            (folder / f"{name.replace(' ', '-')}.yaml").write_text(said + dump(keys), encoding="utf-8")
 
 
 def _conclude(console: Console, folder: Path, pdf: str | None) -> int:

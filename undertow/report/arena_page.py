@@ -15,8 +15,7 @@ from undertow.arena.leader_board import (
     vehicle_rows,
 )
 from undertow.arena.robustness import VEHICLE
-from undertow.arena.scores import tolerances
-from undertow.arena.tasks import TASKS, VERSION
+from undertow.arena.tasks import TASKS, VERSION, tolerances
 from undertow.comparison.step_time import HOW_LONG
 from undertow.comparison.tables import Rows
 from undertow.report.figures.arena import arena_plots
@@ -30,8 +29,9 @@ SCORE = (
     "The error of a trial is the root of the mean square of position error (rms per axis) and orientation error (rms "
     "angle), each divided by its tolerance; it counts from 0.01 to 10, and a run that failed as 10. The score is the "
     "geometric mean, over tasks and vehicles, of the median over the trials, with its 95 % interval from resampling "
-    "them. Within tolerance: trials with both errors below their tolerances. Lost: trials that failed or had ten "
-    "times the tolerance. Input variation: total variation of the inputs per second as a share of their limit."
+    "them. Laws that lose fewer vehicles come first. Within tolerance: trials with both errors below their "
+    "tolerances. Lost: trials that failed or had ten times the tolerance; in both, every task on every vehicle counts "
+    "the same. Input variation: total variation of the inputs per second as a share of their limit."
 )
 _CAPTIONS = {
     "tasks": "Error of every law in every task, in tolerances; the geometric mean over the vehicles of the median over "
@@ -131,7 +131,7 @@ def _definition(board: Board) -> Html:
             if (task, vehicle) not in board.cells:
                 cells.append("-")
                 continue
-            position, orientation = tolerances((task, vehicle))
+            position, orientation = tolerances(task, vehicle)
             cells.append(f"{position:g} m, {math.degrees(orientation):.0f} deg")
         rows.append((task.replace("_", " "), prose(TASKS[task].question), *cells))
     return table(("task", "question", *board.vehicles), rows, wide=True)
