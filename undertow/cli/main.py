@@ -384,10 +384,10 @@ def arena(
 ) -> int:
     """Run control laws through fixed tasks on four vehicles, and write the leader board.
 
-    The fifteen tasks reach from station keeping in waves to the models of other publications. Results of other laws in
-    DIR stay, trials that are there are not repeated, and the same command continues after an interruption. A law of your
-    own enters by `undertow arena ./mine.py:law`. The command writes leaderboard.html, .json, .csv and .md, figures/ and
-    laws/, which has the scenario of every task.
+    The fifteen tasks reach from station keeping in waves to the models of other publications. Results of other laws
+    in DIR stay, trials that are there are not repeated, and the same command continues after an interruption. A law of
+    your own enters by `undertow arena ./mine.py:law`. The command writes leaderboard.html, .json, .csv and .md,
+    figures/ and laws/, which has the scenario of every task.
     """
     from undertow.cli.arena import arena
 
