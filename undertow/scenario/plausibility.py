@@ -21,6 +21,7 @@ from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
 from undertow.disturbances.waves import Waves
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.unactuated_attitude import WEAK, body_force, largest_lean
 
 _SAMPLES = 201  # instants at which a reference is looked at
 _LONG = 1e6  # s, by when a reference that ends has ended
@@ -33,7 +34,7 @@ _DIRECTIONS = 2000
 _EASY, _LOOKS = 0.4, 41  # a motion through the water that is slower than this share of the top speed; instants
 _AT_REST = 1e-3  # m/s
 _SHARES = 101  # of a current, tried one after the other
-_WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
+_LEANS = 1.0  # rad; less is the way of such a vehicle
 _BALANCED = 0.01  # of the force: what may be left of it
 
 
@@ -104,18 +105,16 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
     from scipy.optimize import lsq_linear  # a third of a second, which scenarios without current need not wait for
     from scipy.spatial.transform import Rotation
 
-    thrusts, body = _thrusts(plant), plant.body
+    thrusts = _thrusts(plant)
     if thrusts is None or not flow.any():
         return _size(flow)
     rotation = Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
     shares = np.linspace(0.0, 1.0, _SHARES)
     through = np.concatenate([-rotation.T @ flow, np.zeros(3)])
-    forces = jax.jit(
-        jax.vmap(lambda nu: body.coriolis(nu) + body.damping(nu) + body.restoring(jnp.asarray(rotation[2])))
-    )
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
-    acting = matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
-    needed = np.asarray(forces(jnp.asarray(np.outer(shares, through)))) @ acting.T
+    acting = matrix @ np.linalg.pinv(matrix, rcond=WEAK)
+    down = np.broadcast_to(rotation[2], (_SHARES, 3))
+    needed = np.asarray(body_force(plant.body, np.outer(shares, through), down)) @ acting.T
     held = 0.0
     for share, force in zip(shares, needed, strict=True):
         left = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
@@ -243,6 +242,7 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
     else:
         yield from _begins_elsewhere(desired)
         yield from _too_demanding(loop, plant, duration, flow, (speed + drift) / top)
+        yield from _leans(plant, desired, flow)
 
 
 def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow: np.ndarray, effort: float):
@@ -256,6 +256,22 @@ def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow
             f"{reserve.time:.3g} s: the vehicle falls behind"
         )
         yield advice("reference", says, "Make it slower")
+
+
+def _leans(plant: HybridVehicle, desired: Motion, flow: np.ndarray):
+    """A vehicle that the water turns over about an axis that its thrusters cannot turn it about."""
+    through = desired.velocity[:, :3] - flow
+    if not through.any():
+        return
+    lean = largest_lean(plant, desired.position[:, 3:], through)
+    if lean is None or lean.angle <= _LEANS:
+        return
+    angle = f"by {np.degrees(lean.angle):.0f} degrees" if np.isfinite(lean.angle) else "until it turns over"
+    says = (
+        f"the thrusters cannot {lean.axis} the vehicle, and its weight and buoyancy right it too little: at "
+        f"{desired.time[lean.row]:.3g} s, at {_size(through[lean.row]):.2g} m/s through the water, it leans {angle}"
+    )
+    yield advice("reference", says, "Make it slower, or lower the centre of gravity")
 
 
 def _begins_elsewhere(desired: Motion):
