@@ -1,6 +1,11 @@
-"""A run's page lists its faults and the transitions of its supervisor."""
+"""A run's page lists its faults and the transitions of its supervisor, and its figures mark when."""
 
+import numpy as np
+
+from undertow.report.figures.fault_marks import fault_marks
+from undertow.report.figures.run import run_plots
 from undertow.report.run_tables import fault_rows, navigation_rows, transition_rows
+from undertow.scenario.finished_run import losses_of
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
@@ -32,3 +37,42 @@ def test_rows_of_a_navigation_filter():
     assert "is 45; 9 is expected" in shown.sentences[0] and shown.sentences[-1] == "It is wrong."
     early = navigation_rows({"sensors": [], "nees": None, "findings": []})
     assert "is not known before the steady window" in early.sentences[0]
+
+
+def test_a_thruster_that_was_taken_out_of_use_is_named_with_its_time():
+    found = Transition(16.3, State.DEGRADED, "thruster_lost", 1.0, 0.0)
+    rows = transition_rows([found], [("T2 bow port", 16.3)])
+    assert rows.sentences == ("The supervisor took T2 bow port out of use at 16.3 s.",)
+    assert transition_rows([found]).sentences == ()
+
+
+FAULTS = "faults: [{target: thruster, number: 2, mode: 'off', onset: 8}, {target: depth, mode: nan, onset: [1, 2]}]"
+
+
+def faulty(make_run):
+    """A run in which thruster 2 is off from 8 s on and out of use from 9 s on, thruster 5 out of use for a while."""
+    run = make_run()
+    lost = np.zeros((run.sizes["time"], 8))
+    lost[90:, 1] = 1
+    lost[40:60, 4] = 1
+    run["lost_thrusters"] = ("time", "actuator"), lost
+    run.attrs["scenario"] = FAULTS
+    return run
+
+
+def test_losses_have_the_time_of_the_first_record(make_run):
+    assert losses_of(faulty(make_run)) == [("T5", 4.0), ("T2", 9.0)]
+    assert losses_of(make_run()) == []
+
+
+def test_figures_mark_the_onset_of_a_fault_and_when_the_thruster_was_out_of_use(make_run):
+    run = faulty(make_run)
+    marks = [(mark.time, mark.word) for mark in fault_marks(run)]
+    assert marks == [(8.0, "T2 off"), (4.0, "T5 out of use"), (9.0, "T2 out of use")]
+    assert fault_marks(make_run()) == []
+    first, *others = run_plots(run)["tracking"]().axes
+    assert [note.get_text() for note in first.texts] == ["T5 out of use", "T2 off", "T2 out of use"]
+    assert not any(panel.texts for panel in others)
+    for panel in (first, *others):
+        lines = [float(line.get_xdata()[0]) for line in panel.lines if np.ptp(line.get_xdata()) == 0]
+        assert sorted(lines) == [4.0, 8.0, 9.0]

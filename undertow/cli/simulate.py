@@ -26,6 +26,7 @@ from undertow.scenario.finished_run import (
     Repetition,
     certificate_of,
     compare,
+    losses_of,
     metrics_of,
     navigation_of,
     requirements_of,
@@ -127,7 +128,7 @@ def _print_results(executed: Executed, folder: Path, console: Console) -> None:
     if certificate is not None:
         console.print(terminal_table(certificate_rows(certificate, window)))
     if (transitions := transitions_of(executed.dataset)) is not None:
-        console.print(terminal_table(transition_rows(transitions)))
+        console.print(terminal_table(transition_rows(transitions, losses_of(executed.dataset))))
     for finding in (navigation_of(executed.dataset) or {"findings": ()})["findings"]:
         typer.echo(f"Advice: {finding}.", err=True)
     verdict = f"; {executed.success.sentence(known)}" if executed.success else ""

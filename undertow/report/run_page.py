@@ -27,6 +27,7 @@ from undertow.report.run_tables import (
 from undertow.scenario.finished_run import (
     certificate_of,
     faults_of,
+    losses_of,
     metrics_of,
     navigation_of,
     transitions_of,
@@ -98,7 +99,9 @@ def _page(
     if faults := faults_of(run):
         sections.append(section("faults", "Faults", _table(fault_rows(faults, input_names(run)))))
     if (transitions := transitions_of(run)) is not None:
-        sections.append(section("supervision", "Supervision", _table(transition_rows(transitions))))
+        supervision = transition_rows(transitions, losses_of(run))
+        below = [tag("p", prose(one)) for one in supervision.sentences]
+        sections.append(section("supervision", supervision.title, _table(supervision), *below))
     if (navigated := navigation_of(run)) is not None:
         assumed = navigation_rows(navigated)
         below = [tag("p", prose(one)) for one in assumed.sentences]

@@ -136,10 +136,16 @@ def navigation_rows(navigated: Mapping[str, Any]) -> RunTable:
     return RunTable("Navigation filter", head, rows, sentences)
 
 
-def transition_rows(transitions: Sequence[Transition]) -> RunTable:
-    """Transitions of the supervisor: when, to which state, and why."""
+def transition_rows(transitions: Sequence[Transition], losses: Sequence[tuple[str, float]] = ()) -> RunTable:
+    """Transitions of the supervisor: when, to which state, and why; below it the thrusters that it took out of use.
+
+    Args:
+        transitions: of the supervisor.
+        losses: names of these thrusters, and when, s.
+    """
+    sentences = [f"The supervisor took {name} out of use at {time:.6g} s." for name, time in losses]
     rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]
-    return RunTable("Supervision", ("time", "state", "reason: value, limit"), rows)
+    return RunTable("Supervision", ("time", "state", "reason: value, limit"), rows, tuple(sentences))
 
 
 def _span(window: tuple[float, float] | None) -> str:

@@ -170,6 +170,16 @@ def faults_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return list(parse(dataset.attrs["scenario"], "scenario", Path(), "scenario").data.get("faults", ()))
 
 
+def losses_of(dataset: xr.Dataset) -> list[tuple[str, float]]:
+    """Name of each thruster that was taken out of use, and the time of the first record of that, s, in its order."""
+    if "lost_thrusters" not in dataset:
+        return []
+    names, time = dataset["actuator"].attrs["names"].split(", "), dataset["time"].values
+    lost = zip(names, dataset["lost_thrusters"].values.T, strict=True)
+    losses = [(name, float(time[series.argmax()])) for name, series in lost if series.any()]
+    return sorted(losses, key=lambda loss: loss[1])
+
+
 def window_of(dataset: xr.Dataset) -> tuple[float, float] | None:
     """Start and stop of the steady window of a run, s, from its scenario; None for a run that was made from objects."""
     if not dataset.attrs.get("scenario"):

@@ -12,6 +12,8 @@ from undertow.report.figures import style
 from undertow.report.figures.limits import fit_linear, fit_log, fit_symmetric
 
 WIDTH = 9.6  # in
+# Share of a panel that the word of a mark takes, and what hides the curves behind it.
+_ROOM, _PAPER = 0.3, {"facecolor": "white", "alpha": 0.85, "linewidth": 0, "pad": 0.6}
 _HEAD, _FOOT, _LEFT, _RIGHT, _GAP, _BETWEEN = 0.34, 0.2, 0.56, 0.1, 0.08, 0.24
 
 
@@ -22,6 +24,15 @@ class Curve(NamedTuple):
     time: np.ndarray  # s, (samples,)
     values: np.ndarray  # (samples, columns)
     look: style.Look
+
+
+class Mark(NamedTuple):
+    """A vertical line at an instant, in every panel; the first panel has its word beside it, before or after."""
+
+    time: float  # s
+    word: str
+    dashes: tuple
+    before: bool
 
 
 class Block(NamedTuple):
@@ -35,6 +46,7 @@ class Block(NamedTuple):
     window: tuple[float, float] | None = None  # s; the whole record by default
     limits_from: float = 0.0  # s; the y axis fits the values after this time
     titled: bool = False  # whether the panel shows the name of the column
+    marks: Sequence[Mark] = ()
 
 
 def small_multiples(
@@ -78,6 +90,22 @@ def _plot(panel: Axes, block: Block, column: int) -> None:
     ends = [curve.time[[0, -1]] for curve in shown if len(curve.time)]
     if ends and np.ptp(ends) > 0:
         panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+    for mark in block.marks:
+        panel.axvline(mark.time, color=style.INK, linestyle=mark.dashes, linewidth=0.6, zorder=1.5)
+    if block.marks and column == 0:
+        _name(panel, block.marks)
+
+
+def _name(panel: Axes, marks: Sequence[Mark]) -> None:
+    """Write the words of marks at the upper edge, each in a line of its own, on the side where there is room."""
+    left, right = panel.get_xlim()
+    for line, mark in enumerate(sorted(marks, key=lambda mark: mark.time)):
+        share = (mark.time - left) / (right - left)
+        before = share > _ROOM if mark.before else share > 1 - _ROOM
+        shift, align = (-2, "right") if before else (2, "left")
+        style.note(
+            panel, mark.word, (share, 1.0), (shift, -2 - 7.5 * line), ha=align, va="top", color=style.INK, bbox=_PAPER
+        )
 
 
 def _cut(curve: Curve, window: tuple[float, float] | None) -> Curve:

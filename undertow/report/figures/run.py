@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
 from undertow.report.figures.certificate import certificate
+from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.figures.paper import settled
@@ -19,7 +20,7 @@ _RUNAWAY = 1e2
 def run_figures(run: xr.Dataset) -> dict[str, Figure]:
     """Figures `tracking`, `error`, `estimate` and `effort` of one run.
 
-    A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`.
+    A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`. Faults are marked.
     """
     return {name: make() for name, make in run_plots(run).items()}
 
@@ -41,9 +42,11 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     places, errors = recorded.places(shown), recorded.per_axis(shown, "|error|")
     rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
+    marks = fault_marks(run)
 
     def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:
-        return lambda: small_multiples(_titled(run, what), names, blocks(), _columns(len(names)))
+        marked = lambda: [block._replace(marks=marks) for block in blocks()]
+        return lambda: small_multiples(_titled(run, what), names, marked(), _columns(len(names)))
 
     figures = {
         "tracking": plot("Tracking", outputs, lambda: [_block(run, [desired, actual], places, 0.0)]),
