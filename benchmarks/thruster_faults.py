@@ -299,6 +299,8 @@ def false_alarms(seeds: int) -> None:
         ("bluerov2_heavy", moves, {"navigation": {"kind": "white_noise", "position": 0.01, "velocity": 0.01}})
         for moves in MOVES
     ]
+    still = {"navigation": "perfect", "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}]}
+    cases += [("bluerov2_heavy", moves, still | changes) for changes in ({}, {"model": wrong_model}) for moves in MOVES]
     duration, runs = 225.0, 16 * seeds
     hours = runs * duration / 3600
     for vehicle, moves, changes in cases:
@@ -310,7 +312,7 @@ def false_alarms(seeds: int) -> None:
         lost = batch(loops, list(range(runs)), duration, ("lost_thrusters", "fault_evidence"), every=100)
         alarms = (lost["lost_thrusters"][:, -1] > 0).sum()
         what = f"{vehicle} {' '.join(changes)}"
-        print(f"  {what:<28}{moves:<9}{alarms:4d} in {hours:.1f} h: {100 * alarms / hours:6.1f} per 100 h", flush=True)
+        print(f"  {what:<50}{moves:<9}{alarms:4d} in {hours:.1f} h: {100 * alarms / hours:6.1f} per 100 h", flush=True)
 
 
 def cost(seeds: int) -> None:

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
-from undertow.supervision.fault_onset import ONSETS, Seen, cleared, examine, onset_state, transients, weighed
+from undertow.supervision.fault_onset import ONSETS, Wide, cleared, examine, onset_state, transients, weighed
 
 CHANCE = np.random.default_rng(5)
 EFFECT = CHANCE.normal(size=(6, 5))
@@ -41,8 +41,8 @@ def test_the_ratio_of_a_missing_effect_is_a_difference_of_squared_distances():
 
 @jax.jit
 def pair_of(difference):
-    seen = Seen(np.zeros((ONSETS, 5)), weighed(EFFECT, COVARIANCE, difference), FORCES)
-    return two_thrusters(seen, FORCES, USED, BOUNDS)
+    wide = Wide(weighed(EFFECT, COVARIANCE, difference), FORCES)
+    return two_thrusters(wide, FORCES, USED, BOUNDS)
 
 
 def pair_in(failed, share=0.7):
@@ -74,16 +74,16 @@ COUNT, ONSET, FAILING = 27, 20, 2  # examinations, the one at which a fault begi
 
 @jax.jit
 def followed(residuals, forces, remains):
-    """State and findings after an examination of each residual."""
+    """State and missing forces after an examination of each residual."""
 
     def step(state, instant):
         k, residual, of_now = instant
-        state, seen = examine(state, residual, of_now, EFFECT, np.zeros(5), remains, np.asarray(0.0))
-        return cleared(state, k == ONSET), seen  # what was before the history was full
+        state, missing = examine(state, residual, of_now, EFFECT, np.zeros(5), remains, np.asarray(0.0))
+        return cleared(state, k == ONSET), missing  # what was before the history was full
 
     start = onset_state(6, 5)._replace(covariance=COVARIANCE)
-    state, seen = jax.lax.scan(step, start, (np.arange(1, COUNT + 1), residuals, forces))
-    return state, jax.tree.map(lambda series: series[-1], seen)
+    state, missing = jax.lax.scan(step, start, (np.arange(1, COUNT + 1), residuals, forces))
+    return state, missing[-1]
 
 
 def behind_low_passes(series, fine):
@@ -96,7 +96,7 @@ def behind_low_passes(series, fine):
 
 
 def examined(share, pushed=0.0):
-    """State and findings after examinations of a healthy thruster model of which one thruster fails at the onset.
+    """State and missing forces after examinations of a healthy model of which one thruster fails at the onset.
 
     Nominal forces vary; of the failing one the share is missing, but for what the onset leaves and decays.
     """
@@ -115,29 +115,29 @@ def examined(share, pushed=0.0):
 
 @pytest.mark.parametrize("share", [1.0, 0.5, 2.0])
 def test_the_missing_share_and_all_of_the_square_are_that_of_the_thruster_since_its_onset(share):
-    state, seen = examined(share)
+    state, missing = examined(share)
     lag = COUNT - ONSET - 1  # the onset was seven examinations ago
     np.testing.assert_allclose(state.along[lag, FAILING] / state.size[lag, FAILING], share, rtol=0.03)
     explained = state.along[lag, FAILING] ** 2 / state.size[lag, FAILING]
     np.testing.assert_allclose(explained, state.total[lag], rtol=0.02)
-    found, square = explained_by_one(state, seen, USED, BOUNDS)
+    found, square = explained_by_one(state, missing, USED, BOUNDS)
     np.testing.assert_array_equal(found, np.arange(5) == FAILING)
     np.testing.assert_allclose(square, explained, rtol=0.05)  # rest and noise of two ways to count
 
 
 def test_a_force_that_grew_a_load_and_an_unused_thruster_are_no_fault():
-    state, seen = examined(-0.7)
-    assert not explained_by_one(state, seen, USED, BOUNDS)[0].any()
+    state, missing = examined(-0.7)
+    assert not explained_by_one(state, missing, USED, BOUNDS)[0].any()
     away = np.linalg.svd(EFFECT)[0][:, 5] * 30.0  # what no thruster can give
-    state, seen = examined(0.0, pushed=away)
-    assert not explained_by_one(state, seen, USED, BOUNDS)[0].any()
-    state, seen = examined(1.0)
-    assert not explained_by_one(state, seen, np.where(np.arange(5) == FAILING, 0.0, USED), BOUNDS)[0][FAILING]
+    state, missing = examined(0.0, pushed=away)
+    assert not explained_by_one(state, missing, USED, BOUNDS)[0].any()
+    state, missing = examined(1.0)
+    assert not explained_by_one(state, missing, np.where(np.arange(5) == FAILING, 0.0, USED), BOUNDS)[0][FAILING]
 
 
 def test_what_remains_unexplained_counts_as_noise():
-    quiet, seen = examined(1.0)
-    _, square = explained_by_one(quiet, seen, USED, BOUNDS)
+    quiet, missing = examined(1.0)
+    _, square = explained_by_one(quiet, missing, USED, BOUNDS)
     restless = quiet._replace(total=quiet.total + 10 * 6 * np.arange(1.0, ONSETS + 1))
-    _, less = explained_by_one(restless, seen, USED, BOUNDS)
+    _, less = explained_by_one(restless, missing, USED, BOUNDS)
     assert less < square / 15  # ten times the expected square, counted twice

@@ -14,6 +14,7 @@ from undertow.loop import simd_batch
 from undertow.loop.sampled import moved
 from undertow.numerics.integrators import METHODS
 from undertow.scenario.build import build
+from undertow.scenario.finished_run import losses_of
 from undertow.scenario.reading import from_data
 from undertow.supervision.conditions import Request, State
 from undertow.supervision.supervisor import supervisor
@@ -143,3 +144,20 @@ def test_stopped_is_for_good():
     assert run.z.state == int(State.STOPPED)
     assert (output == 0).all()
     assert transitions(run.z.log)[-1].reason == "operator"
+
+
+@pytest.mark.full
+def test_a_law_of_low_bandwidth_does_not_hide_a_dead_thruster():
+    scenario = {
+        "plant": {"vehicle": "bluerov2", "thruster": {"kind": "t200", "supply": 16}},
+        "controller": {"kind": "pid", "frequency": 1.0},
+        "supervisor": True,
+        "reference": {"kind": "setpoint", "position": [0] * 6},
+        "disturbance": {"kind": "current", "velocity": [0, 0.3, 0]},
+        "loop": {"dt": 0.01, "duration": 18, "record": 0.05},
+        "faults": [{"target": "thruster 2", "mode": "off", "onset": 15}],
+    }
+    run = ut.simulate_scenario(scenario).dataset
+    ((name, time),) = losses_of(run)
+    assert name.startswith("T2") and 15 < time < 16.5
+    assert np.rad2deg(np.abs(run["error"].sel(axis="yaw")).max()) < 10  # 64 degrees in 15 s if it is not found

@@ -135,6 +135,20 @@ def test_two_thrusters_that_fail_together_are_both_found():
     np.testing.assert_array_equal(state.lost, fails.astype(float))
 
 
+# Volts of thrusters that give 3 to 5 % of their largest force, less than the first examination pays attention to.
+GENTLE = np.stack([np.zeros(8), [2.0, -2.2, 2.0, -2.2, 2.0, -2.2, 2.2, -2.0]])
+
+
+def test_a_small_force_that_ends_is_found_whenever_that_is_between_two_examinations():
+    fails, step = np.arange(8) == 1, 8
+    before = followed(*start(), 0, WARM, GENTLE, np.ones(8), NONE)
+    for first in range(WARM, WARM + 30, step):
+        assert not before[0].lost.any()
+        state, _ = followed(*before, first, 150, GENTLE, 1.0 - fails, NONE)
+        np.testing.assert_array_equal(state.lost, fails.astype(float))
+        before = followed(*before, first, step, GENTLE, np.ones(8), NONE)
+
+
 def test_what_is_lost_stays_lost_and_a_sudden_load_is_no_thruster():
     fails = np.arange(8) == 2
     state, nu = later(healthy(), 50, ~fails)

@@ -29,36 +29,47 @@ class Weighed(NamedTuple):
 
 
 class OnsetState(NamedTuple):
-    """What is kept of the last examinations, the latest first; residuals in units."""
+    """What is kept of the last examinations, the latest first, with k possible onsets; residuals in units."""
 
-    residuals: Float[Array, "10 n"]
-    forces: Float[Array, "10 3 m"]  # nominal forces behind two, one and no low-pass, N
-    along: Float[Array, "10 m"]  # sums of s . P e since each possible onset, with s what the fault adds to e
-    size: Float[Array, "10 m"]  # sums of s . P s
-    total: Float[Array, " 10"]  # sums of e . P e
+    residuals: Float[Array, "r n"]
+    forces: Float[Array, "k c m"]  # nominal forces behind two low-passes and, where c is 3, behind one and none, N
+    along: Float[Array, "k m"]  # sums of s . P e since each possible onset, with s what the fault adds to e
+    size: Float[Array, "k m"]  # sums of s . P s
+    total: Float[Array, " k"]  # sums of e . P e
     covariance: Float[Array, "n n"]  # of e without faults
-    wide_covariance: Float[Array, "n n"]  # of the wide difference without faults
 
 
-class Seen(NamedTuple):
-    """What one examination makes of them."""
+class Wide(NamedTuple):
+    """The second difference of residuals `WIDE` examinations apart: a change of force between them is whole in it."""
 
-    missing: Float[Array, "10 m"]  # force that is missing by now, of a thruster that stopped at each possible onset, N
-    wide: Weighed  # the wide difference
-    changes: PerActuator  # that of the nominal forces, N
+    weighed: Weighed
+    changes: PerActuator  # the same difference of the nominal forces, N
 
 
-def onset_state(axes: int, actuators: int) -> OnsetState:
-    """State before the first examination."""
+def onset_state(
+    axes: int, actuators: int, onsets: int = ONSETS, residuals: int = ONSETS, columns: int = 3
+) -> OnsetState:
+    """State before the first examination.
+
+    Args:
+        axes, actuators: n and m.
+        onsets: k.
+        residuals: r; `examine` needs two, `wide_difference` needs `ONSETS`.
+        columns: c.
+    """
     return OnsetState(
-        residuals=jnp.zeros((ONSETS, axes)),
-        forces=jnp.zeros((ONSETS, 3, actuators)),
-        along=jnp.zeros((ONSETS, actuators)),
-        size=jnp.zeros((ONSETS, actuators)),
-        total=jnp.zeros(ONSETS),
+        residuals=jnp.zeros((residuals, axes)),
+        forces=jnp.zeros((onsets, columns, actuators)),
+        along=jnp.zeros((onsets, actuators)),
+        size=jnp.zeros((onsets, actuators)),
+        total=jnp.zeros(onsets),
         covariance=_START * jnp.eye(axes),
-        wide_covariance=_WIDE_START * jnp.eye(axes),
     )
+
+
+def wide_covariance(axes: int) -> Float[Array, "n n"]:
+    """Covariance of the wide difference before the first examination."""
+    return _WIDE_START * jnp.eye(axes)
 
 
 def weighed(effect: Float[Array, "n m"], covariance: Float[Array, "n n"], vector: PerAxis) -> Weighed:
@@ -72,7 +83,7 @@ def weighed(effect: Float[Array, "n m"], covariance: Float[Array, "n n"], vector
     return Weighed(products, jnp.where(own > 0, own, 1.0), matvec(columns, pulled), (vector * pulled).sum())
 
 
-def transients(bandwidth, decay, elapsed) -> Float[Array, "11 3"]:
+def transients(bandwidth, decay, elapsed, onsets: int = ONSETS) -> Float[Array, "k+1 3"]:
     """What remains of the forces of an onset 0, 1, ... examinations later behind two low-passes, per force.
 
     The thrust of a thruster that stops decays exponentially; that of the onset is in the low-passes as well.
@@ -81,11 +92,12 @@ def transients(bandwidth, decay, elapsed) -> Float[Array, "11 3"]:
         bandwidth: w of each low-pass, rad/s.
         decay: time constant of the thrust, s.
         elapsed: time between examinations, s.
+        onsets: how many are possible.
 
     Returns:
         One row per examination, one column for the force behind two, one and no low-pass.
     """
-    t = elapsed * jnp.arange(ONSETS + 1, dtype=jnp.asarray(elapsed).dtype)
+    t = elapsed * jnp.arange(onsets + 1, dtype=jnp.asarray(elapsed).dtype)
     slow = jnp.exp(-bandwidth * t)
     rate = 1 / decay
     rate = jnp.where(jnp.abs(bandwidth - rate) < 0.01 * bandwidth, 0.99 * bandwidth, rate)  # the limit of equal ones
@@ -97,26 +109,25 @@ def transients(bandwidth, decay, elapsed) -> Float[Array, "11 3"]:
 def examine(
     past: OnsetState,
     residual: PerAxis,
-    forces: Float[Array, "3 m"],
+    forces: Float[Array, "c m"],
     effect: Float[Array, "n m"],
     error_share: PerActuator,
-    remains: Float[Array, "11 3"],
+    remains: Float[Array, "k+1 c"],
     learned: Float[Array, ""],
-) -> tuple[OnsetState, Seen]:
-    """State and findings with one more residual.
+) -> tuple[OnsetState, Float[Array, "k m"]]:
+    """State with one more residual, and the force that a thruster that stopped at each onset is missing by now, N.
 
     The innovation e is the second difference of the residual: loads, waves and errors of the model change slowly and
     almost disappear in it. A thruster that stopped l examinations ago is missing its nominal force of now but for
-    what `remains`, and adds the second difference of that to e. The wide difference is that of residuals `WIDE`
-    examinations apart: it contains a change of force whole, whenever it happened between them.
+    what `remains`, and adds the second difference of that to e.
 
     Args:
         past: state until now.
         residual: of now, in units.
-        forces: nominal ones of now behind two, one and no low-pass, N.
+        forces: nominal ones of now, as in the state, N.
         effect: acceleration per force, in units.
         error_share: share of a change of the nominal force of each thruster that the model may miss.
-        remains: that of `transients`.
+        remains: of each column of the forces, as by `transients`.
         learned: part of the covariance that is replaced by this innovation.
     """
     before, unit = past.forces[:, 0], jnp.eye(len(residual))
@@ -125,13 +136,9 @@ def examine(
     now = weighed(effect, past.covariance + _FLOOR * unit + _unknown(effect, error_share * change), innovation)
     # Second difference of the missing force, which is zero at the onset and before.
     bent = jnp.concatenate([remains[1:2], remains[2:] - 2 * remains[1:-1] + remains[:-2]])
-    first = (jnp.arange(ONSETS) == 0)[:, None]
+    first = (jnp.arange(len(past.total)) == 0)[:, None]
     added = jnp.where(first, forces[:1], change[None]) - (bent[:, :, None] * past.forces).sum(1)
     missing = forces[:1] - (remains[1:, :, None] * past.forces).sum(1)
-    difference = residual - 2 * past.residuals[WIDE - 1] + past.residuals[-1]
-    changes = forces[0] - 2 * before[WIDE - 1] + before[-1]
-    spread = past.wide_covariance + _WIDE_FLOOR * unit + _unknown(effect, error_share * changes)
-    wide = weighed(effect, spread, difference)
     after = OnsetState(
         residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
         forces=jnp.concatenate([forces[None], past.forces[:-1]]),
@@ -139,9 +146,33 @@ def examine(
         size=_later(past.size) + added * added * now.size[None],
         total=_later(past.total) + now.total,
         covariance=_learned(past.covariance, learned, innovation, now.total),
-        wide_covariance=_learned(past.wide_covariance, learned, difference, wide.total),
     )
-    return after, Seen(missing, wide, changes)
+    return after, missing
+
+
+def wide_difference(
+    past: OnsetState,
+    covariance: Float[Array, "n n"],
+    residual: PerAxis,
+    forces: PerActuator,
+    effect: Float[Array, "n m"],
+    error_share: PerActuator,
+    learned: Float[Array, ""],
+) -> tuple[Wide, Float[Array, "n n"]]:
+    """The wide difference with one more residual, and its covariance one examination later.
+
+    Args:
+        past: state until now, with all residuals.
+        covariance: of the wide difference without faults, until now.
+        residual: of now, in units.
+        forces: nominal ones of now behind two low-passes, N.
+        effect, error_share, learned: as in `examine`.
+    """
+    difference = residual - 2 * past.residuals[WIDE - 1] + past.residuals[-1]
+    changes = forces - 2 * past.forces[WIDE - 1, 0] + past.forces[-1, 0]
+    spread = covariance + _WIDE_FLOOR * jnp.eye(len(residual)) + _unknown(effect, error_share * changes)
+    wide = weighed(effect, spread, difference)
+    return Wide(wide, changes), _learned(covariance, learned, difference, wide.total)
 
 
 def cleared(state: OnsetState, when: Array) -> OnsetState:

@@ -21,6 +21,16 @@ from undertow.supervision.fault_onset import (
     onset_state,
     transients,
     weighed,
+    wide_covariance,
+    wide_difference,
+)
+from undertow.supervision.gradual_onset import (
+    GRADUAL_ONSETS,
+    RARELY,
+    Series,
+    examine_next,
+    gradual_bounds,
+    gradual_state,
 )
 
 PerActuator = Float[Array, " m"]
@@ -43,6 +53,7 @@ class Findings(NamedTuple):
     """What the examinations keep."""
 
     onsets: OnsetState
+    wide_covariance: Float[Array, "n n"]  # of the wide difference without faults, in squares of `unit`
     background: PerAxis  # slow part of the residual: loads and errors of the model, m/s^2, rad/s^2
     slow_forces: PerActuator  # slow part of the nominal forces, N
     slow_covariance: Float[Array, "n n"]  # of the residual without its background, in squares of `unit`
@@ -65,6 +76,7 @@ class MonitorState(NamedTuple):
     forces: Float[Array, "2 m"]  # nominal forces behind one and two low-passes, N
     wait: Float[Array, ""]  # time until the next examination, s
     findings: Findings
+    gradual: Series  # what is known of gradual onsets
 
     @property
     def lost(self) -> PerActuator:
@@ -94,6 +106,10 @@ class ThrusterMonitor(eqx.Module):
     thruster by `margin`. Two thrusters are suspected where both are off and explain what no single one does. A
     suspicion that persists is an alarm. Where actuators report their speed, one whose reported force differs from that
     predicted of its command is suspected as well.
+
+    The same examination at a sixth of the rate, with a smaller `unit` and a smaller `least` force, finds what is too
+    slow for the first one: a propeller that coasts, or a small force that a law of low bandwidth raises over seconds.
+    Two series of such examinations take turns.
 
     This finds a fault that begins while a thruster works. One that begins at little thrust, or a stuck propeller, shows
     by what does not happen afterwards: the nominal force without its slow part, phi, has no effect on the residual
@@ -127,6 +143,11 @@ class ThrusterMonitor(eqx.Module):
     likely_rival: Float[Param, ""] = param("", "largest ratio of the second best to the best", default=0.7)
     correlation: Float[Param, ""] = param("s", "after which residuals are independent", default=0.3)
     fading: Float[Param, ""] = param("s", "time constant with which the sum fades", default=4.0)
+    gradual_threshold: Float[Param, ""] = param("", "`threshold` of gradual onsets", default=6.0)
+    gradual_unit: Float[Param, ""] = param("", "`unit` of gradual onsets, as a share of it", default=0.25)
+    gradual_least: Float[Param, ""] = param("", "`least` of gradual onsets", default=0.005)
+    gradual_decay: Float[Param, ""] = param("s", "`decay` of gradual onsets: a coasting propeller", default=0.15)
+    gradual_persistence: Float[Param, ""] = param("s", "`persistence` of gradual onsets", default=0.4)
     persistence: Float[Param, ""] = param("s", "for which a suspicion persists before it is an alarm", default=0.05)
     settling: Float[Param, ""] = param("s", "after the start, without alarms", default=2.0)
     pause: Float[Param, ""] = param("s", "after an alarm, without another", default=0.3)
@@ -134,10 +155,13 @@ class ThrusterMonitor(eqx.Module):
     def __check_init__(self):
         for name in (
             *("unit", "largest", "bandwidth", "interval", "background_time", "memory", "threshold", "decay"),
-            *("likely", "likely_rival", "correlation", "fading"),
+            *("likely", "likely_rival", "correlation", "fading", "gradual_threshold", "gradual_unit", "gradual_decay"),
         ):
             checks.positive(name, getattr(self, name))
-        for name in (*("margin", "least", "learning", "clearly", "persistence", "settling", "pause"), "mismatch"):
+        for name in (
+            *("margin", "least", "learning", "clearly", "persistence", "settling", "pause", "mismatch"),
+            *("gradual_least", "gradual_persistence"),
+        ):
             checks.not_negative(name, getattr(self, name))
 
     def init(self, model: Model, y: Measurement) -> MonitorState:
@@ -149,12 +173,14 @@ class ThrusterMonitor(eqx.Module):
         """
         actuators, zero, none = model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
         velocity = model.coordinates.velocity(y)
+        axes, count = velocity.shape[0], none.shape[0]
         findings = Findings(
-            onsets=onset_state(velocity.shape[0], none.shape[0]),
+            onsets=onset_state(axes, count),
+            wide_covariance=wide_covariance(axes),
             background=jnp.zeros_like(velocity),
             slow_forces=none,
-            slow_covariance=_START * jnp.eye(velocity.shape[0]),
-            likelihood=jnp.zeros((none.shape[0], none.shape[0])),
+            slow_covariance=_START * jnp.eye(axes),
+            likelihood=jnp.zeros((count, count)),
             suspected=none,
             in_pair=none,
             lost=none,
@@ -170,6 +196,7 @@ class ThrusterMonitor(eqx.Module):
             forces=jnp.zeros((2, *none.shape)),
             wait=zero,
             findings=findings,
+            gradual=gradual_state(axes, count),
         )
 
     def advance(
@@ -196,26 +223,34 @@ class ThrusterMonitor(eqx.Module):
         first = state.forces[0] + share * (force - state.forces[0])
         velocity = state.velocity + dt * (dynamics.drift(y) + matvec(effect, force)) + share * away
         elapsed = dt * jnp.maximum(jnp.round(self.interval / dt), 1.0)  # whole sampling times
-        findings = jax.lax.cond(
-            state.wait < dt / 2,
-            lambda: self.examined(
-                state.findings, effect, residual, jnp.stack([second, first, force]), differs, used, elapsed
-            ),
-            lambda: state.findings,
+        forces, is_time, past = jnp.stack([second, first, force]), state.wait < dt / 2, state.findings
+        # Beside the other examination, not inside it: a branch within a branch is traced several times.
+        gradual = jax.lax.cond(
+            is_time & (jnp.mod(past.examinations, RARELY / 2) == 0),
+            lambda: self._examined_rarely(state.gradual, past, effect, residual, second, used, elapsed),
+            lambda: state.gradual,
         )
+        findings = jax.lax.cond(
+            is_time,
+            lambda: self._examined(past, gradual, effect, residual, forces, differs, used, elapsed),
+            lambda: past,
+        )
+        raised = (findings.lost > past.lost).any()
         return MonitorState(
             actuators=after,
             unreported=unreported,
             velocity=jnp.where(jnp.isfinite(velocity), velocity, state.velocity),
             residual=residual,
             forces=jnp.stack([first, second]),
-            wait=jnp.where(state.wait < dt / 2, elapsed, state.wait) - dt,
+            wait=jnp.where(is_time, elapsed, state.wait) - dt,
             findings=findings,
+            gradual=(gradual[0].without_sums(raised), gradual[1].without_sums(raised)),
         )
 
-    def examined(
+    def _examined(
         self,
         past: Findings,
+        gradual: Series,
         effect: Float[Array, "n m"],
         residual: PerAxis,
         forces: Float[Array, "3 m"],
@@ -227,6 +262,7 @@ class ThrusterMonitor(eqx.Module):
 
         Args:
             past: findings until now.
+            gradual: what is known of gradual onsets.
             effect: acceleration per force.
             residual: of now, m/s^2, rad/s^2.
             forces: nominal ones behind two, one and no low-pass, N.
@@ -238,36 +274,45 @@ class ThrusterMonitor(eqx.Module):
         error_share = jnp.where(used > 0, self.mismatch, _UNUSED)
         remains = transients(self.bandwidth, self.decay, elapsed)
         learned = first_weight(past.examinations, elapsed, self.memory)
-        onsets, seen = examine(past.onsets, residual / self.unit, forces, scaled, error_share, remains, learned)
+        scaled_residual = residual / self.unit
+        onsets, missing = examine(past.onsets, scaled_residual, forces, scaled, error_share, remains, learned)
+        wide, covariance_of_wide = wide_difference(
+            past.onsets, past.wide_covariance, scaled_residual, forces[0], scaled, error_share, learned
+        )
         since = jnp.maximum(past.examinations, 1.0) * elapsed  # while it is short, the covariance is not well known
         bounds = Bounds(
             ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest
         )
         awake = past.quiet <= 0
-        found, explained = one_thruster(onsets, seen, used, bounds)
+        found, explained = one_thruster(onsets, missing, used, bounds)
+        at_once = jnp.sqrt(explained) / self.threshold
         behind = forces[0]
         slow = (residual - past.background) / self.unit
         seen_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
         diagonal = jnp.eye(len(used)) > 0
         ratio = jnp.where(
-            diagonal, missing_effect(seen_slow, behind - past.slow_forces), missing_effect(seen.wide, seen.changes)
+            diagonal, missing_effect(seen_slow, behind - past.slow_forces), missing_effect(wide.weighed, wide.changes)
         )
         likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
         strained = jnp.where(jnp.abs(behind) > _STRAINED * self.largest, likely_pair, 0.0)
         suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
-        both = two_thrusters(seen, behind, used, bounds)
+        both = two_thrusters(wide, behind, used, bounds)
         both = jnp.where(awake, jnp.where(both.max() > 0, both, strained), 0.0)
         in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
         both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
         alarm = jnp.where(alarm.any(), alarm, both_alarm)
+        longest = jnp.maximum(gradual[0].suspected, gradual[1].suspected)
+        gradual_alarm = (longest > self.gradual_persistence) & (longest >= longest.max())
+        alarm = jnp.where(alarm.any(), alarm, gradual_alarm & (used > 0) & awake)
         raised = alarm.any()
         forgotten = -jnp.expm1(-elapsed / self.background_time)
         steady = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
         weight = steady * jnp.minimum(1.0, _CLIP * len(slow) / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
         return Findings(
             onsets=cleared(onsets, raised),
+            wide_covariance=covariance_of_wide,
             background=past.background + forgotten * (residual - past.background),
             slow_forces=past.slow_forces + forgotten * (behind - past.slow_forces),
             slow_covariance=past.slow_covariance * (1 - steady) + weight * slow[:, None] * slow[None, :],
@@ -277,7 +322,43 @@ class ThrusterMonitor(eqx.Module):
             lost=jnp.where(alarm, 1.0, past.lost),
             quiet=jnp.where(raised, self.pause, jnp.maximum(past.quiet - elapsed, 0.0)),
             examinations=past.examinations + 1,
-            evidence=jnp.maximum(jnp.sqrt(explained) / self.threshold, likelihood.max() / self.likely),
+            evidence=jnp.maximum(
+                jnp.maximum(at_once, likelihood.max() / self.likely),
+                jnp.maximum(gradual[0].evidence, gradual[1].evidence),
+            ),
+        )
+
+    def _examined_rarely(
+        self,
+        series: Series,
+        past: Findings,
+        effect: Float[Array, "n m"],
+        residual: PerAxis,
+        forces: PerActuator,
+        used: PerActuator,
+        elapsed: Float[Array, ""],
+    ) -> Series:
+        """What is known of gradual onsets with one more residual.
+
+        Args:
+            series: until now.
+            forces: nominal ones behind two low-passes, N.
+            past, effect, residual, used, elapsed: as in `_examined`.
+        """
+        unit, elapsed_rarely = self.gradual_unit * self.unit, RARELY * elapsed
+        since = jnp.maximum(past.examinations, 1.0) * elapsed
+        square = ((1 + self.learning / since) * self.gradual_threshold) ** 2
+        return examine_next(
+            series,
+            residual / unit,
+            forces,
+            effect / unit[:, None],
+            jnp.where(used > 0, self.mismatch, _UNUSED),
+            transients(self.bandwidth, self.gradual_decay, elapsed_rarely, GRADUAL_ONSETS),
+            first_weight(past.examinations / RARELY, elapsed_rarely, self.memory),
+            jnp.where(past.quiet <= 0, used, 0.0),
+            gradual_bounds(square, jnp.asarray(self.margin), self.gradual_least * self.largest),
+            elapsed_rarely,
         )
 
     def _forces(self, state: MonitorState, model: AbstractActuatorModel, y: Measurement, u_applied: Inputs, dt):
