@@ -46,6 +46,15 @@ def test_a_thruster_that_was_taken_out_of_use_is_named_with_its_time():
     assert transition_rows([found]).sentences == ()
 
 
+def test_a_tracking_error_without_a_lost_thruster_does_not_exclude_one():
+    away = Transition(16.3, State.DEGRADED, "attitude_error", 1.2, 1.0)
+    (sentence,) = transition_rows([away], []).sentences
+    assert "no thruster was found to have failed" in sentence and "cannot exclude it" in sentence
+    assert transition_rows([away]).sentences == ()  # nothing watched the thrusters
+    assert "T2" in transition_rows([away], [("T2", 16.3)]).sentences[0]
+    assert transition_rows([away._replace(reason="saturated")], []).sentences == ()
+
+
 FAULTS = "faults: [{target: thruster, number: 2, mode: 'off', onset: 8}, {target: depth, mode: nan, onset: [1, 2]}]"
 
 
@@ -62,7 +71,10 @@ def faulty(make_run):
 
 def test_losses_have_the_time_of_the_first_record(make_run):
     assert losses_of(faulty(make_run)) == [("T5", 4.0), ("T2", 9.0)]
-    assert losses_of(make_run()) == []
+    assert losses_of(make_run()) is None
+    run = faulty(make_run)
+    run["lost_thrusters"] *= 0
+    assert losses_of(run) == []
 
 
 def test_figures_mark_the_onset_of_a_fault_and_when_the_thruster_was_out_of_use(make_run):

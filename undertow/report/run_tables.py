@@ -13,6 +13,14 @@ if TYPE_CHECKING:  # it loads SciPy, which a run does not need
     from undertow.analysis.linearization.response import Comparison
 
 
+# Reasons of the supervisor that a failed thruster explains as well, and what is said where none was found.
+_TRACKING = ("position_error", "attitude_error")
+_NOTHING_FOUND = (
+    "The tracking error exceeded its limit, and no thruster was found to have failed. The monitor cannot exclude it: "
+    "it does not see a thruster fail whose force is small, or whose effect resembles that of another one."
+)
+
+
 class RunTable(NamedTuple):
     """A table: title, column titles, rows of words and of numbers to be formatted, and sentences below it."""
 
@@ -136,14 +144,16 @@ def navigation_rows(navigated: Mapping[str, Any]) -> RunTable:
     return RunTable("Navigation filter", head, rows, sentences)
 
 
-def transition_rows(transitions: Sequence[Transition], losses: Sequence[tuple[str, float]] = ()) -> RunTable:
+def transition_rows(transitions: Sequence[Transition], losses: Sequence[tuple[str, float]] | None = None) -> RunTable:
     """Transitions of the supervisor: when, to which state, and why; below it the thrusters that it took out of use.
 
     Args:
         transitions: of the supervisor.
-        losses: names of these thrusters, and when, s.
+        losses: names of these thrusters, and when, s; None where no monitor watched them.
     """
-    sentences = [f"The supervisor took {name} out of use at {time:.6g} s." for name, time in losses]
+    sentences = [f"The supervisor took {name} out of use at {time:.6g} s." for name, time in losses or ()]
+    if losses is not None and not losses and any(one.reason in _TRACKING for one in transitions):
+        sentences.append(_NOTHING_FOUND)
     rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]
     return RunTable("Supervision", ("time", "state", "reason: value, limit"), rows, tuple(sentences))
 

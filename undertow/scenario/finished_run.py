@@ -170,10 +170,13 @@ def faults_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return list(parse(dataset.attrs["scenario"], "scenario", Path(), "scenario").data.get("faults", ()))
 
 
-def losses_of(dataset: xr.Dataset) -> list[tuple[str, float]]:
-    """Name of each thruster that was taken out of use, and the time of the first record of that, s, in its order."""
+def losses_of(dataset: xr.Dataset) -> list[tuple[str, float]] | None:
+    """Name of each thruster that was taken out of use, and the time of the first record of that, s, in its order.
+
+    None for a run in which no monitor watched the thrusters.
+    """
     if "lost_thrusters" not in dataset:
-        return []
+        return None
     names, time = dataset["actuator"].attrs["names"].split(", "), dataset["time"].values
     lost = zip(names, dataset["lost_thrusters"].values.T, strict=True)
     losses = [(name, float(time[series.argmax()])) for name, series in lost if series.any()]

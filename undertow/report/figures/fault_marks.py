@@ -23,7 +23,7 @@ def fault_marks(run: xr.Dataset) -> list[Mark]:
             words.setdefault(float(fault["onset"]), []).append(f"{_target(fault, names)} {fault['mode']}")
     end = float(np.nanmax(run["time"].values, initial=0.0))
     onsets = [Mark(onset, ", ".join(said), _ONSET, before=True) for onset, said in words.items() if onset <= end]
-    found = [Mark(time, f"{short(name)} out of use", _FOUND, before=False) for name, time in losses_of(run)]
+    found = [Mark(time, f"{short(name)} out of use", _FOUND, before=False) for name, time in losses_of(run) or ()]
     return onsets + found
 
 
