@@ -348,6 +348,7 @@ class ThrusterMonitor(eqx.Module):
         unit, elapsed_rarely = self.gradual_unit * self.unit, RARELY * elapsed
         since = jnp.maximum(past.examinations, 1.0) * elapsed
         square = ((1 + self.learning / since) * self.gradual_threshold) ** 2
+        of_series = jnp.floor((past.examinations + 1) / RARELY)  # + 1: whatever the rounding of the quotient
         return examine_next(
             series,
             residual / unit,
@@ -355,7 +356,7 @@ class ThrusterMonitor(eqx.Module):
             effect / unit[:, None],
             jnp.where(used > 0, self.mismatch, _UNUSED),
             transients(self.bandwidth, self.gradual_decay, elapsed_rarely, GRADUAL_ONSETS),
-            first_weight(past.examinations / RARELY, elapsed_rarely, self.memory),
+            first_weight(of_series, elapsed_rarely, self.memory),
             jnp.where(past.quiet <= 0, used, 0.0),
             gradual_bounds(square, jnp.asarray(self.margin), self.gradual_least * self.largest),
             elapsed_rarely,
