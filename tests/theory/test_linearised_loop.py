@@ -10,6 +10,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.analysis.linearization.response import compare_metrics
+from undertow.arena.vehicles import VEHICLES
 from undertow.controllers import rcaf
 from undertow.disturbances import none, sinusoid
 from undertow.loop.closed_loop import ClosedLoop
@@ -225,6 +226,27 @@ def test_loads_along_the_reference_are_the_disturbance():
     expected = np.stack([np.sin(3 * around.time), 2 * np.sin(7 * around.time)], axis=1)
     np.testing.assert_allclose(around.load, expected, atol=1e-9)
     assert not around.noise.any()
+
+
+@pytest.mark.full
+def test_thrust_that_holds_a_vehicle_is_no_load():
+    """RexROV must be held down. Without a disturbance its load is zero, and in a current its inputs are the run's."""
+    scenario = {
+        "plant": {"vehicle": "rexrov", "thruster": VEHICLES["rexrov"].thruster},
+        "controller": "robust",
+        "reference": {"kind": "setpoint", "position": [0.0] * 6},
+        "loop": {"dt": 0.05, "duration": 60, "record": 0.5},
+    }
+    known = operating_point(build(from_data(scenario)))
+    np.testing.assert_allclose(known.around.load, 0.0, atol=1e-9)
+    plant = known.built.closed_loop.plant
+    surplus = float(plant.body.buoyancy - plant.body.weight)
+    assert surplus > 200.0
+    np.testing.assert_allclose((plant.thruster_matrix @ known.mean.at["u"])[2], surplus, rtol=1e-6)
+    in_current = build(from_data(scenario | {"disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]}}))
+    found = operating_point(in_current).mean.at["u"]
+    simulated = np.asarray(execute(in_current).outcome.signals["input"])[-1]
+    np.testing.assert_allclose(found, simulated, rtol=2e-3, atol=0.2)
 
 
 SCENARIOS = {

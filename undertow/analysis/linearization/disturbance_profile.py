@@ -87,8 +87,9 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
 
     y_rest = plant.output(zero, x_rest)
-    at_rest = unknown(zero, x_rest, plant.no_load())
     still = jnp.zeros_like(y_rest.position)
+    # With actuators as they are along the reference, where they begin to turn: their thrust is no part of the load.
+    at_rest = unknown(zero, plant.initial_state(y_rest.position, still), plant.no_load())
     scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
 
     times, resting = jnp.arange(steps, dtype=float) * dt, plant.pose(x_rest)
