@@ -6,7 +6,7 @@ of `undertow simulate`: the linearised loop along the loads of the same seed.
     python benchmarks/predictions.py [--laws robust,pid,lqi,adrc,disturbance_observer]
 
 A line per loop: rms of position and attitude, predicted and simulated over the second half of 60 s, and what `simulate`
-prints about them. Half an hour on two cores.
+prints about them. Ten minutes on two cores.
 """
 
 import argparse

@@ -65,7 +65,7 @@ def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     """Metrics of the steady window from the linearised loop; or None, and the reason."""
     if not known.mean.found:
         rate = f"{known.mean.moving:.2g} per second"
-        return None, f"the loop has no equilibrium under the mean load: a state still changes by {rate}"
+        return None, f"no equilibrium of the loop was found under the mean load: a state still changes by {rate}"
     if known.radius >= 1:
         pole = margins.poles(known.linear)[0]
         turning = f"+- {abs(pole.imag):.3g}j " if pole.imag else ""

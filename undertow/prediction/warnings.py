@@ -48,7 +48,7 @@ def _actuators(prediction: Prediction) -> tuple[str, ...]:
     lost = [point for point in prediction.points if not point.found]
     if lost:
         warnings.append(
-            f"the loop has no equilibrium under the load at {len(lost)} of {len(prediction.points)} operating points"
+            f"no equilibrium was found under the load at {len(lost)} of {len(prediction.points)} operating points"
         )
     return tuple(warnings)
 
