@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
 from PIL import Image
 
 from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
+from undertow.report.figures.limits import fit_linear
 from undertow.report.figures.paper import effort, uncertainty
 from undertow.report.figures.prediction import prediction_plots
 from undertow.reproduction.thruster_response import thruster_response
@@ -98,6 +100,20 @@ def test_what_leaves_a_panel_is_written_above_it(figures):
     panel, _ = titled(figures["fig07"], "north")
     assert panel.get_ylim()[1] < 10
     assert any("first 1 s" in text.get_text() and "RCAFC to 40" in text.get_text() for text in panel.texts)
+
+
+@pytest.mark.parametrize(
+    "applied, said", [(-9.0, "first 1 s: to \u22129"), (-8.0, "commanded to \u22129, applied to \u22128")]
+)
+def test_what_is_the_same_of_all_curves_is_written_once(applied, said):
+    """Beside the name of a thruster there is no room for more."""
+    time, rest = np.linspace(0.0, 10.0, 101), np.sin(np.linspace(0.0, 10.0, 101))
+    series = [
+        (name, time, np.where(time < 0.5, low, rest)) for name, low in (("commanded", -9.0), ("applied", applied))
+    ]
+    panel = Figure().subplots()
+    fit_linear(panel, series, 1.0)
+    assert panel.texts[0].get_text().endswith(said)
 
 
 def test_voltages_are_split_into_start_and_rest(figures, runs):

@@ -29,13 +29,17 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
     low, high = low - margin, high + margin
     panel.set_ylim(low, high)
     _shorten(panel)
-    beyond = []
+    beyond = {}
     for name, _, values in series:
         outside = np.where(np.isfinite(values), np.maximum(values - high, low - values), -np.inf)
         if outside.size and outside.max() > 0:
-            beyond.append(f"{name} to {plain(values[outside.argmax()])}")
+            beyond[name] = plain(values[outside.argmax()])
     if beyond:
-        said = f"first {start:.2g} s: {', '.join(beyond)}"
+        named = [f"{name} to {value}" for name, value in beyond.items()]
+        peaks = set(beyond.values())
+        if len(beyond) == len(series) and len(peaks) == 1:  # all the same, in few words beside the name of the panel
+            named = [f"to {peaks.pop()}"]
+        said = f"first {start:.2g} s: {', '.join(named)}"
         style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
 
 
