@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from undertow.arena.entry import prepare_entry, read_entry
+from undertow.arena.tasks import VERSION
 from undertow.cli import arena as command
 from undertow.cli.main import run
 from undertow.comparison import step_time
@@ -103,7 +104,7 @@ def test_damage_and_other_versions(folder, capsys, monkeypatch):
     for bad, says in [
         ("[]", "have entries that can be read"),
         (good.replace('"name": "pid"', '"name": 7'), "have entries that can be read"),
-        (good.replace('"version": 1', '"version": 0'), "be of version 1 of the arena"),
+        (good.replace(f'"version": {VERSION}', '"version": 0'), f"be of version {VERSION} of the arena"),
     ]:
         file.write_text(bad)
         assert run(["arena", "pid", *few]) == 2
