@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from undertow.arena.entry import Entry
 from undertow.arena.leader_board import (
@@ -20,6 +21,8 @@ from undertow.arena.leader_board import (
 )
 from undertow.arena.robustness import PARAMETERS, Curve
 from undertow.arena.scores import CellResult, scored
+from undertow.arena.tasks import CELLS as EVERY
+from undertow.arena.tasks import TASKS
 from undertow.comparison.step_time import StepTime
 from undertow.report.arena_page import write_board
 from undertow.report.figures.arena import robustness_figure, tasks_figure
@@ -27,10 +30,10 @@ from undertow.report.figures.arena import robustness_figure, tasks_figure
 CELLS = (("payload", "odin"), ("payload", "rexrov"), ("delay", "odin"))
 
 
-def standing(name: str, errors: tuple[float, ...], levels: int) -> Standing:
+def standing(name: str, errors: tuple[float, ...], levels: int, each=CELLS) -> Standing:
     """A law with these errors, within the tolerance up to so many levels of every parameter and lost after them."""
     cells = {}
-    for cell, error in zip(CELLS, errors, strict=True):
+    for cell, error in zip(each, errors, strict=True):
         found = np.full(3, error)
         failed = {"diverged": 3} if error == 10 else {}
         tracking = np.full(3, np.nan) if failed else 0.5 * found
@@ -39,7 +42,7 @@ def standing(name: str, errors: tuple[float, ...], levels: int) -> Standing:
     for key, one in PARAMETERS.items():
         high = np.where(np.arange(len(one.levels)) < levels, 0.5, 10.0)
         curves[key] = Curve(one.levels, high, high, high)
-    entry = Entry(name, 1, {"kind": name}, CELLS, {}, {"odin": "tuned <by hand>"})
+    entry = Entry(name, 1, {"kind": name}, each, {}, {"odin": "tuned <by hand>"})
     return Standing(entry, scored(name, cells), curves, StepTime(2e-6, "xla"))
 
 
@@ -79,6 +82,16 @@ def test_figures_show_the_numbers(board):
     for panel, parameter in zip(panels, PARAMETERS.values(), strict=True):
         crosses = [line.get_xdata()[0] for line in panel.lines if line.get_marker() == "x"]
         assert crosses == [parameter.levels[0], parameter.levels[3]]  # where pid, and where robust is lost first
+
+
+@pytest.mark.full
+def test_all_tasks_and_their_names_are_on_the_figure():
+    every = Board((standing("adaptive_backstepping", (0.1,) * len(EVERY), 0, EVERY),), EVERY)
+    figure = tasks_figure(every)
+    width, _ = FigureCanvasAgg(figure).get_width_height()
+    names = figure.axes[0].get_xticklabels()
+    assert len(names) == len(TASKS)
+    assert max(name.get_window_extent().x1 for name in names) < width
 
 
 @pytest.mark.full

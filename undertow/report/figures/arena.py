@@ -17,6 +17,7 @@ from undertow.report.formats import plain
 
 _SHOWN = 6  # laws with a colour in the charts of robustness; the others are grey
 _COLUMNS, _WIDTH, _HEIGHT = 3, 2.6, 1.75  # panels, in
+_PAGE, _SLANTED = 9.6, 0.85  # width of the figure of the tasks, and of the name of the last one beside its cell, in
 
 
 def arena_plots(board: Board) -> Mapping[str, Callable[[], Figure]]:
@@ -30,8 +31,9 @@ def tasks_figure(board: Board) -> Figure:
     """A cell for every law and task, its colour and number the error in tolerances."""
     laws, tasks = [one.entry.name for one in board.standings], board.tasks
     errors = np.array([[one.score.mean(board.of_task(task)) for task in tasks] for one in board.standings])
-    left, top, cell = 0.25 + 0.075 * max(map(len, laws)), 1.35, (0.6, 0.24)
-    figure = style.blank(9.6, top + cell[1] * len(laws) + 0.2)
+    left, top = 0.25 + 0.075 * max(map(len, laws)), 1.35
+    cell = (min(0.6, (_PAGE - left - _SLANTED) / len(tasks)), 0.24)
+    figure = style.blank(_PAGE, top + cell[1] * len(laws) + 0.2)
     style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
     panel = style.place(figure, left, top, cell[0] * len(tasks), cell[1] * len(laws))
     panel.imshow(errors, norm=LogNorm(FINEST, LOST), cmap="RdYlBu_r", aspect="auto")
