@@ -21,7 +21,7 @@ from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
 from undertow.disturbances.waves import Waves
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario.unactuated_attitude import WEAK, body_force, largest_lean
+from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
 
 _SAMPLES = 201  # instants at which a reference is looked at
 _LONG = 1e6  # s, by when a reference that ends has ended
@@ -112,9 +112,8 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
     shares = np.linspace(0.0, 1.0, _SHARES)
     through = np.concatenate([-rotation.T @ flow, np.zeros(3)])
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
-    acting = matrix @ np.linalg.pinv(matrix, rcond=WEAK)
     down = np.broadcast_to(rotation[2], (_SHARES, 3))
-    needed = np.asarray(body_force(plant.body, np.outer(shares, through), down)) @ acting.T
+    needed = np.asarray(body_force(plant.body, np.outer(shares, through), down)) @ acting_directions(plant).T
     held = 0.0
     for share, force in zip(shares, needed, strict=True):
         left = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force

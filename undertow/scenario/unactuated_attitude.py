@@ -15,7 +15,7 @@ from undertow.core.runtime import double_outside_runs
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.vehicles.body import Body
 
-WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
+_WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
 _UNACTUATED = 0.5  # of a unit force or moment: what thrusters leave of it at least
 _STEEPEST, _ANGLES = 1.4, 57  # rad; angles at which the moment is computed
 _AXES = {3: "roll", 4: "pitch"}
@@ -44,14 +44,19 @@ def largest_lean(
         angles: of the target: roll, pitch, yaw, rad.
         through: velocities of the target through the water, world axes, m/s.
     """
-    matrix = np.asarray(plant.thruster_matrix, dtype=float)
-    free = np.eye(6) - matrix @ np.linalg.pinv(matrix, rcond=WEAK)
+    free = np.eye(6) - acting_directions(plant)
     if (np.diagonal(free)[:3] > _UNACTUATED).any():
         return None
     roll, pitch, yaw = angles.T
     rotation = _turns(2, yaw) @ _turns(1, pitch) @ _turns(0, roll)
     leans = [_lean_about(plant.body, axis, free, rotation, through) for axis in _AXES if free[axis, axis] > _UNACTUATED]
     return max(leans, key=lambda one: one.angle, default=None)
+
+
+def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
+    """Projection of forces and moments on the directions along which the thrusters act."""
+    matrix = np.asarray(plant.thruster_matrix, dtype=float)
+    return matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
 
 
 def _lean_about(body: Body, axis: int, free: np.ndarray, rotation: np.ndarray, through: np.ndarray) -> Lean:
