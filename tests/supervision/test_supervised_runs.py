@@ -161,3 +161,21 @@ def test_a_law_of_low_bandwidth_does_not_hide_a_dead_thruster():
     ((name, time),) = losses_of(run)
     assert name.startswith("T2") and 15 < time < 16.5
     assert np.rad2deg(np.abs(run["error"].sel(axis="yaw")).max()) < 10  # 64 degrees in 15 s if it is not found
+
+
+@pytest.mark.full
+def test_an_integral_survives_the_loss_of_a_thruster():
+    """The pitch that a BlueROV2 cannot give has wound up nothing when the thrusters that are left share the work."""
+    scenario = {
+        "plant": {"vehicle": "bluerov2", "thruster": {"kind": "t200", "supply": 16}},
+        "controller": "lqi",
+        "supervisor": True,
+        "reference": {"kind": "setpoint", "position": [0] * 6},
+        "disturbance": {"kind": "current", "velocity": [0.2, 0.1, 0]},
+        "loop": {"dt": 0.02, "duration": 60, "record": 0.1},
+        "faults": [{"target": "thruster 3", "mode": "off", "onset": 20}],
+    }
+    run = ut.simulate_scenario(scenario).dataset
+    ((name, _),) = losses_of(run)
+    assert name.startswith("T3")
+    assert np.abs(run["position"].values[:, :3]).max() < 0.05  # 2.6 m where it has

@@ -5,6 +5,7 @@ import jax
 import numpy as np
 import pytest
 
+from undertow import controllers
 from undertow.analysis import motor_loop, small_signal
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
@@ -181,6 +182,24 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     assert abs(last["error"][4]) > 0.05
     np.testing.assert_allclose(found.local.values["error"], last["error"], atol=2e-4)
     np.testing.assert_allclose(found.at["u"], last["input"], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["pid", "lqi", "cascade", "mrac", "super_twisting"])
+def test_an_integral_rests_where_no_input_acts(name):
+    """It does not wind up along a direction that only the springs hold: 4 (x1 - x2) is the difference of the loads."""
+    load, dt = np.array([0.3, -0.1, 0.2]), 0.01
+    plant = linear_plant(UNDER, -4 * np.eye(3), -2 * np.eye(3))
+    law = getattr(controllers, name)(plant.model(), sampling_time=dt)
+    found = equilibrium(ClosedLoop(plant, law, setpoint([0.0] * 3), none(), perfect()), dt, np.zeros(3), load)
+    assert found.found, found.moving
+    np.testing.assert_allclose(found.local.values["error"], [-0.05, 0.05, 0.0], atol=1e-6)
+    pushed = ClosedLoop(plant, law, setpoint([0.0] * 3), sinusoid(0.0, offset=load), perfect())
+    run = simulate(pushed, duration=1000.0, dt=dt, record_every=10_000)
+    estimates = np.asarray(run.signals["estimate"])
+    assert np.abs(estimates).max() < 20, "the springs pull by 0.2 m/s^2 at most"
+    np.testing.assert_allclose(estimates[-1], estimates[3], rtol=1e-6, atol=1e-6)
+    if name != "super_twisting":  # its sign function leaves a range of points of rest
+        np.testing.assert_allclose(estimates[-1], found.local.values["estimate"], rtol=1e-4, atol=1e-6)
 
 
 def test_a_load_that_no_input_holds_is_told():

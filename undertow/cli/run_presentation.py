@@ -30,6 +30,7 @@ from undertow.scenario.finished_run import metrics_of
 
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10
+_MANIFOLD = 10.0  # a departure of which nobody wants the percentage
 
 # Peak metrics depend on single moments: shown, not compared.
 _PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
@@ -116,8 +117,12 @@ def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
     departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
-    named = ", ".join(f"{one.name} by {100 * one.departure:.0f} %" for one in departing)
+    named = ", ".join(f"{one.name} {_by(one.departure)}" for one in departing)
     return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed, executed.steady)}"
+
+
+def _by(departure: float) -> str:
+    return f"by {100 * departure:.0f} %" if departure < _MANIFOLD else "more than tenfold"
 
 
 def in_results(predicted: PredictedMetrics) -> dict[str, Any]:

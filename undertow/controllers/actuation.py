@@ -56,7 +56,8 @@ class Given(NamedTuple):
     """What the applied input gives."""
 
     known: PerAxis  # modelled acceleration F + G f, m/s^2, rad/s^2
-    missing: PerAxis  # acceleration towards which the actuators are driven, less the demanded one; zero within limits
+    missing: PerAxis  # acceleration that the actuators are driven to, less the demanded one: what limits take, and
+    # along directions in which no actuator acts all of it
     share: Float[Array, ""]  # of the demanded acceleration, along its direction, 0 to 1
 
 
@@ -65,7 +66,8 @@ class Plan(NamedTuple):
 
     actuators: Any
     off: TrackingError
-    forces: Float[Array, " m"]  # for the demanded acceleration, without limits
+    wanted: PerAxis  # of the actuators: the demanded acceleration less what the model compensates
+    forces: Float[Array, " m"]  # for that, without limits
     signals: dict[str, Array]
 
 
@@ -108,9 +110,10 @@ class AbstractAccelerationLaw(AbstractInformedController):
         asked, going = heading(actuators.command(plan.actuators, plan.forces, path.actuator_rate)), heading(u_applied)
         share = attained(effect, asked, going)
         known = self._drift(y) + matvec(effect, actuators.force(plan.actuators, u_applied))
+        missing = matvec(effect, going - asked + plan.forces) - plan.wanted
         coordinates = self.model.coordinates
         return ActuatedState(
-            law=self.adapt(z.law, y, plan.off, Given(known, matvec(effect, going - asked), share), dt),
+            law=self.adapt(z.law, y, plan.off, Given(known, missing, share), dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=None if path.filter is None else path.filter.advance(z.filter, r, coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
@@ -141,8 +144,9 @@ class AbstractAccelerationLaw(AbstractInformedController):
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         off = coordinates.tracking_error(y, target)
         acceleration, signals = self.demand(z.law, y, off)
-        forces = dynamics.invert(y, acceleration - self._compensated(y, off))
-        return Plan(self._actuators().update_from_report(z.actuators, y.actuator), off, forces, signals)
+        wanted = acceleration - self._compensated(y, off)
+        estimated = self._actuators().update_from_report(z.actuators, y.actuator)
+        return Plan(estimated, off, wanted, dynamics.invert(y, wanted), signals)
 
 
 def actuation_for(
