@@ -13,10 +13,12 @@ from undertow.core.contracts import Measurement
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.navigation.degraded import degraded
 from undertow.navigation.perfect import perfect
 from undertow.navigation.white_noise import white_noise
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
+from undertow.scenario.build import velocity_noise_of
 
 LIMIT, DT = 3.0, 1e-3
 
@@ -106,3 +108,12 @@ def test_plant_moves_with_what_was_applied(limited):
     _, samples = limited
     acceleration = samples["input"] + np.sin(2.0 * DT * np.arange(len(samples["input"])))[:, None]
     np.testing.assert_allclose(np.diff(samples["velocity"], axis=0) / DT, acceleration[:-1], atol=2e-3)
+
+
+def test_a_law_is_told_the_noise_of_the_velocities():
+    """Of one step of the loop: readings that come five times as seldom are as good as white noise of sqrt(5) times."""
+    axes = np.array([0.02, 0.03])
+    np.testing.assert_allclose(velocity_noise_of(white_noise(0.1, axes), DT), axes)
+    seldom = degraded(0.1, axes, period=5 * DT, sampling_time=DT)
+    np.testing.assert_allclose(velocity_noise_of(seldom, DT), 5**0.5 * axes, rtol=1e-6)
+    assert velocity_noise_of(perfect(), DT) == 0

@@ -184,7 +184,10 @@ def test_what_no_thruster_moves_rests_where_the_vehicle_lets_it():
     np.testing.assert_allclose(found.at["u"], last["input"], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", ["pid", "lqi", "cascade", "mrac", "super_twisting"])
+INTEGRATING = ("pid", "lqi", "cascade", "mrac", "super_twisting", "adaptive_backstepping", "slotine_li", "neural")
+
+
+@pytest.mark.parametrize("name", INTEGRATING)
 def test_an_integral_rests_where_no_input_acts(name):
     """It does not wind up along a direction that only the springs hold: 4 (x1 - x2) is the difference of the loads."""
     load, dt = np.array([0.3, -0.1, 0.2]), 0.01

@@ -130,6 +130,10 @@ class AbstractAccelerationLaw(AbstractInformedController):
     def _effect(self, y: Measurement) -> Float[Array, "n m"]:
         return self.model.dynamics.gain(y)
 
+    def _within_reach(self, y: Measurement, values: PerAxis) -> PerAxis:
+        """What the actuators give of an acceleration: all of it, but for directions in which none acts."""
+        return matvec(self._effect(y), self.model.dynamics.invert(y, values))
+
     def _drift(self, y: Measurement) -> PerAxis:
         return self.model.dynamics.drift(y) if self.actuation.feedforward else jnp.zeros_like(y.position)
 

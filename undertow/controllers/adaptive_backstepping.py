@@ -47,7 +47,8 @@ class AdaptiveBackstepping(AbstractAccelerationLaw):
     V_dot = -c^3 z_1^2 - c z_2^2 - c_3 z_3^2 / c^2. The jerk of the reference is not known to the law, and left out.
 
     Without lag the third step falls away, a = alpha, and the law is a PID with k_d = 2 c, k_p = 2 c^2 + gamma and
-    k_i = gamma c. While limits of the actuators bind, the estimate waits; projection keeps it within its bound.
+    k_i = gamma c. While limits of the actuators bind, the estimate waits, and it never learns from errors that no input
+    moves; projection keeps it within its bound.
 
     Raises:
         BadInput: a number that is not positive, or a negative rate of adaptation or lag.
@@ -79,7 +80,7 @@ class AdaptiveBackstepping(AbstractAccelerationLaw):
 
     def adapt(self, own: BacksteppingState, y: Measurement, off: TrackingError, given: Given, dt) -> BacksteppingState:
         at = self._steps(own, off)
-        learning = jnp.where(given.share < _WHOLE, 0.0, at.learning)
+        learning = jnp.where(given.share < _WHOLE, 0.0, self._within_reach(y, at.learning))
         going = -jnp.expm1(-dt / self.lag) if self.lagged else 1.0
         return BacksteppingState(
             jnp.clip(own.load + dt * learning, -self.bound, self.bound),

@@ -45,7 +45,8 @@ class Neural(AbstractAccelerationLaw):
 
     W_dot = F sigma r^T - F sigma' V^T x r^T - kappa F |r| W, V_dot = G x (sigma'^T W r)^T - kappa G |r| V, by Euler's
     method. Inputs x: 1, e, e_dot, the velocity, the acceleration of the target, and the sines of positions that are
-    angles. Nothing is learnt while limits bind. The tracking error and the weights are ultimately bounded.
+    angles. Nothing is learnt while limits bind, nor from errors that no input moves. The tracking error and the weights
+    are ultimately bounded.
 
     Raises:
         BadInput: a gain of the wrong sign.
@@ -84,7 +85,8 @@ class Neural(AbstractAccelerationLaw):
 
     def adapt(self, own: Weights, y: Measurement, off: TrackingError, given: Given, dt) -> Weights:
         seen = self._seen(own, y, off)
-        r, inner = seen.filtered, seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
+        inner = seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
+        r = self._within_reach(y, seen.filtered)  # an error that no input moves would be learnt for ever
         size = safe_sqrt((r**2).sum())
         regressor = jnp.concatenate([jnp.ones(1), seen.layer - inner * matvec(own.hidden.T, seen.inputs)])
         by_output = (self.adaptation * r)[None, :] * regressor[:, None] - (

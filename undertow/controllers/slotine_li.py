@@ -113,11 +113,12 @@ class SlotineLi(AbstractAccelerationLaw):
         """Parameters one sampling time later.
 
         Euler's method adds T / 2 theta_dot^T (gamma Gamma)^-1 theta_dot to V_dot. Where that is more than half of what
-        feedback takes away, adaptation is slowed down to it, so that V falls at any sampling time.
+        feedback takes away, adaptation is slowed down to it, so that V falls at any sampling time. Nothing is learnt
+        from errors that no input moves.
         """
         structure, surface = self.regressor.parametrization(), self._surface(off)
         _, transposed = jax.vjp(lambda parameters: self._force(parameters, y, off), own)
-        (slope,) = transposed(surface)
+        (slope,) = transposed(self._within_reach(y, surface))
         rate = self.adaptation_rate * structure.rates * slope
         added, taken = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
         share = jnp.where(added > taken, taken / jnp.where(added > taken, added, 1.0), 1.0)
