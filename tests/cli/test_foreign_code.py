@@ -9,8 +9,10 @@ from good_scenario import SCENARIO, SMALL
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
+from undertow.scenario.build import build
 from undertow.scenario.execute import execute, save
 from undertow.scenario.finished_run import compare
+from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
 
@@ -116,3 +118,11 @@ def test_words_about_code_are_none(tmp_path):
     made = xr.Dataset(attrs={"scenario": f"{SCENARIO}description: 'after my_goal.py: my own vehicle'\n"})
     made.to_netcdf(tmp_path / "mine.nc", engine="netcdf4")
     assert read(tmp_path / "mine.nc").data["seed"] == 3
+
+
+def test_the_hash_is_that_of_the_code_that_ran(his):
+    """Code that is edited while it runs is recorded as it was read."""
+    built = build(parse(QUICK, "s.yaml", his, "SCENARIO"))
+    (his / "my_goal.py").write_text(CODE + "\n# later\n")
+    run = execute(built).dataset
+    assert [path.name for path in changed(run.attrs["code"], built.resolved, his)] == ["my_goal.py"]

@@ -199,13 +199,16 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
 
 @functools.lru_cache
 def _module(path: Path, contents: bytes) -> ModuleType:
-    """A file as a module, loaded once per content, so that two parts from it have the same class."""
+    """A file as a module, loaded once per content, so that two parts from it have the same class.
+
+    What runs are these bytes: Python's loader would read the file once more, or compiled code that lies beside it.
+    """
     spec = importlib.util.spec_from_file_location(f"{MODULE_PREFIX}{path.stem}", path)
-    if spec is None or spec.loader is None:
+    if spec is None:
         raise ImportError("not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # where annotations of the file are looked up
-    spec.loader.exec_module(module)
+    exec(compile(contents, str(path), "exec"), vars(module))
     return module
 
 

@@ -41,6 +41,7 @@ from undertow.scenario.consistency import (
     rounded_times,
 )
 from undertow.scenario.faulted import faulted, without_faults
+from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
@@ -77,6 +78,7 @@ class Built(NamedTuple):
     metrics: tuple[AbstractMetric, ...]  # the scenario's own
     text: Text  # of the scenario, whose lines advice names
     reference: AbstractReference  # as the scenario gives it: that of the loop begins where its plant does
+    code: str  # hashes of the user's code files as they were read, see `code_hashes`
     requirements: tuple[Requirement, ...] = ()
 
     @in_its_precision
@@ -253,7 +255,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         resolved["metrics"] = [description for _, description in several]
     metrics = tuple(part for part, _ in several)
     placed = loop.starting_at(scenario.initial.position)
-    built = Built(placed, scenario, resolved, metrics, text, loop.reference)
+    code = code_hashes(resolved, Path())  # its paths are absolute
+    built = Built(placed, scenario, resolved, metrics, text, loop.reference, code)
     with within("controller.signals"):
         loop.signals()
     with within("success"):

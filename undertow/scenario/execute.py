@@ -21,7 +21,6 @@ from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.consistency import record_period
 from undertow.scenario.finished_run import Measuring, label, metrics_text
-from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
@@ -79,7 +78,7 @@ def finished(built: Built, outcome: Outcome, left_to_xla: Mapping[str, str], gat
             "title": scenario.description or "a closed loop run by undertow",
             "scenario": text,
             "scenario_hash": text_hash(text),
-            "code": code_hashes(built.resolved, Path()),  # its paths are absolute
+            "code": built.code,
             "seed": scenario.seed,
         }
     )
