@@ -66,7 +66,7 @@ class Plan(NamedTuple):
 
     actuators: Any
     off: TrackingError
-    wanted: PerAxis  # of the actuators: the demanded acceleration less what the model compensates
+    desired: PerAxis  # of the actuators: the demanded acceleration less what the model compensates
     forces: Float[Array, " m"]  # for that, without limits
     signals: dict[str, Array]
 
@@ -110,7 +110,7 @@ class AbstractAccelerationLaw(AbstractInformedController):
         asked, going = heading(actuators.command(plan.actuators, plan.forces, path.actuator_rate)), heading(u_applied)
         share = attained(effect, asked, going)
         known = self._drift(y) + matvec(effect, actuators.force(plan.actuators, u_applied))
-        missing = matvec(effect, going - asked + plan.forces) - plan.wanted
+        missing = matvec(effect, going - asked + plan.forces) - plan.desired
         coordinates = self.model.coordinates
         return ActuatedState(
             law=self.adapt(z.law, y, plan.off, Given(known, missing, share), dt),
@@ -148,9 +148,9 @@ class AbstractAccelerationLaw(AbstractInformedController):
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         off = coordinates.tracking_error(y, target)
         acceleration, signals = self.demand(z.law, y, off)
-        wanted = acceleration - self._compensated(y, off)
+        desired = acceleration - self._compensated(y, off)
         estimated = self._actuators().update_from_report(z.actuators, y.actuator)
-        return Plan(estimated, off, wanted, dynamics.invert(y, wanted), signals)
+        return Plan(estimated, off, desired, dynamics.invert(y, desired), signals)
 
 
 def actuation_for(
