@@ -201,22 +201,49 @@ def test_another_vehicles_file(written, capsys):
         assert "`plant` must be a vehicle with thrusters, but is InvertedPendulum" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_with_neutral_commands(driven, vehicle, how):
+@contextlib.contextmanager
+def controlling(driven, vehicle):
+    """The command, with thrusters that turn, and the vehicle that it talks with."""
     command = [sys.executable, "-m", "undertow.cli.main", "mavlink", str(driven), "--connect", "udpin:127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None and process.stderr is not None
-        for line in process.stdout:
-            if found := re.search(r"MAVLink on UDP port (\d+)", line):
-                break
-        with MavlinkVehicle(f"udpout:127.0.0.1:{found[1]}") as peer:
-            peer.heartbeat()
-            peer.odometry(1_000_000, vehicle.state())
-            peer.pulses()
-            process.send_signal(how)
-            assert process.wait(20) == 128 + how
-            last = None
-            while (message := peer.wait("RC_CHANNELS_OVERRIDE", timeout=0.3)) is not None:
-                last = message
-        assert last is not None and [getattr(last, f"chan{n}_raw") for n in range(1, 9)] == [1500] * 8
+        try:
+            assert process.stdout is not None and process.stderr is not None
+            for line in process.stdout:
+                if found := re.search(r"MAVLink on UDP port (\d+)", line):
+                    break
+            with MavlinkVehicle(f"udpout:127.0.0.1:{found[1]}") as peer:
+                peer.heartbeat()
+                peer.odometry(1_000_000, vehicle.state())
+                peer.pulses()
+                yield process, peer
+        finally:
+            process.kill()
+
+
+def ends_neutral(peer):
+    """Whether the last command that comes is neutral; False without any."""
+    last = None
+    while (message := peer.wait("RC_CHANNELS_OVERRIDE", timeout=0.6)) is not None:
+        last = message
+    return last is not None and [getattr(last, f"chan{n}_raw") for n in range(1, 9)] == [1500] * 8
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
+def test_signals_end_it_with_neutral_commands(driven, vehicle, how):
+    with controlling(driven, vehicle) as (process, peer):
+        process.send_signal(how)
+        assert process.wait(20) == 128 + how
+        assert ends_neutral(peer)
         assert process.stderr.read().strip() == "Interrupted: stopping."
+
+
+def test_a_watchdog_sends_neutral_commands_where_the_controller_cannot(driven, vehicle):
+    """It stands still, as on a machine that swaps, and is killed, as where memory ran out."""
+    with controlling(driven, vehicle) as (process, peer):
+        process.send_signal(signal.SIGSTOP)
+        stopped = [peer.wait("RC_CHANNELS_OVERRIDE", timeout=1.0) for _ in range(3)]
+        assert all(message is not None and message.chan1_raw == 1500 for message in stopped)
+        process.kill()
+        assert process.wait(20) == -signal.SIGKILL
+        assert ends_neutral(peer)
+        assert peer.wait("RC_CHANNELS_OVERRIDE", timeout=1.0) is None  # the watchdog has ended, too

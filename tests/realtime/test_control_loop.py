@@ -248,3 +248,11 @@ def test_settings_that_cannot_be_used(settings, said):
     clock = Stalling()
     with pytest.raises(BadInput, match=said):
         RealTimeLoop(Counting(), Noting(clock), clock, LoopSettings(**settings))
+
+
+def test_a_controller_that_stood_still_ends_as_a_silent_vehicle_does():
+    """For 0.5 s at most; it does not go on from what was true before. In a loop of long periods two of them pass."""
+    loop, _, link = made(late=[0.0, 0.48, 0.0, 0.52])
+    assert loop.run(100) is Reason.STALLED
+    assert loop.statistics.steps == 4
+    np.testing.assert_array_equal(link.sent[-1][1], SAFE)

@@ -18,7 +18,7 @@ RUN_FAILED = 1
 BAD_INPUT = 2
 INTERNAL_ERROR = 3
 FILES_FAILED = 4
-INTERRUPTED = 130  # by Ctrl-C; 143 by SIGTERM
+INTERRUPTED = 130  # by Ctrl-C; other signals have other codes
 _BY_SIGNAL = 128  # and the number of the signal
 NOBODY_READS = _BY_SIGNAL + signal.SIGPIPE
 
@@ -36,6 +36,8 @@ MEANINGS = {
     NOBODY_READS: "Nobody reads the output any more, as after `undertow list | head -3`; nothing is said.",
     _BY_SIGNAL
     + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
+    _BY_SIGNAL + signal.SIGHUP: "Ended by SIGHUP: the terminal or the ssh connection is gone; otherwise like Ctrl-C.",
+    _BY_SIGNAL + signal.SIGQUIT: "Ended by SIGQUIT, as by Ctrl-\\; otherwise like Ctrl-C.",
 }
 
 

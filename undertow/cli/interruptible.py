@@ -1,4 +1,4 @@
-"""End a command at once on Ctrl-C or SIGTERM, also while modules are imported or compiled code runs."""
+"""End a command at once on a signal that ends it, also while modules are imported or compiled code runs."""
 
 import os
 import signal
@@ -10,7 +10,9 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Ctrl-C, `kill`, the end of the terminal or of an ssh connection, and Ctrl-\\.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+
 _AGAIN = 0.05  # s, until the next look whether modules are still being imported
 _LONGEST = 20.0  # s, longest wait for an import: a user's file may never end
 
@@ -18,13 +20,14 @@ _asked: list[tuple[int, float]] = []  # the signals received, with their times
 
 
 def remember_interrupts() -> None:
-    """Make Ctrl-C and SIGTERM raise KeyboardInterrupt, and remember a signal that compiled code swallows.
+    """Make the signals that end a command raise KeyboardInterrupt, and remember one that compiled code swallows.
 
     The first one is answered by a line on stderr. During an import the exception waits until it ends: a half-imported
-    compiled module crashes.
+    compiled module crashes. What `nohup` switched off stays off.
     """
-    for one in _SIGNALS:
-        signal.signal(one, _handler)
+    for one in ENDING:
+        if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN:
+            signal.signal(one, _handler)
     signal.signal(signal.SIGALRM, _handler)
 
 

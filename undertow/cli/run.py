@@ -20,7 +20,7 @@ import typer
 from undertow.autopilot.autopilot import Autopilot
 from undertow.autopilot.measured_motion import Format
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
-from undertow.cli.interruptible import interruptible
+from undertow.cli.interruptible import ENDING, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
@@ -39,7 +39,6 @@ from undertow.scenario.reading import dump, read
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
 
 
@@ -63,7 +62,7 @@ class Options(NamedTuple):
 
 
 class _Stop:
-    """Whether a signal asked for the end, and which: Ctrl-C, SIGTERM, or the end of the terminal."""
+    """Whether a signal asked for the end, and which."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -80,7 +79,7 @@ class _Stop:
                 os.write(2, b"\nInterrupted: stopping.\n")
             self.number = number
 
-        before = {one: signal.signal(one, note) for one in _SIGNALS}
+        before = {one: signal.signal(one, note) for one in ENDING if signal.getsignal(one) != signal.SIG_IGN}
         try:
             yield
         finally:
@@ -254,9 +253,13 @@ def _ending(reason: Reason, link: AbstractLink, options: Options, stop: _Stop) -
         complain(link.ended)
     elif reason is Reason.LINK_LOST:
         complain(f"no measurement for {options.max_age:g} s: the safe output was sent, and the run ended")
+    elif reason is Reason.STALLED:
+        said = "the controller stood still for longer than --max-age"
+        complain(f"{said} ({options.max_age:g} s): the safe output was sent, and the run ended")
     elif reason is Reason.NO_START:
         complain(f"no first measurement within {options.patience:g} s over {options.link}; nothing was written")
-    return RUN_FAILED if link.failed or reason in (Reason.LINK_LOST, Reason.NO_START) else DONE
+    failed = (Reason.LINK_LOST, Reason.STALLED, Reason.NO_START)
+    return RUN_FAILED if link.failed or reason in failed else DONE
 
 
 def _replay(built: Built, options: Options) -> int:

@@ -25,6 +25,7 @@ from undertow.realtime.statistics import LoopStatistics
 
 _LITTLE = 0.1  # periods, by which a step may begin late and counts as on time for the controller
 _ROUNDING = 1e-6  # periods
+_STANDSTILL = 2.0  # periods, that a loop of long periods may stand still beyond `max_age`
 
 
 class Reason(enum.Enum):
@@ -34,6 +35,7 @@ class Reason(enum.Enum):
     LINK_ENDED = "the link ended"
     LINK_LOST = "no measurement"
     NO_START = "no first measurement"
+    STALLED = "the controller stood still"
     STOPPED = "stopped"
 
 
@@ -44,7 +46,7 @@ class LoopSettings(NamedTuple):
         safe: output that is sent last, however the loop ends, in the unit of the plant's input; one number or one per
             actuator.
         deadline: s after the planned beginning of a step, by which its command should be sent; None for the period.
-        max_age: s without a new measurement, after which the loop ends.
+        max_age: s without a new measurement, or without a step of its own, after which the loop ends.
         patience: s that the loop waits for the first measurement.
     """
 
@@ -109,6 +111,7 @@ class RealTimeLoop:
         Whatever happens, the last thing sent is the safe output.
         """
         try:
+            self._link.guard(self._safe, max(self._max_age, _STANDSTILL * self._period))
             with _without_collection():
                 return self._run(steps, periods)
         finally:
@@ -143,6 +146,8 @@ class RealTimeLoop:
             started = clock.now()
             before, at = at, self._instant(started - begin)
             elapsed = (at - before) * period
+            if elapsed > max(self._max_age, _STANDSTILL * period):
+                return Reason.STALLED
             received = self._link.receive(elapsed)
             if self._link.ended:
                 return Reason.LINK_ENDED

@@ -151,7 +151,14 @@ class Sender:
     def pack(self, values: np.ndarray, time: int, answered: int, flag: bool = False) -> bytes:
         """The next datagram."""
         self._sequence = min(self._sequence + 1, _SEQUENCES - 1)
-        datagram = Datagram(self._kind, flag, self._session, self._sequence, time, answered, values)
+        return self._packed(self._sequence, values, time, answered, flag)
+
+    def following(self, values: np.ndarray, time: int, count: int) -> list[bytes]:
+        """The next datagrams, should somebody else send them."""
+        return [self._packed(self._sequence + k, values, time, 0, False) for k in range(1, count + 1)]
+
+    def _packed(self, sequence: int, values: np.ndarray, time: int, answered: int, flag: bool) -> bytes:
+        datagram = Datagram(self._kind, flag, self._session, sequence, time, answered, values)
         return datagram.packed(self._actuators)
 
 

@@ -60,6 +60,14 @@ class AbstractLink(abc.ABC):
     def finish(self, safe: np.ndarray) -> None:
         """Send the safe output as the last command, then close."""
 
+    def guard(self, safe: np.ndarray, longest: float) -> None:  # noqa: B027
+        """Called before the loop: a network sees to it that the vehicle gets the safe output whatever happens here.
+
+        Args:
+            safe: in the unit of the plant's input.
+            longest: s for which the loop may stand still.
+        """
+
     def await_measurement(self, safe: np.ndarray) -> None:  # noqa: B027
         """Called once per period while the loop waits for the first measurement: a network says that it is there."""
 

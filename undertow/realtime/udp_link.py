@@ -14,6 +14,7 @@ from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.realtime.datagrams import COMMAND, MEASUREMENT, MOTION, Received, Sender, address_of
 from undertow.realtime.link import AbstractLink, LinkMeasurement
 from undertow.realtime.vehicle_link import VehicleLink
+from undertow.realtime.watchdog import Watchdog
 from undertow.scenario.build import Built
 
 _LONGEST = 2048  # bytes of a datagram that are read: none of ours comes near
@@ -48,6 +49,8 @@ class UdpVehicleLink(AbstractLink):
         self._received = Received(MEASUREMENT, self._actuators)
         self._sender = Sender(COMMAND, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._sent = self._unsent = self._others = 0
+        self._watchdog: Watchdog | None = None
+        self._safe = np.zeros(self._actuators)
 
     def fileno(self) -> int:
         """Of the socket: `select` can wait for datagrams."""
@@ -72,7 +75,13 @@ class UdpVehicleLink(AbstractLink):
         motion, applied = found.values[:MOTION], found.values[MOTION:]
         return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if found.flag else None)
 
+    def guard(self, safe: np.ndarray, longest: float) -> None:
+        self._safe, self._watchdog = safe, Watchdog(self._socket, longest)
+
     def send(self, command: np.ndarray) -> None:
+        if self._watchdog is not None:
+            following = self._sender.following(self._safe, time.monotonic_ns(), 1 + _LAST)
+            self._watchdog.hold(self._peer, following[1:])
         self._send(command, False)
 
     def await_measurement(self, safe: np.ndarray) -> None:
@@ -90,6 +99,8 @@ class UdpVehicleLink(AbstractLink):
     def finish(self, safe: np.ndarray) -> None:
         for _ in range(_LAST):
             self._send(safe, False)
+        if self._watchdog is not None:
+            self._watchdog.done()
         self._socket.close()
 
     def counts(self) -> dict[str, int]:

@@ -59,6 +59,7 @@ class Companion:
     Attributes:
         counts: what happened so far.
         complaint: why the last message was ignored, or a command was rejected.
+        timeout: s.
         running: whether the law runs.
         armed: whether the vehicle is, as far as is known.
         channels: of the thrusters.
@@ -83,8 +84,9 @@ class Companion:
         if not 1 <= target_system <= 255:
             raise BadInput("target_system", "be from 1 to 255", target_system)
         checks.positive("timeout", timeout, "s")
+        self.timeout = float(timeout)
         checks.not_negative("blend", blend, "s")
-        self._reader, self._timeout, self._target = OdometryReader(source), timeout, Target(target_system)
+        self._reader, self._target = OdometryReader(source), Target(target_system)
         smoothly = blend or 1.0  # a start that is given no applied input has no use for it
         self._autopilot = Autopilot(scenario, attitude="quaternion", blend=smoothly, allow_code=allow_code)
         plant = pulse_driven(self._autopilot.plant, battery_suffices=False)
@@ -179,7 +181,7 @@ class Companion:
             self.complaint = f"command {message.command} was answered {result.name if result else message.result}"
 
     def _stop_if_lost(self, now: float) -> None:
-        lost = now - self._heartbeat > HEARTBEAT_TIMEOUT or now - self._odometry > self._timeout
+        lost = now - self._heartbeat > HEARTBEAT_TIMEOUT or now - self._odometry > self.timeout
         if self.running and (lost or not self.armed):
             self.running, self._sent_neutral = False, -np.inf
 

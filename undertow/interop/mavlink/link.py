@@ -10,10 +10,12 @@ from pymavlink.dialects.v20 import common as mavlink
 from undertow.core.errors import BadInput
 from undertow.interop.latency import Latency
 from undertow.interop.mavlink.companion import HEARTBEAT_TIMEOUT, Companion
+from undertow.realtime.watchdog import Watchdog
 
 _LONGEST = 65535  # bytes of a datagram
 _LOOK = 0.05  # s, longest wait before what is due is sent
 _LAST = 3  # times that neutral commands are sent at the end: any of them may be lost
+_HELD = 0.5  # s between two times that the watchdog gets what to send
 _KINDS = ("udp", "udpin", "udpout")
 
 
@@ -26,6 +28,7 @@ class UdpLink:
         system, component: our ids.
 
     Attributes:
+        socket: that it uses.
         port: on which it listens.
         peer: address of the vehicle; None before it is known.
         unsent: messages that the network did not take, such as while a cable is unplugged. They are lost.
@@ -40,32 +43,32 @@ class UdpLink:
             if not 1 <= number <= 255:
                 raise BadInput(name, "be from 1 to 255", number)
         self._packer: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
         self.unsent = 0
         try:
             if kind == "udpout":
                 self.peer = socket.gethostbyname(address[0]), address[1]
-                self._socket.bind(("", 0))
+                self.socket.bind(("", 0))
             else:
-                self._socket.bind(address)
+                self.socket.bind(address)
         except OSError as error:
-            self._socket.close()
+            self.socket.close()
             hint = "Another program may be listening there"
             raise BadInput("connect", "be free to use", f"{place}: {error.strerror}", hint=hint) from None
-        self.port = self._socket.getsockname()[1]
+        self.port = self.socket.getsockname()[1]
 
     def __enter__(self) -> "UdpLink":
         return self
 
     def __exit__(self, *error: Any) -> None:
-        self._socket.close()
+        self.socket.close()
 
     def receive(self, longest: float) -> tuple[list[Any], Any]:
         """Messages of the next datagram, and its sender; none after `longest`, s."""
-        self._socket.settimeout(longest)
+        self.socket.settimeout(longest)
         try:
-            data, sender = self._socket.recvfrom(_LONGEST)
+            data, sender = self.socket.recvfrom(_LONGEST)
         except (TimeoutError, ConnectionError):  # the second where nobody listens on the other side
             return [], None
         return parsed(data), sender
@@ -74,13 +77,19 @@ class UdpLink:
         """Send messages to the vehicle, if its address is known."""
         if self.peer is None:
             return
-        for message in messages:
-            data = message.pack(self._packer)
-            self._packer.seq = (self._packer.seq + 1) % 256
+        for data in self.packed(messages):
             try:
-                self._socket.sendto(data, self.peer)
+                self.socket.sendto(data, self.peer)
             except OSError:  # the vehicle notices that commands are missing, and the next one may get through
                 self.unsent += 1
+
+    def packed(self, messages: list[Any]) -> list[bytes]:
+        """Messages as datagrams, numbered on."""
+        found = []
+        for message in messages:
+            found.append(message.pack(self._packer))
+            self._packer.seq = (self._packer.seq + 1) % 256
+        return found
 
 
 def parsed(data: bytes) -> list[Any]:
@@ -104,6 +113,8 @@ def accompany(
 ) -> None:
     """Let a companion talk through a link until it is to end, or Ctrl-C. What is sent last are neutral commands.
 
+    A `Watchdog` sends them where this process is killed, or stands still for longer than the companion's timeout.
+
     The vehicle is where the first message of the target system comes from. Another sender takes its place after 3 s
     without one.
 
@@ -116,7 +127,8 @@ def accompany(
         latency: gets the time from each odometry to the commands.
     """
     measured = latency or Latency()
-    due, received, steps = time.monotonic() + every, -float("inf"), 0
+    due, received, steps, held = time.monotonic() + every, -float("inf"), 0, -float("inf")
+    watchdog = Watchdog(link.socket, companion.timeout)
     try:
         while not until():
             messages, sender = link.receive(max(0.001, min(_LOOK, due - time.monotonic())))
@@ -127,16 +139,22 @@ def accompany(
                         continue
                     link.peer, received = sender, now
                 before = companion.counts["steps"]
-                link.send(companion.receive(message, now))
+                answer = companion.receive(message, now)
+                if companion.running and link.peer and now - held > _HELD:  # before the first command, too
+                    watchdog.hold(link.peer, link.packed(companion.neutral()))
+                    held = now
+                link.send(answer)
                 if companion.counts["steps"] > before:
                     measured.add(time.perf_counter() - begun)
             link.send(companion.idle(time.monotonic()))
+            watchdog.alive()
             if time.monotonic() >= due:
                 report(status_line(companion, link, measured, (companion.counts["steps"] - steps) / every))
                 steps, due = companion.counts["steps"], time.monotonic() + every
     finally:
         for _ in range(_LAST):
             link.send(companion.neutral())
+        watchdog.done()
 
 
 def status_line(companion: Companion, link: UdpLink, latency: Latency, rate: float) -> str:
