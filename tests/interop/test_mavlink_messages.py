@@ -55,6 +55,8 @@ def test_odometry(world):
         (odometry((200, BODY)), "`ODOMETRY.frame_id` must be .*, but is 200, which is no frame"),
         (odometry((NED, NED)), "`ODOMETRY.child_frame_id` must be MAV_FRAME_BODY_FRD, but is MAV_FRAME_LOCAL_NED"),
         (odometry(quality=-1), "`ODOMETRY.quality` must not be -1"),
+        (odometry(velocity=[3e38, 0, 0, 0, 0, 0]), "`ODOMETRY velocity` must be at most 20 m/s, but is 3e.38 m/s"),
+        (odometry(velocity=[0, 0, 0, 0, -21, 0]), "`ODOMETRY angular velocity` must be at most 20 rad/s"),
     ],
 )
 def test_odometry_that_is_not_used(message, said):

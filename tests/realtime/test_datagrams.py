@@ -73,10 +73,39 @@ def test_old_and_foreign_sessions_and_numbers_are_refused():
     assert (received.counts["repeated"], received.counts["other session"]) == (4, 1)
 
 
-def test_a_sequence_ends_at_its_largest_number_and_never_begins_again():
+def test_a_sequence_begins_again_after_its_largest_number():
     of, received = sender(), Received(MEASUREMENT, N)
     of._sequence = 2**32 - 3
-    assert [received.take(of.pack(UPRIGHT, 0, 0)) is not None for _ in range(5)] == [True, True, False, False, False]
+    taken = [received.take(of.pack(UPRIGHT, 0, 0)) for _ in range(5)]
+    assert [one and one.sequence for one in taken] == [2**32 - 2, 2**32 - 1, 1, 2, 3]
+
+
+@pytest.mark.parametrize("wrong", [0, 2**32 - 1, 2**31 - 1, 50_000])
+def test_one_wrong_number_does_not_end_a_connection(wrong):
+    of, received = sender(), Received(MEASUREMENT, N)
+    assert received.take(of.pack(UPRIGHT, 0, 0)) is not None
+    at, of._sequence = of._sequence, wrong - 1
+    forged = of._packed(wrong, UPRIGHT, 0, 0, False)
+    assert received.take(forged) is None
+    of._sequence = at
+    assert all(received.take(of.pack(UPRIGHT, 0, 0)) is not None for _ in range(3))
+    assert received.take(forged) is None
+
+
+def test_a_sender_that_was_not_heard_for_long_is_heard_again():
+    """More datagrams were lost than the window holds: the second one counts."""
+    of, received = sender(), Received(MEASUREMENT, N)
+    assert received.take(of.pack(UPRIGHT, 0, 0)) is not None
+    of._sequence += 50_000
+    assert [received.take(of.pack(UPRIGHT, 0, 0)) is not None for _ in range(3)] == [False, True, True]
+    assert received.counts["far ahead"] == 1
+
+
+@pytest.mark.parametrize(("entry", "value"), [(0, 1.1e4), (2, -1e5), (7, 21.0), (9, -9e5), (10, 25.0)])
+def test_motions_of_no_vehicle_are_refused(entry, value):
+    received, values = Received(MEASUREMENT, N), UPRIGHT.copy()
+    values[entry] = value
+    assert received.take(sender().pack(values, 0, 0)) is None and received.counts["implausible"] == 1
 
 
 @pytest.mark.full

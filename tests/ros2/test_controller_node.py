@@ -136,6 +136,10 @@ def test_a_target_is_reached_for(setup, autopilot):
         ({"frames": Frames(("world_ned",))}, "`/odom header.frame_id` must be odom or map, but is 'world_ned'"),
         ({"frames": Frames(body="imu_link")}, "`/odom child_frame_id` must be base_link, but is 'imu_link'"),
         ({"motion": STILL._replace(quaternion=np.zeros(4))}, "`/odom orientation` must be of unit length"),
+        (
+            {"motion": STILL._replace(position=np.full(3, 2e4))},
+            "`/odom position` must be at most 10000 m, but is 2e+04 m",
+        ),
         ({"motion": STILL._replace(position=np.array([0, np.nan, 0]))}, "`position[1]` must be a finite number"),
     ],
 )
@@ -230,6 +234,10 @@ def test_numbers_of_any_size_harm_nobody(setup):
             message.header.stamp = ros.Time(sent := sent + 1, 0)
             quaternion = chance.normal(size=4)
             message.pose.pose.orientation = ros.Quaternion(*(quaternion / np.linalg.norm(quaternion)).tolist())
+        if chance.random() < 0.8:  # of a vehicle
+            message.pose.pose.position = ros.Point(*chance.uniform(-1e4, 1e4, 3).tolist())
+            for part in ("linear", "angular"):
+                setattr(message.twist.twist, part, ros.Vector3(*chance.uniform(-20, 20, 3).tolist()))
         peer.odometry.publish(message)
         target = random_message(ros.PoseStamped, chance)
         target.header.frame_id = "map"

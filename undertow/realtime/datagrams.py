@@ -9,7 +9,7 @@ All numbers are little-endian. A header of 28 bytes, the numbers, and CRC-32 (as
     6       1     flags; of a measurement: 1, the applied input is known; of a command: 1, control has not begun
     7       1     number n of actuators
     8       4     session: any number that the sender chose when it started
-    12      4     sequence number: of the first datagram 1 or more, and larger in every later one
+    12      4     sequence number: 1 or more, and larger in every later datagram; after 2^32 - 1 comes 1
     16      8     time of the sender, ns since any origin
     24      4     sequence number of the newest datagram that was received from the other side; 0 without one
     28      8 m   numbers, double precision
@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.core.errors import BadInput
+from undertow.realtime.plausible_motion import is_plausible
 
 MEASUREMENT, COMMAND = 1, 2
 FLAG = 1
@@ -35,6 +36,7 @@ MOTION = 13  # numbers of the motion
 _HEADER, _SUM = struct.Struct("<4sBBBBIIqI"), struct.Struct("<I")
 _MAGIC, _VERSION = b"UTOW", 1
 _SEQUENCES = 2**32
+_WINDOW = 10_000  # datagrams that may be lost in a row
 
 # Numbers beyond are of no vehicle: m, m/s, rad/s, V, N.
 _LARGEST = 1e6
@@ -83,7 +85,8 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
 
     Raises:
         Refused: wrong size; damaged; foreign (another format, version or kind); invalid (a number that is infinite or
-            far beyond any vehicle, NaN in anything but a measurement, or a quaternion that is none).
+            far beyond any vehicle, NaN in anything but a measurement, or a quaternion that is none); implausible (see
+            `plausible_motion`).
     """
     if len(data) != size_of(kind, actuators):
         raise Refused("wrong size")
@@ -99,6 +102,8 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
         raise Refused("invalid")
     if kind == MEASUREMENT and abs((values[3:7] ** 2).sum() - 1) > _UNIT:  # false for NaN
         raise Refused("invalid")
+    if kind == MEASUREMENT and not is_plausible(values[:3], values[7:MOTION]):
+        raise Refused("implausible")
     return Datagram(kind, bool(flags), session, sequence, time, answered, values)
 
 
@@ -116,9 +121,11 @@ class Received:
 
     def __init__(self, kind: int, actuators: int):
         self._kind, self._actuators = kind, actuators
-        names = ("received", "wrong size", "damaged", "foreign", "invalid", "other session", "repeated", "left unread")
+        names = ("received", "wrong size", "damaged", "foreign", "invalid", "implausible", "other session")
+        names += ("repeated", "far ahead", "left unread")
         self.counts: dict[str, int] = dict.fromkeys(names, 0)
         self.newest: Datagram | None = None
+        self._far = 0  # sequence number of the last datagram that was ahead
 
     def take(self, data: bytes) -> Datagram | None:
         """The datagram, if it can be used; otherwise it is counted."""
@@ -126,14 +133,27 @@ class Received:
             found = unpacked(data, self._kind, self._actuators)
             if self.newest is not None and found.session != self.newest.session:
                 raise Refused("other session")
-            if found.sequence <= (0 if self.newest is None else self.newest.sequence):
-                raise Refused("repeated")
+            self._check_order(found.sequence)
         except Refused as why:
             self.counts[str(why)] += 1
             return None
         self.counts["received"] += 1
         self.newest = found
         return found
+
+    def _check_order(self, sequence: int) -> None:
+        """Check that a datagram is later than the last one; one far ahead counts where another follows it.
+
+        Otherwise a single datagram of a wrong number would end the connection.
+        """
+        last = 0 if self.newest is None else self.newest.sequence
+        ahead = (sequence - last) % _SEQUENCES
+        if ahead == 0 or (ahead > _SEQUENCES // 2 and self.newest is not None) or sequence == 0:
+            raise Refused("repeated")
+        if ahead > _WINDOW and self.newest is not None and not 0 < (sequence - self._far) % _SEQUENCES <= _WINDOW:
+            self._far = sequence
+            raise Refused("far ahead")
+        self._far = sequence
 
 
 class Sender:
@@ -150,16 +170,21 @@ class Sender:
 
     def pack(self, values: np.ndarray, time: int, answered: int, flag: bool = False) -> bytes:
         """The next datagram."""
-        self._sequence = min(self._sequence + 1, _SEQUENCES - 1)
+        self._sequence = _next(self._sequence, 1)
         return self._packed(self._sequence, values, time, answered, flag)
 
     def following(self, values: np.ndarray, time: int, count: int) -> list[bytes]:
         """The next datagrams, should somebody else send them."""
-        return [self._packed(self._sequence + k, values, time, 0, False) for k in range(1, count + 1)]
+        return [self._packed(_next(self._sequence, k), values, time, 0, False) for k in range(1, count + 1)]
 
     def _packed(self, sequence: int, values: np.ndarray, time: int, answered: int, flag: bool) -> bytes:
         datagram = Datagram(self._kind, flag, self._session, sequence, time, answered, values)
         return datagram.packed(self._actuators)
+
+
+def _next(sequence: int, steps: int) -> int:
+    """Sequence number so many datagrams later; 0 is none."""
+    return (sequence + steps - 1) % (_SEQUENCES - 1) + 1
 
 
 def address_of(place: str, name: str) -> tuple[str, int]:

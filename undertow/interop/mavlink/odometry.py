@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.realtime.plausible_motion import check_plausible
 
 SOURCES = ("odometry", "local_position")
 
@@ -83,7 +84,7 @@ def of_odometry(message: Any) -> Odometry:
     """Odometry of a message ODOMETRY: pose in the local frame, velocity in body axes.
 
     Raises:
-        BadInput: its axes are others, or its estimator has failed.
+        BadInput: its axes are others, its estimator has failed, or it is the motion of no vehicle.
     """
     _check_frame("frame_id", message.frame_id, _WORLD)
     _check_frame("child_frame_id", message.child_frame_id, _BODY)
@@ -92,16 +93,22 @@ def of_odometry(message: Any) -> Odometry:
     velocity = [message.vx, message.vy, message.vz, message.rollspeed, message.pitchspeed, message.yawspeed]
     position = np.array([message.x, message.y, message.z], dtype=float)
     attitude = _unit(np.array(message.q, dtype=float))
+    check_plausible("ODOMETRY", position, velocity)
     return Odometry(message.time_usec, position, attitude, np.array(velocity, dtype=float), message.reset_counter)
 
 
 def of_local_position(position: Any, attitude: Any) -> Odometry:
-    """Odometry of LOCAL_POSITION_NED, whose velocity is in world axes, and ATTITUDE_QUATERNION."""
+    """Odometry of LOCAL_POSITION_NED, whose velocity is in world axes, and ATTITUDE_QUATERNION.
+
+    Raises:
+        BadInput: it is the motion of no vehicle.
+    """
     quaternion = _unit(np.array([attitude.q1, attitude.q2, attitude.q3, attitude.q4], dtype=float))
     world = np.array([position.vx, position.vy, position.vz], dtype=float)
     rates = np.array([attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed], dtype=float)
     velocity = np.concatenate([in_body_axes(quaternion, world), rates])
     place = np.array([position.x, position.y, position.z], dtype=float)
+    check_plausible("LOCAL_POSITION_NED", place, velocity)
     return Odometry(1000 * position.time_boot_ms, place, quaternion, velocity)
 
 

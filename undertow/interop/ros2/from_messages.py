@@ -12,6 +12,7 @@ from undertow.autopilot.measured_motion import AS_INTEGRATED
 from undertow.core.errors import BadInput
 from undertow.interop.ros2.frames import between_attitudes, between_frd_and_flu, between_ned_and_enu
 from undertow.logs.frames import attitudes_of_quaternions
+from undertow.realtime.plausible_motion import check_plausible
 
 SECOND = 1_000_000_000  # ns
 
@@ -65,13 +66,15 @@ def motion_of(message: Any, frames: Frames, topic: str) -> PoseAndVelocity:
     """Motion of an odometry message; numbers that are not finite were not measured.
 
     Raises:
-        BadInput: another frame, or a quaternion that is not of unit length.
+        BadInput: another frame, a quaternion that is not of unit length, or the motion of no vehicle.
     """
     frames.check_world(topic, message.header.frame_id)
     frames.check_body(topic, "child_frame_id", message.child_frame_id)
     pose, twist = message.pose.pose, message.twist.twist
     velocity = np.concatenate([_frd(twist.linear), _frd(twist.angular)])
-    return PoseAndVelocity(_ned(pose.position), _attitude(pose.orientation, topic), velocity)
+    position = _ned(pose.position)
+    check_plausible(topic, position, velocity)
+    return PoseAndVelocity(position, _attitude(pose.orientation, topic), velocity)
 
 
 def target_of(message: Any, frames: Frames, topic: str) -> NDArray:
