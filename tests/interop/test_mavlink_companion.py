@@ -186,7 +186,7 @@ def test_a_clock_that_is_set(talk):
         assert pulses(talk.odometry(after=jump))
     assert pulses(talk.odometry())
     assert talk.companion.counts["clock jumps"] == 2 and talk.companion.counts["starts"] == 1
-    assert talk.companion.steps_counted == {"steps": 3, "late": 0, "missed": 0, "repeated": 0}
+    assert talk.companion.steps_counted == dict.fromkeys(talk.companion.steps_counted, 0) | {"steps": 3}
     assert pulses(talk.odometry(after=20_000))
     assert talk.companion.steps_counted["late"] == 1
 
@@ -237,7 +237,7 @@ def test_anything_may_arrive(talk):
         message = messages[k % len(messages)]
         if message.get_type() == "ODOMETRY":
             message.time_usec += int(chance.integers(-5_000, 50_000)) if message.time_usec > 5_000 else 5_000
-            message.x, message.vx = (float(one) for one in chance.choice([0.0, 1.0, np.nan, np.inf, 1e30, -1e38], 2))
+            message.x, message.vx = (float(one) for one in chance.choice([0.0, 19.0, -19.0, np.nan, np.inf, 1e30], 2))
         data = bytearray(message.pack(talk.wire))
         if chance.integers(2):
             for _ in range(chance.integers(1, 4)):

@@ -199,6 +199,28 @@ def test_missing_readings_are_replaced(heavy):
     assert all(np.isfinite(heavy.step(*nothing, target=np.zeros(6))).all() for _ in range(100))
 
 
+@pytest.mark.full
+def test_a_law_that_is_no_number_any_more_starts_again(heavy):
+    """An applied input that overflows while the thrusters give all they can; then the vehicle is at its target."""
+    at, far = (np.zeros(3), np.zeros(6), np.zeros(3)), np.array([8.0, 1, 1, 0, 0, 0.5])
+    heavy.start(*at, target=far)
+    for _ in range(50):
+        full = heavy.step(*at, target=far)
+    assert np.abs(full).max() == 16
+    assert (heavy.step(*at, target=far, applied=np.full(8, 1e300)) == full).all()
+    found = np.array([heavy.step(*at, target=np.zeros(6)) for _ in range(100)])
+    assert heavy.counts["restarted"] == 1
+    heavy.start(*at, target=np.zeros(6))
+    anew = np.array([heavy.step(*at, target=np.zeros(6)) for _ in range(99)])
+    np.testing.assert_allclose(found[1:], anew, atol=0.05)
+
+    heavy.step(*at, target=far, applied=np.full(8, 1e300))
+    missing = np.full(3, np.nan)
+    silent = [heavy.step(missing, *at[1:], target=far) for _ in range(5)]
+    assert not np.any(silent[1:]), "without a measurement it cannot start, and gives nothing"
+    assert heavy.step(*at, target=far).any()
+
+
 def test_late_missed_and_repeated_steps():
     clock = Clock(0.01)
     assert [clock.passed(dt) for dt in (None, 0.01, 0.012, 0.015, 0.05, 10.0)] == [0.01, 0.01, 0.012, 0.015, 0.05, 0.05]

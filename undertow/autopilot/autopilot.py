@@ -50,7 +50,9 @@ class Autopilot:
     it is missed, and the law advances by 5 sampling times only. With `dt` zero, negative or not finite the last output
     is repeated. `counts` says how often each happened.
 
-    Entries of a measurement that are not finite are replaced by those that the law's model expects.
+    Entries of a measurement that are not finite are replaced by those that the law's model expects. A law whose command
+    is not finite repeats its last output once. Then it starts anew from the next whole measurement, and its output is
+    zero until there is one (`restarted`); a supervisor does that by itself.
 
     Args:
         scenario: a .yaml file or an earlier run.nc, the same as a mapping, a closed loop made of parts, or what `build`
@@ -107,7 +109,8 @@ class Autopilot:
             self._compile(Functions(loop, form, conversion))
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
-        self._blended, self._started = np.zeros((), dtype=bool), np.zeros((), dtype=bool)
+        self._blended, self._started, self._broken = (np.zeros((), dtype=bool) for _ in range(3))
+        self._restarts = np.zeros((), dtype=int)
         motion, report, target, status = self._begin.inputs
         self._received = ReceivedStep(motion, report, target, status, np.zeros_like(self._command), 0.0)
         self._log_later, self._logged, self._log = log_later, True, None
@@ -202,6 +205,7 @@ class Autopilot:
         self._command[...] = before
         blended = applied is not None and supervised is None
         self._before[...], self._blended[...], self._started[...] = before, blended, True
+        self._broken[...], self._restarts[...] = False, 0
         return self._answered()
 
     def step(
@@ -249,7 +253,22 @@ class Autopilot:
         self._received = ReceivedStep(motion, report, goal or self._target(None), healthy, given, elapsed)
         put(self._go_on.inputs, (*self._received[:5], passed))
         self._go_on()
+        if not self.supervised:
+            self._start_again_if_broken()
         return self._answered()
+
+    def _start_again_if_broken(self) -> None:
+        """From the second command in a row that is not finite on: a law whose state is not finite stays so."""
+        if np.isfinite(self._go_on.outputs.command).all():
+            self._broken[...] = False
+        elif not self._broken:
+            self._broken[...] = True
+        else:
+            put(self._begin.inputs, self._received[:4])
+            self._begin()
+            put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+            self._restarts += 1
+            self._command[...] = 0.0  # unless the command is finite now
 
     def save(self) -> bytes:
         """The state: law, time, counts, output. An autopilot that is made alike goes on from it with the same bits.
@@ -272,8 +291,8 @@ class Autopilot:
     def _kept(self) -> list[np.ndarray]:
         """Everything that changes from step to step."""
         steps = self._go_on.state, self._go_on.outputs, self._at.numbers, self._convert.outputs
-        own = self._command, self._before, self._blended, self._started, self._clock.numbers
-        return [*jax.tree.leaves(steps), *own]
+        own = self._command, self._before, self._blended, self._started, self._broken, self._restarts
+        return [*jax.tree.leaves(steps), *own, self._clock.numbers]
 
     def _identity(self) -> bytes:
         """What states have in common that may be exchanged: structure and numbers of the controller, and formats."""
@@ -287,8 +306,8 @@ class Autopilot:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Steps after the first one, and those of them that were late, missed or repeated."""
-        return self._clock.counts
+        """Steps after the first one, those that were late, missed or repeated, and new starts of a broken law."""
+        return self._clock.counts | {"restarted": int(self._restarts)}
 
     @property
     def supervised(self) -> bool:
