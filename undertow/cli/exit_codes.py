@@ -1,5 +1,6 @@
 """Exit codes, and one line on stderr for an error."""
 
+import contextlib
 import os
 import select
 import signal
@@ -70,6 +71,12 @@ def _nobody_reads() -> bool:
     poll = select.poll()
     poll.register(stdout, 0)
     return any(event & select.POLLERR for _, event in poll.poll(0))
+
+
+def report(line: str) -> None:
+    """Print a line of a command that controls a vehicle: where that fails, as on a full disk, it is lost."""
+    with contextlib.suppress(OSError, ValueError):
+        print(line, flush=True)
 
 
 def complain(sentence: str) -> None:

@@ -1,5 +1,6 @@
 """The command line `undertow`: arguments and help. Each command is in its own file, imported when it runs."""
 
+import contextlib
 import importlib.metadata
 import os
 import platform
@@ -490,8 +491,9 @@ def main() -> None:
     # A thread in compiled code, or compiling, cannot be stopped otherwise; and JAX would clear its caches for a quarter
     # of a second. A profiler writes its findings on the usual way out.
     if threading.active_count() > 1 or sys.getprofile() is None:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        with contextlib.suppress(OSError):  # a full disk
+            sys.stdout.flush()
+            sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
 

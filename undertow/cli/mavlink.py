@@ -3,9 +3,7 @@
 import time
 from pathlib import Path
 
-import typer
-
-from undertow.cli.exit_codes import DONE
+from undertow.cli.exit_codes import DONE, report
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
@@ -47,7 +45,7 @@ def mavlink(
                 timeout=timeout,
                 allow_code=allow_code,
             )
-        typer.echo(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
+        report(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
         end = float("inf") if duration is None else time.monotonic() + duration
-        accompany(companion, link, typer.echo, until=lambda: time.monotonic() >= end)
+        accompany(companion, link, report, until=lambda: time.monotonic() >= end)
     return DONE

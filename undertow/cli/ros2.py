@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, report
 from undertow.cli.interruptible import interruptible
 from undertow.core import checks
 from undertow.core.errors import BadInput
@@ -65,7 +65,7 @@ def _run(scenario: Path, options: Options) -> int:
 
     names = Topics().remapped(options.remap)
     frames = Frames(tuple(options.world_frame) or Frames().world, options.body_frame)
-    reporter = Reporter(lambda line: print(line, flush=True))
+    reporter = Reporter(report)
     domain, localhost = _domain(options.domain), options.localhost or _environment_says_localhost()
     bag = None if options.bag is None else BagWriter(options.bag, options.storage)
     reporter.say(f"compiling the {options.role}")
