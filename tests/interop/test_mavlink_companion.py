@@ -1,5 +1,7 @@
 """When the law of a companion runs, and what the thrusters get when it does not; messages only, without a socket."""
 
+import copy
+
 import numpy as np
 import pytest
 from driven_scenario import DRIVEN
@@ -10,6 +12,7 @@ from undertow.core.errors import BadInput
 from undertow.interop.mavlink import Companion
 from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, HEARTBEAT_TIMEOUT, NEUTRAL_PERIOD
 from undertow.interop.mavlink.link import parsed
+from undertow.interop.mavlink.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
 
@@ -28,9 +31,16 @@ class Talk:
         (received,) = parsed(message.pack(wire or self.wire))
         return self.companion.receive(received, self.now)
 
-    def heartbeat(self, armed=True, autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, wire=None):
-        mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
-        return self.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_SUBMARINE, autopilot, mode, 0, 4, 3), wire)
+    def heartbeat(
+        self,
+        armed=True,
+        autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+        wire=None,
+        mode=0,
+        status=mavlink.MAV_STATE_ACTIVE,
+    ):
+        flags, kind = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0, mavlink.MAV_TYPE_SUBMARINE
+        return self.say(mavlink.MAVLink_heartbeat_message(kind, autopilot, flags, mode, status, 3), wire)
 
     def odometry(self, place=(0, 0, 0), q=(1, 0, 0, 0), velocity=(0,) * 6, after=10_000, resets=0, wire=None, frame=1):
         self.time_usec += after
@@ -42,6 +52,7 @@ class Talk:
 
     def idle(self, passed=0.0):
         self.now += passed
+        self.time_usec += round(1e6 * passed)
         return self.companion.idle(self.now)
 
 
@@ -60,14 +71,19 @@ def neutrals(messages):
 def made(driven):
     """Compiled once; `talk` begins with the state that a new one has."""
     companion = Companion(driven, blend=0.0, timeout=TIMEOUT)
-    fresh = {name: value.copy() if isinstance(value, dict) else value for name, value in vars(companion).items()}
+    fresh = {
+        name: copy.copy(value) if isinstance(value, dict | SenderClock) else value
+        for name, value in vars(companion).items()
+    }
     return companion, fresh
 
 
 @pytest.fixture
 def talk(made):
     companion, fresh = made
-    vars(companion).update({name: value.copy() if isinstance(value, dict) else value for name, value in fresh.items()})
+    vars(companion).update(
+        {name: copy.copy(value) if isinstance(value, dict | SenderClock) else value for name, value in fresh.items()}
+    )
     return Talk(companion)
 
 
@@ -177,18 +193,84 @@ def test_the_same_odometry_again(talk):
     assert talk.odometry(after=0) == [] and talk.companion.counts["repeated"] == 1
 
 
-def test_a_clock_that_is_set(talk):
-    """Back by an hour, on by a day: the law advances by one sampling time."""
+@pytest.mark.parametrize("jump", [-3600 * 10**6, 86400 * 10**6])
+def test_a_clock_that_is_set(talk, jump):
+    """Back by an hour, on by a day: for half a second its odometry may be old, and then the law begins again."""
     talk.time_usec = 10**15
     talk.heartbeat()
     talk.odometry()
-    for jump in (-3600 * 10**6, 86400 * 10**6):
-        assert pulses(talk.odometry(after=jump))
-    assert pulses(talk.odometry())
-    assert talk.companion.counts["clock jumps"] == 2 and talk.companion.counts["starts"] == 1
-    assert talk.companion.steps_counted == dict.fromkeys(talk.companion.steps_counted, 0) | {"steps": 3}
+    talk.time_usec += jump
+    used = [bool(talk.odometry()) for _ in range(60)]
+    assert used.index(True) == 50 and all(used[50:])
+    assert talk.companion.counts["clock jumps"] == 1 and talk.companion.counts["old"] == 50
+    assert talk.companion.counts["starts"] == 2
+
+
+def test_steps_that_are_late(talk):
+    talk.heartbeat()
+    talk.odometry()
     assert pulses(talk.odometry(after=20_000))
     assert talk.companion.steps_counted["late"] == 1
+
+
+def test_old_odometry_is_not_the_present(talk):
+    """Two of a while ago come in turn, as from a replay: the law stops as where none comes."""
+    talk.heartbeat()
+    for _ in range(20):
+        talk.odometry()
+    newest = talk.time_usec
+    for k in range(300):
+        talk.time_usec = newest - 150_000 - 50_000 * (k % 2)
+        assert talk.odometry(after=0) == []
+        talk.companion.idle(talk.now)
+    assert not talk.companion.running and talk.companion.counts["starts"] == 1
+    assert talk.companion.counts["clock jumps"] == 0
+
+
+def test_a_queue_that_grew_old(talk):
+    """One second late, and the present again: only that is used."""
+    talk.heartbeat()
+    talk.odometry()
+    present = talk.time_usec + 10_000
+    talk.now += 1.0
+    assert talk.odometry() == [] and talk.companion.counts["old"] == 1
+    talk.time_usec = present + 1_000_000
+    assert pulses(talk.odometry()) and talk.companion.counts["starts"] == 2
+
+
+def test_another_component_is_not_the_autopilot(talk):
+    """A camera with an odometry of its own, 50 m away; a gimbal that says that it is armed."""
+    other = mavlink.MAVLink(None, srcSystem=1, srcComponent=197)
+    talk.heartbeat(wire=other)
+    assert talk.odometry() == []
+    talk.heartbeat()
+    assert pulses(talk.odometry())
+    assert talk.odometry(place=[50, 0, 0], wire=other) == []
+    assert talk.companion.counts["foreign"] == 2 and pulses(talk.odometry())
+
+
+@pytest.mark.parametrize("change", [{"mode": 19}, {"status": mavlink.MAV_STATE_CRITICAL}, {"status": 6}])
+def test_the_pilot_and_the_failsafes_of_the_autopilot_come_first(talk, change):
+    """Another flight mode, a failsafe, an emergency: neutral, until it is as it was."""
+    talk.heartbeat()
+    talk.odometry()
+    talk.heartbeat(**change)
+    assert not talk.companion.running and [pulses([one]) for one in neutrals(talk.idle())] == [STILL]
+    assert talk.odometry() == [] and talk.companion.state(talk.now) != "running"
+    talk.heartbeat()
+    assert pulses(talk.odometry()) and talk.companion.counts["starts"] == 2
+
+
+def test_a_position_that_leaps_stops_the_law_until_the_pilot_agrees(talk):
+    """Its target is where it was, so that the thrusters would give all they can."""
+    talk.heartbeat()
+    talk.odometry()
+    assert talk.odometry(place=[20, 0, 0]) == [] and talk.companion.counts["leaps"] == 1
+    assert [pulses([one]) for one in neutrals(talk.idle())] == [STILL]
+    assert talk.odometry(place=[20, 0, 0]) == [] and "leapt" in talk.companion.state(talk.now)
+    talk.heartbeat(armed=False)
+    talk.heartbeat()
+    assert pulses(talk.odometry(place=[20, 0, 0]))
 
 
 def test_an_estimator_that_jumps(talk):
@@ -237,7 +319,7 @@ def test_anything_may_arrive(talk):
         message = messages[k % len(messages)]
         if message.get_type() == "ODOMETRY":
             message.time_usec += int(chance.integers(-5_000, 50_000)) if message.time_usec > 5_000 else 5_000
-            message.x, message.vx = (float(one) for one in chance.choice([0.0, 19.0, -19.0, np.nan, np.inf, 1e30], 2))
+            message.x, message.vx = (float(one) for one in chance.choice([0.0, 0.9, -0.1, np.nan, np.inf, 1e30], 2))
         data = bytearray(message.pack(talk.wire))
         if chance.integers(2):
             for _ in range(chance.integers(1, 4)):

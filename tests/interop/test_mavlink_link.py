@@ -18,6 +18,7 @@ import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink import Companion, UdpLink, accompany
+from undertow.interop.mavlink.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
 
@@ -35,7 +36,8 @@ def companion(driven):
 
 @contextlib.contextmanager
 def accompanied(companion, link, **options):
-    """The companion talks in a thread, until the block ends."""
+    """The companion talks in a thread, until the block ends; the clock of its vehicle is a new one."""
+    companion._clock = SenderClock(companion.timeout)
     ended = threading.Event()
     options |= {"until": ended.is_set}
     thread = threading.Thread(target=accompany, args=(companion, link), kwargs=options)

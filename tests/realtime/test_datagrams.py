@@ -92,7 +92,7 @@ def test_one_wrong_number_does_not_end_a_connection(wrong):
     assert received.take(forged) is None
 
 
-def test_a_sender_that_was_not_heard_for_long_is_heard_again():
+def test_a_sender_of_whom_much_was_lost_is_accepted_again():
     """More datagrams were lost than the window holds: the second one counts."""
     of, received = sender(), Received(MEASUREMENT, N)
     assert received.take(of.pack(UPRIGHT, 0, 0)) is not None

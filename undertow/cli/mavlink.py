@@ -17,6 +17,7 @@ def mavlink(
     source: str,
     system: int,
     target_system: int,
+    target_component: int,
     frame: str | None,
     channels: str | None,
     timeout: float,
@@ -40,11 +41,13 @@ def mavlink(
                 source=source,
                 output=output,
                 target_system=target_system,
+                target_component=target_component,
                 frame=frame,
                 channels=channels,
                 timeout=timeout,
                 allow_code=allow_code,
             )
+        link.drain()  # what came while the law was compiled
         report(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
         end = float("inf") if duration is None else time.monotonic() + duration
         accompany(companion, link, report, until=lambda: time.monotonic() >= end)

@@ -115,6 +115,7 @@ def mavlink(
         int, typer.Option(metavar="ID", help="Our system id. ArduPilot takes RC overrides from MAV_GCS_SYSID only.")
     ] = 255,
     target_system: Annotated[int, typer.Option(metavar="ID", help="System id of the vehicle.")] = 1,
+    target_component: Annotated[int, typer.Option(metavar="ID", help="Component id of its autopilot.")] = 1,
     frame: Annotated[
         str | None, typer.Option(metavar="NAME", help="Frame of ArduSub: vectored_6dof or vectored; see `ardupilot`.")
     ] = None,
@@ -138,7 +139,18 @@ def mavlink(
     from undertow.cli.mavlink import mavlink
 
     return mavlink(
-        scenario, connect, output, source, system, target_system, frame, channels, timeout, duration, allow_code
+        scenario,
+        connect,
+        output,
+        source,
+        system,
+        target_system,
+        target_component,
+        frame,
+        channels,
+        timeout,
+        duration,
+        allow_code,
     )
 
 

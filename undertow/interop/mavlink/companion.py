@@ -14,17 +14,22 @@ from undertow.core.contracts import Inputs
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_of
 from undertow.interop.mavlink.odometry import Odometry, OdometryReader
+from undertow.interop.mavlink.sender_clock import SenderClock
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.interop.thruster_channels import channels_of_vehicle
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.power.esc import ESC, esc
+from undertow.realtime.plausible_motion import SPEED
 
 HEARTBEAT_PERIOD = 1.0  # s
 HEARTBEAT_TIMEOUT = 3.0  # s without one from the vehicle, after which the law stops
 NEUTRAL_PERIOD = 0.1  # s between neutral commands while the law is stopped
-JUMP = 1.0  # s; odometry whose time goes back, or on by more, comes from a clock that was set
+JUMP = 1.0  # s, longest time between two odometries by which the law advances
 
-_COUNTS = ("steps", "starts", "foreign", "invalid", "repeated", "clock jumps", "estimator resets", "rejected commands")
+LEAP = 1.0  # m by which a position may leap beyond what the largest plausible speed explains
+
+_COUNTS: tuple[str, ...] = ("steps", "starts", "foreign", "invalid", "superseded", "repeated", "out of order", "old", "clock jumps")
+_COUNTS += ("estimator resets", "leaps", "rejected commands")
 
 
 class Companion:
@@ -32,25 +37,31 @@ class Companion:
 
     The law runs while all of this holds, and the thrusters are neutral otherwise:
 
-    * HEARTBEAT of the target system says that the vehicle is armed, and is no older than 3 s; nothing here arms it;
-    * valid odometry is no older than `timeout`.
+    * HEARTBEAT of the target says that the vehicle is armed, and is no older than 3 s; nothing here arms it;
+    * its flight mode is that in which the law first ran since it was armed, and its status is neither emergency nor
+      failsafe;
+    * valid odometry is no older than `timeout`;
+    * the position has not leapt since it was armed.
 
     It begins (again) at the pose of the next whole odometry: reference, law and output start there. Of a message:
 
-    * from another system: ignored (`foreign`);
+    * from another system or component: ignored (`foreign`);
     * odometry in axes other than NED or FRD, of a failed estimator, or without its attitude: ignored (`invalid`);
     * odometry with entries that are NaN: the law uses what its model expects; without position or attitude it does not
       count as valid;
-    * odometry of the same time as the last: ignored (`repeated`);
-    * odometry whose time goes back, or on by more than 1 s: its clock was set (`clock jumps`); the law advances by one
-      sampling time;
-    * another `reset_counter`: the estimator has jumped (`estimator resets`), and the law begins again.
+    * odometry of the same time as the last, or an earlier one: ignored (`repeated`, `out of order`);
+    * odometry whose time says that it is older than `timeout`, or of the future: ignored (`old`), unless that goes on
+      for 0.5 s: then the clock of the vehicle was set (`clock jumps`);
+    * another `reset_counter`: the estimator has jumped (`estimator resets`), and the law begins again;
+    * a position further from the last one than any vehicle moves in that time, and by more than 1 m: a leap (`leaps`),
+      after which the law runs only when the vehicle has been disarmed and armed again. Its target may be far away now.
 
     Args:
         scenario: a .yaml file or an earlier run.nc.
         source: of the odometry, `odometry` or `local_position`.
         output: what the commands are, see `actuator_commands`.
-        target_system: system id of the vehicle.
+        target_system, target_component: ids of the vehicle's autopilot: its heartbeat and its odometry count, and
+            commands go to it.
         frame, channels: of the thrusters, see `thruster_channels`.
         timeout: s.
         blend: time constant, s, with which the output turns from neutral into the law's at a start; 0 for at once.
@@ -75,18 +86,20 @@ class Companion:
         source: str = "odometry",
         output: str = "rc_override",
         target_system: int = 1,
+        target_component: int = mavlink.MAV_COMP_ID_AUTOPILOT1,
         frame: str | None = None,
         channels: str | None = None,
         timeout: float = 0.5,
         blend: float = 1.0,
         allow_code: bool = False,
     ):
-        if not 1 <= target_system <= 255:
-            raise BadInput("target_system", "be from 1 to 255", target_system)
+        for name, number in (("target_system", target_system), ("target_component", target_component)):
+            if not 1 <= number <= 255:
+                raise BadInput(name, "be from 1 to 255", number)
         checks.positive("timeout", timeout, "s")
         self.timeout = float(timeout)
         checks.not_negative("blend", blend, "s")
-        self._reader, self._target = OdometryReader(source), Target(target_system)
+        self._reader, self._target = OdometryReader(source), Target(target_system, target_component)
         smoothly = blend or 1.0  # a start that is given no applied input has no use for it
         self._autopilot = Autopilot(scenario, attitude="quaternion", blend=smoothly, allow_code=allow_code)
         plant = pulse_driven(self._autopilot.plant, battery_suffices=False)
@@ -99,6 +112,11 @@ class Companion:
         self.complaint, self.running, self.armed = "", False, False
         self._heartbeat, self._odometry, self._last = -np.inf, -np.inf, None
         self._sent_heartbeat = self._sent_neutral = -np.inf
+        self._clock = SenderClock(self.timeout)
+        self._placed: Odometry | None = None  # the last one with a position
+        self._mode: Any = None  # in which the law may run; None until it does
+        self._present_mode: Any = None
+        self._other_mode = self._emergency = self._leapt = False
 
     @property
     def sampling_time(self) -> float:
@@ -110,10 +128,9 @@ class Companion:
         """Steps since the last start, and those of them that were late, missed or repeated."""
         return self._autopilot.counts
 
-    @property
-    def target_system(self) -> int:
-        """System id of the vehicle."""
-        return self._target.system
+    def is_from_target(self, message: Any) -> bool:
+        """Whether a message comes from the vehicle's autopilot."""
+        return (message.get_srcSystem(), message.get_srcComponent()) == self._target
 
     def receive(self, message: Any, now: float) -> list[Any]:
         """Messages to send in answer to one.
@@ -122,7 +139,7 @@ class Companion:
             message: of pymavlink.
             now: time of a clock that never jumps, s.
         """
-        if message.get_srcSystem() != self._target.system:
+        if not self.is_from_target(message):
             self.counts["foreign"] += 1
             return []
         if message.get_type() == "HEARTBEAT":
@@ -163,6 +180,12 @@ class Companion:
             return f"no heartbeat of system {self._target.system}"
         if not self.armed:
             return "disarmed"
+        if self._emergency:
+            return "emergency or failsafe of the vehicle"
+        if self._other_mode:
+            return "another flight mode: the pilot has taken over"
+        if self._leapt:
+            return "the position has leapt: disarm and arm to go on"
         return "running" if self.running else "no valid odometry"
 
     def _note_heartbeat(self, message: Any, now: float) -> None:
@@ -171,6 +194,12 @@ class Companion:
             return
         self._heartbeat = now
         self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        self._emergency = message.system_status >= mavlink.MAV_STATE_CRITICAL
+        mode = message.base_mode & ~mavlink.MAV_MODE_FLAG_SAFETY_ARMED, message.custom_mode
+        if not self.armed:
+            self._mode, self._leapt = None, False
+        self._present_mode = mode
+        self._other_mode = self._mode is not None and mode != self._mode
         self._stop_if_lost(now)
 
     def _note_acknowledgement(self, message: Any) -> None:
@@ -182,28 +211,34 @@ class Companion:
 
     def _stop_if_lost(self, now: float) -> None:
         lost = now - self._heartbeat > HEARTBEAT_TIMEOUT or now - self._odometry > self.timeout
-        if self.running and (lost or not self.armed):
+        if self.running and (lost or not self._may_run()):
             self.running, self._sent_neutral = False, -np.inf
 
     def _follow(self, odometry: Odometry, now: float) -> list[Any]:
         """One step of the law, if it may run."""
         self._stop_if_lost(now)
-        before, self._last = self._last, odometry
-        if before is not None and odometry.time_usec == before.time_usec:
-            self.counts["repeated"] += 1
+        objection = self._clock.objection(odometry.time_usec / 1e6, now)
+        self.counts["clock jumps"] = self._clock.jumps
+        if objection:
+            self.counts[objection] += 1
             return []
+        before, self._last = self._last, odometry
         if before is not None and odometry.resets != before.resets:
             self.counts["estimator resets"] += 1
             self.running = False
+        elif self._has_leapt(odometry):
+            self.counts["leaps"] += 1
+            self._leapt = self.armed
+            self._stop_if_lost(now)
         if odometry.has_pose:
-            self._odometry = now
-        if not self.armed or now - self._heartbeat > HEARTBEAT_TIMEOUT:
+            self._odometry, self._placed = now, odometry
+        if not self._may_run() or now - self._heartbeat > HEARTBEAT_TIMEOUT:
             return []
         given = odometry.position, odometry.velocity, odometry.attitude
         if not self.running:
             if not odometry.is_whole:
                 return []
-            self.running = True
+            self.running, self._mode = True, self._present_mode
             self.counts["starts"] += 1
             still = np.zeros(len(self.channels.numbers)) if self._from_neutral else None
             volts = self._autopilot.start(*given, applied=still)
@@ -215,13 +250,21 @@ class Companion:
         self._drive()
         return self._made(self._drive.outputs[0], odometry.time_usec)
 
+    def _may_run(self) -> bool:
+        return self.armed and not (self._emergency or self._other_mode or self._leapt)
+
+    def _has_leapt(self, odometry: Odometry) -> bool:
+        """Whether no vehicle moves so far from its last position in that time; false without one."""
+        before = self._placed
+        if before is None or not odometry.has_pose:
+            return False
+        away = float(np.linalg.norm(odometry.position - before.position))
+        return away > LEAP + SPEED * abs(odometry.time_usec - before.time_usec) / 1e6
+
     def _elapsed(self, before: Odometry, odometry: Odometry) -> float | None:
         """s between two odometries; None, which is the sampling time, where the clock was set."""
         elapsed = (odometry.time_usec - before.time_usec) / 1e6
-        if 0 < elapsed <= JUMP:
-            return elapsed
-        self.counts["clock jumps"] += 1
-        return None
+        return elapsed if 0 < elapsed <= JUMP else None
 
     def _made(self, pulses: Any, time_usec: int) -> list[Any]:
         neutral, span = float(self._esc.neutral), float(self._esc.span)

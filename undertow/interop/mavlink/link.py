@@ -10,10 +10,12 @@ from pymavlink.dialects.v20 import common as mavlink
 from undertow.core.errors import BadInput
 from undertow.interop.latency import Latency
 from undertow.interop.mavlink.companion import HEARTBEAT_TIMEOUT, Companion
+from undertow.interop.mavlink.odometry import ODOMETRIES
 from undertow.realtime.watchdog import Watchdog
 
 _LONGEST = 65535  # bytes of a datagram
 _LOOK = 0.05  # s, longest wait before what is due is sent
+_AT_ONCE = 256  # datagrams that are read at once
 _LAST = 3  # times that neutral commands are sent at the end: any of them may be lost
 _HELD = 0.5  # s between two times that the watchdog gets what to send
 _KINDS = ("udp", "udpin", "udpout")
@@ -45,7 +47,7 @@ class UdpLink:
         self._packer: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
-        self.unsent = 0
+        self.unsent, self._fixed = 0, kind == "udpout"
         try:
             if kind == "udpout":
                 self.peer = socket.gethostbyname(address[0]), address[1]
@@ -64,14 +66,27 @@ class UdpLink:
     def __exit__(self, *error: Any) -> None:
         self.socket.close()
 
-    def receive(self, longest: float) -> tuple[list[Any], Any]:
-        """Messages of the next datagram, and its sender; none after `longest`, s."""
-        self.socket.settimeout(longest)
-        try:
-            data, sender = self.socket.recvfrom(_LONGEST)
-        except (TimeoutError, ConnectionError):  # the second where nobody listens on the other side
-            return [], None
-        return parsed(data), sender
+    def receive(self, longest: float) -> list[tuple[Any, Any]]:
+        """Messages of all datagrams that are there, each with its sender; it waits for one, at most `longest`, s.
+
+        With `udpout` only those of the vehicle.
+        """
+        found: list[tuple[Any, Any]] = []
+        for k in range(_AT_ONCE):
+            self.socket.settimeout(0.0 if k else longest)
+            try:
+                data, sender = self.socket.recvfrom(_LONGEST)
+            except OSError:  # nothing there, or nobody listens on the other side
+                break
+            if not self._fixed or sender == self.peer:
+                found += [(message, sender) for message in parsed(data)]
+        return found
+
+    def drain(self) -> None:
+        """Forget what has come so far: it is old."""
+        for _ in range(_AT_ONCE):
+            if not self.receive(0.0):
+                break
 
     def send(self, messages: list[Any]) -> None:
         """Send messages to the vehicle, if its address is known."""
@@ -115,8 +130,9 @@ def accompany(
 
     A `Watchdog` sends them where this process is killed, or stands still for longer than the companion's timeout.
 
-    The vehicle is where the first message of the target system comes from. Another sender takes its place after 3 s
-    without one.
+    The vehicle is where the first message of the target comes from. With `udpin`, another sender takes its place after
+    3 s without one. Of odometries that have queued up, the newest counts. After a standstill of this process nothing
+    counts that came meanwhile.
 
     Args:
         companion: rules, with the law.
@@ -128,16 +144,23 @@ def accompany(
     """
     measured = latency or Latency()
     due, received, steps, held = time.monotonic() + every, -float("inf"), 0, -float("inf")
-    watchdog = Watchdog(link.socket, companion.timeout)
+    watchdog, looked = Watchdog(link.socket, companion.timeout), time.monotonic()
     try:
         while not until():
-            messages, sender = link.receive(max(0.001, min(_LOOK, due - time.monotonic())))
+            messages = link.receive(max(0.001, min(_LOOK, due - time.monotonic())))
             begun, now = time.perf_counter(), time.monotonic()
-            for message in messages:
-                if message.get_srcSystem() == companion.target_system:
+            if now - looked > _LOOK + companion.timeout:
+                link.drain()
+                messages = []
+            looked = now
+            arrived = []
+            for message, sender in messages:
+                if companion.is_from_target(message):
                     if link.peer is not None and sender != link.peer and now - received < HEARTBEAT_TIMEOUT:
                         continue
                     link.peer, received = sender, now
+                arrived.append(message)
+            for message in _newest(arrived, companion):
                 before = companion.counts["steps"]
                 answer = companion.receive(message, now)
                 if companion.running and link.peer and now - held > _HELD:  # before the first command, too
@@ -155,6 +178,15 @@ def accompany(
         for _ in range(_LAST):
             link.send(companion.neutral())
         watchdog.done()
+
+
+def _newest(messages: list[Any], companion: Companion) -> list[Any]:
+    """Messages without the odometries of the vehicle after which a newer one has come."""
+    last = {message.get_type(): message for message in messages if companion.is_from_target(message)}
+    old = lambda message: message.get_type() in ODOMETRIES and message is not last[message.get_type()]
+    found = [message for message in messages if not (companion.is_from_target(message) and old(message))]
+    companion.counts["superseded"] += len(messages) - len(found)
+    return found
 
 
 def status_line(companion: Companion, link: UdpLink, latency: Latency, rate: float) -> str:

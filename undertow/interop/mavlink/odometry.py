@@ -11,6 +11,7 @@ from undertow.core.errors import BadInput
 from undertow.realtime.plausible_motion import check_plausible
 
 SOURCES = ("odometry", "local_position")
+ODOMETRIES = ("ODOMETRY", "LOCAL_POSITION_NED")  # messages with a position
 
 # Frames of ODOMETRY that are used as they are: axes north, east, down, or forward, starboard, down of some heading.
 _WORLD = {mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_FRD}
