@@ -28,8 +28,9 @@ JUMP = 1.0  # s, longest time between two odometries by which the law advances
 
 LEAP = 1.0  # m by which a position may leap beyond what the largest plausible speed explains
 
-_COUNTS: tuple[str, ...] = ("steps", "starts", "foreign", "invalid", "superseded", "repeated", "out of order", "old", "clock jumps")
-_COUNTS += ("estimator resets", "leaps", "rejected commands")
+_COUNTS: tuple[str, ...] = ("steps", "starts", "rejected commands")
+_COUNTS += ("foreign", "invalid", "superseded", "repeated", "out of order", "old")  # messages that are not used
+_COUNTS += ("clock jumps", "estimator resets", "leaps")
 
 
 class Companion:
