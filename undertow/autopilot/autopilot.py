@@ -23,7 +23,7 @@ from undertow.core.contracts import AbstractGatedController, Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.stepped import put
+from undertow.loop.stepped import Uncopied, put
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
@@ -34,7 +34,7 @@ from undertow.supervision.transition_log import Transition, transitions
 _NO_ROTATION = 1e-6  # length of a quaternion that is none
 
 
-class Autopilot:
+class Autopilot(Uncopied):
     """A controller that is called once per sampling time, by whoever owns the clock. NumPy goes in and comes out::
 
         autopilot = ut.Autopilot("bluerov2_heavy.yaml", attitude="quaternion")
@@ -79,6 +79,8 @@ class Autopilot:
     Raises:
         BadInput: something given cannot be used.
     """
+
+    _instead = "Make another one, and `restore` there what `save` gives"
 
     def __init__(
         self,

@@ -16,13 +16,13 @@ from undertow.autopilot.step_log import StepLog, filter_signals
 from undertow.core import checks, runtime
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
-from undertow.loop.stepped import put
+from undertow.loop.stepped import Uncopied, put
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 
 
-class NavigationFilter:
+class NavigationFilter(Uncopied):
     """The filter of a scenario's `navigation`, called at every sampling time by whoever owns the clock::
 
         navigation = ut.NavigationFilter("bluerov2_heavy.yaml")
@@ -49,6 +49,8 @@ class NavigationFilter:
     Raises:
         BadInput: something given cannot be used, or the scenario's navigation is not a filter of readings.
     """
+
+    _instead = "Make another one, and `restore` there what `save` gives"
 
     def __init__(
         self,

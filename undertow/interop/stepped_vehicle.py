@@ -15,7 +15,7 @@ from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
-from undertow.loop.stepped import put, realized
+from undertow.loop.stepped import Uncopied, put, realized
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.random_keys import key_of_seed
@@ -51,7 +51,7 @@ class _Given(NamedTuple):
     applied: Any  # input of the plant
 
 
-class SteppedVehicle:
+class SteppedVehicle(Uncopied):
     """The plant of a scenario with its disturbances, integrated as `undertow simulate` does it, frame by frame.
 
     It is compiled when it is made. A step of the length of the scenario's sampling time has the bits of a simulation.

@@ -7,11 +7,30 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.simd_batch import Unsupported, kept_step, realized_disturbance
 
 
-class Step:
+class Uncopied:
+    """An object with compiled steps, whose arrays are those of its programs: a copy of it would go on with old numbers.
+
+    Copying and pickling raise BadInput.
+    """
+
+    _instead = "Make another one"
+
+    def __copy__(self):
+        raise BadInput(type(self).__name__, "not be copied", hint=self._instead)
+
+    def __deepcopy__(self, memo: Any):
+        self.__copy__()
+
+    def __reduce__(self):
+        self.__copy__()
+
+
+class Step(Uncopied):
     """A function (numbers, state, inputs) -> (state, outputs), compiled for one run.
 
     Write into the arrays of `inputs`, call, and read those of `outputs`. Two threads may not call the same step.

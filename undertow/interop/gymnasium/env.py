@@ -14,11 +14,12 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.gymnasium.episodes import Cost, Episodes, Seen
 from undertow.interop.gymnasium.variants import Vary
+from undertow.loop.stepped import Uncopied
 
 _SEEDS = 2**32  # of runs
 
 
-class Env(gymnasium.Env[NDArray[Any], NDArray[Any]]):
+class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
     """A vehicle, or another plant, whose inputs an agent chooses at every sampling time.
 
     Observations and actions are described at `PolicyInterface`, the reward at `Cost`. An episode is `terminated` where
@@ -29,6 +30,7 @@ class Env(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     Arguments are those of `Episodes`, without `count`.
     """
 
+    _instead = "Make another one, `reset` it with the same seed, and give it the same actions"
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(

@@ -16,11 +16,12 @@ from undertow.core.status import Status
 from undertow.interop.gymnasium.env import actions_of, spaces_of
 from undertow.interop.gymnasium.episodes import Cost, Episodes, Seen
 from undertow.interop.gymnasium.variants import Vary
+from undertow.loop.stepped import Uncopied
 
 _SEEDS = 2**32  # of runs
 
 
-class VectorEnv(vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
+class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     """`num_envs` environments of one scenario, each with the bits of an `Env` by itself.
 
     An environment whose episode is over is reset by the next step, which ignores its action and has reward zero
@@ -30,6 +31,7 @@ class VectorEnv(vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     Arguments are those of `Env`.
     """
 
+    _instead = "Make another one, `reset` it with the same seeds, and give it the same actions"
     metadata = {"render_modes": [], "autoreset_mode": vector.AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(

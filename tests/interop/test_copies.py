@@ -1,0 +1,30 @@
+"""What holds a compiled program is not copied: a copy would go on with the numbers of the original, or with old ones."""
+
+import copy
+import pickle
+
+import pytest
+
+import undertow as ut
+from undertow.core.errors import BadInput
+from undertow.interop.gymnasium.env import make
+from undertow.interop.gymnasium.vector_env import make_vec
+from undertow.loop.stepped import Step
+
+PENDULUM = {
+    "plant": "inverted_pendulum",
+    "reference": {"kind": "setpoint", "position": [0]},
+    "loop": {"duration": 1.0, "dt": 0.01},
+}
+
+
+@pytest.mark.parametrize("made", [make, lambda of: make_vec(of, num_envs=2), ut.Autopilot])
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_copying_is_refused_with_the_remedy(made, how):
+    with pytest.raises(BadInput, match="must not be copied"):
+        how(made(PENDULUM))
+
+
+def test_no_part_of_it_is_copied_either():
+    with pytest.raises(BadInput, match="`Step` must not be copied"):
+        copy.deepcopy({"inside": Step(lambda numbers, state, inputs: ((), inputs + numbers), 1.0, (), 2.0)})
