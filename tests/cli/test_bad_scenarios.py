@@ -292,6 +292,7 @@ def test_mistake_is_one_exact_line(refused, tmp_path, mistake):
         ("? [a, b]\n: 1\n", "`s.yaml` must have words for keys, but is a list or mapping for a key (s.yaml, line 1)"),
         ("loop: {<<: 3}", f"{YAML} `<<` takes a mapping, or a list of them (s.yaml, line 1)"),
         ("seed: 1" + 5000 * "0", f"{YAML} Exceeds the limit (4300 digits) for integer string conversion"),
+        ("seed: 0x" + 4000 * "f", "`s.yaml` must have integers of at most 1024 bits, but is one of 4002 characters"),
     ],
 )
 def test_file_that_is_no_scenario(refused, tmp_path, text, said):

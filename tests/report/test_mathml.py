@@ -1,5 +1,7 @@
 """Formulas in pages are MathML: the element tree is that of the formula, and pages contain no ASCII formulas."""
 
+import html
+import re
 from xml.etree import ElementTree
 
 import pytest
@@ -61,6 +63,11 @@ def test_symbols_in_plain_text():
     assert with_symbols("rms of d_hat - d") == f"rms of {mathml(SYMBOLS['d_hat'])} - d"
     assert prose("x_d_ddot and G#") == f"{mathml(SYMBOLS['x_d_ddot'])} and {mathml('G^{#}')}"
     assert prose(r"gain $\gamma$ < 1") == "gain " + mathml(r"\gamma") + " &lt; 1"
+
+
+@pytest.mark.parametrize("words", [r"gain $\beta$ of x", "5 $ or 6 $", "$" + 400 * "{" + "$"])
+def test_dollar_signs_of_a_description_that_is_no_formula(words):
+    assert html.unescape(re.sub("<[^>]*>", "", prose(words))).count("$") == words.count("$")
 
 
 def test_names_in_code_and_units_stay():

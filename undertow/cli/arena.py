@@ -194,6 +194,6 @@ def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
     for row in rows.rows:
         shown.add_row(*row)
     console.print(shown)
-    console.print(SCORE, markup=False, highlight=False, soft_wrap=True)
+    console.print(SCORE, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE

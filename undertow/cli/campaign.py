@@ -69,7 +69,7 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | Non
     warn_of([*missing, *failures])
     console.print(table(results, found))
     for sentence in sentences(found):
-        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+        console.print(sentence, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE if set(found["status"]) <= {"completed"} else RUN_FAILED
 

@@ -132,13 +132,13 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
     console.print(table)
     said = [] if ready.budgets is None else budget_sentences(ready.budgets)
     for sentence in (NOTE, HOW_LONG, *sentences(found), *said):
-        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+        console.print(sentence, highlight=False, soft_wrap=True)
     for name, note in found.tuning.items():
-        console.print(f"{name}: {note}.", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"{name}: {note}.", highlight=False, soft_wrap=True)
     for name, note in zip(ready.names, ready.notes, strict=True):
         if not note.tuned and name in files and ready.budgets is None:
             said = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
-            console.print(said, markup=False, highlight=False, soft_wrap=True)
+            console.print(said, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE if all(found.completed(name) == found.trials for name in found.names) else RUN_FAILED
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Column, Table
-from rich.text import Text
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
@@ -42,7 +41,7 @@ def describe(name: str, json_schema: bool = False) -> None:
         print(json.dumps(_SCHEMAS[name](), indent=1))
     elif name == "scenario":
         _show_keys(console, "Scenario", Scenario)
-        console.print(_PARTS, highlight=False, markup=False, soft_wrap=True)
+        console.print(_PARTS, highlight=False, soft_wrap=True)
     elif name == "campaign":
         _show_keys(console, "Campaign", Campaign)
         for section, model in SECTIONS.items():
@@ -66,8 +65,8 @@ def _show_keys(console: Console, title: str, model: type[BaseModel]) -> None:
 
 
 def _show_part(console: Console, part: describing.Description) -> None:
-    console.print(Text(f"{part.name} {part.kind}".rstrip(), style="bold"))
-    console.print(Text(part.summary))
+    console.print(f"{part.name} {part.kind}".rstrip(), style="bold", highlight=False)
+    console.print(part.summary, highlight=False)
     if part.options:
         rows = [(option.name, text_of(option.default), option.meaning) for option in part.options]
         _show_table(console, "Options", ("option", "default", "meaning"), rows)
@@ -77,7 +76,7 @@ def _show_part(console: Console, part: describing.Description) -> None:
     if part.signals:
         _show_signals(console, "Signals", part.signals)
     for sentence in part.advice:
-        console.print(Text(f"Advice: {sentence}"))
+        console.print(f"Advice: {sentence}", highlight=False)
 
 
 def _show_signals(console: Console, title: str, declared: Mapping[str, Signal]) -> None:
@@ -88,7 +87,7 @@ def _show_signals(console: Console, title: str, declared: Mapping[str, Signal]) 
 def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     table = titled(title, *(Column(name, overflow="fold") for name in columns))
     for row in rows:
-        table.add_row(*map(Text, row))
+        table.add_row(*row)
     console.print(table)
 
 
@@ -111,7 +110,7 @@ def list_parts(kind: str | None, as_json: bool = False) -> None:
     table = Table("kind", "name", "description")
     for shown in shown_kinds:
         for name, sentence in describing.listed(shown):
-            table.add_row(shown, name, Text(sentence))
+            table.add_row(shown, name, sentence)
         table.add_section()
     console = wide_console()
     console.print(table)
@@ -126,7 +125,7 @@ def _list_faults(as_json: bool) -> None:
         return
     table = Table("target", "mode", "severity", "unit", "default", "range")
     for i, one in enumerate(found):
-        table.add_row(one.target, one.mode, *map(Text, severity_cells(one)))
+        table.add_row(one.target, one.mode, *severity_cells(one))
         if found[i + 1 : i + 2] and found[i + 1].target != one.target:
             table.add_section()
     console = wide_console()

@@ -88,7 +88,7 @@ def _live(
         def say(stage: str) -> None:
             live.update(task, description=stage)
             if not console.is_terminal:
-                console.print(stage, markup=False, highlight=False)
+                console.print(stage, highlight=False)
 
         def watch(runs: int, least: float, smallest: Violation | None) -> None:
             size = "" if smallest is None else f", smallest violation {smallest.size:.4g}"

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.text import Text
 
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
@@ -68,11 +67,11 @@ def _print(log: Log, console: Console) -> None:
     kept = [i for i in range(len(heads)) if any(row[i] for row in rows)]  # most logs have no gaps
     table = titled(title, *(heads[i] for i in kept))
     for row in rows:
-        table.add_row(*(Text(row[i]) for i in kept))
+        table.add_row(*(row[i] for i in kept))
     console.print(table)
     console.print("World axes are north, east, down; body axes forward, starboard, down.", highlight=False)
     for note in log.notes:
-        console.print(f"Note: {note}.", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"Note: {note}.", highlight=False, soft_wrap=True)
 
 
 def _row(log: Log, name: str) -> tuple[str, ...]:

@@ -33,5 +33,5 @@ def reproduce(out: Path, quick: bool, pdf: str | None) -> None:
         page = interruptible(lambda: write(found, draft.path, pdf, pool))
     for claim in json.loads((out / "results.json").read_text(encoding="utf-8"))["claims"]:
         line = f"{claim['id']:<4}{claim['verdict']}: {claim['claim']}"
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(line, highlight=False, soft_wrap=True)
     console.print(f"Report: {folder / page.relative_to(draft.path)}", highlight=False, soft_wrap=True)

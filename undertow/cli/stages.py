@@ -35,7 +35,7 @@ def new_lines(console: Console) -> Callable[[str], None]:
         nonlocal last
         if words != last:
             last = words
-            console.print(words, markup=False, highlight=False)
+            console.print(words, highlight=False)
 
     return say
 
@@ -54,6 +54,6 @@ def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str,
         def progress(message: str, share: float) -> None:
             live.update(task, description=message, completed=share)
             if not console.is_terminal:
-                console.print(f"{share:4.0%} {message}", markup=False, highlight=False)
+                console.print(f"{share:4.0%} {message}", highlight=False)
 
         yield progress

@@ -1,7 +1,10 @@
 """Tables and console of the terminal."""
 
+from typing import Any
+
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 
 from undertow.report.run_tables import RunTable, plain
 
@@ -28,7 +31,18 @@ def terminal_table(rows: RunTable) -> Table:
 
 
 class _Output(Console):
-    """Console on stdout that leaves it to the command what happens where nobody reads any more."""
+    """Console on stdout that shows text as it is: names of signals, requirements and folders come from anywhere.
+
+    Brackets are no markup, and characters that act on a terminal are written as escapes. It leaves it to the command
+    what happens where nobody reads any more.
+    """
+
+    def __init__(self, **options: Any):
+        super().__init__(markup=False, emoji=False, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        shown = (one if one.isprintable() or one == "\n" else one.encode("unicode_escape").decode() for one in text)
+        return super().render_str("".join(shown), **options)
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has caught, and would end the process for

@@ -155,7 +155,7 @@ def _live(console: Console, resumed: bool) -> Iterator[Watch]:
             if first is None and resumed:
                 again = "" if tally.done == tally.trials else "; chunks that were not finished run again"
                 kept = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
-                console.print(kept, markup=False, highlight=False)
+                console.print(kept, highlight=False)
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
             invalid = f", {tally.invalid} invalid" if tally.invalid else ""

@@ -79,14 +79,14 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
         def say(stage: str) -> None:
             live.update(task, description=stage)
             if not console.is_terminal:
-                console.print(stage, markup=False, highlight=False)
+                console.print(stage, highlight=False)
 
         def watch(best: Step, evaluations: int) -> None:
             left = max(0.0, budget - best.elapsed)
             line = f"{evaluations} evaluations, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
             live.update(task, description=line, completed=best.elapsed, left=f"{left:.0f} s left at most")
             if not console.is_terminal:
-                console.print(line, markup=False, highlight=False)
+                console.print(line, highlight=False)
 
         yield say, watch
 

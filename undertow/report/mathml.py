@@ -3,7 +3,7 @@
 import html
 import re
 
-from undertow.report.page import Html, marked
+from undertow.report.page import Html, marked, text
 
 _IDENTIFIERS = {
     **{"alpha": "\u03b1", "gamma": "\u03b3", "delta": "\u03b4", "varepsilon": "\u03b5", "eta": "\u03b7"},
@@ -60,7 +60,15 @@ def mathml(tex: str) -> Html:
 def with_symbols(content: str) -> Html:
     """Plain text with the formulas between dollar signs, and the symbols of the paper, as MathML."""
     with_letters = lambda plain: marked(_SYMBOL, plain, lambda word: mathml((SYMBOLS | _INVERSES)[word]))
-    return marked(r"\$([^$]+)\$", content, mathml, with_letters)
+    return marked(r"\$(?=\S)([^$]+)(?<=\S)\$", content, _formula, with_letters)
+
+
+def _formula(tex: str) -> Html:
+    """A formula; as it was written where it is none, such as in a description that mentions two prices."""
+    try:
+        return mathml(tex)
+    except (ValueError, RecursionError):
+        return text(f"${tex}$")
 
 
 def _tokens(tex: str) -> list[tuple[str, str]]:

@@ -26,6 +26,7 @@ from undertow.scenario.yaml_mistakes import mistake_of
 Path_ = tuple[str | int, ...]
 
 _MOST, _DEEPEST = 50_000, 20
+_BITS = 1024  # of an integer: larger ones are no floating-point numbers either
 
 _PREFIX = "tag:yaml.org,2002:"
 _MERGE = f"{_PREFIX}merge"
@@ -188,9 +189,13 @@ class _Composer:
         if kind not in makers:  # dates, too, are text
             return _Node(event.value, {}, 1, 0)
         try:
-            return _Node(makers[kind](ScalarNode(kind, event.value)), {}, 1, 0)
+            value = makers[kind](ScalarNode(kind, event.value))
         except ValueError as error:  # an integer of thousands of digits
             raise _invalid(str(error), event.start_mark.line + 1) from None
+        if kind == "int" and value.bit_length() > _BITS:  # of so many hexadecimal digits that no message could show it
+            digits = f"one of {len(event.value)} characters"
+            raise Malformed(f"have integers of at most {_BITS} bits", digits, event.start_mark.line + 1)
+        return _Node(value, {}, 1, 0)
 
 
 def _mergeable(node: _Node, line: int) -> dict[str, _Node]:
