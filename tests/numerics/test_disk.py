@@ -74,3 +74,38 @@ def test_everything_in_a_folder_is_on_the_disk(tmp_path, monkeypatch):
     )
     disk.settle(tmp_path / "a")
     assert [one.removeprefix(f"{tmp_path}/") for one in settled] == ["a/b/c.txt", "a/b", "a"]
+
+
+def test_what_was_there_stays_until_the_new_file_is_whole(tmp_path):
+    """A disk that is full in the middle, as a limit of the size of files makes it; permissions and links stay."""
+    kept, link = tmp_path / "kept.txt", tmp_path / "link.txt"
+    kept.write_text("whole")
+    kept.chmod(0o600)
+    link.symlink_to(kept)
+    with pytest.raises(OSError, match="full"), disk.replacing(link) as file:
+        file.write_text("ha")
+        raise OSError("full")
+    assert kept.read_text() == "whole" and sorted(one.name for one in tmp_path.iterdir()) == ["kept.txt", "link.txt"]
+    with disk.replacing(link) as file:
+        assert file.suffix == ".txt" and file.parent == tmp_path
+        file.write_text("new")
+    assert link.is_symlink() and kept.read_text() == "new" and kept.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_new_file_has_the_permissions_that_the_user_wants(tmp_path):
+    before = os.umask(0o077)
+    try:
+        with disk.replacing(tmp_path / "a.txt") as file:
+            file.write_text("a")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.txt").stat().st_mode & 0o777 == 0o600
+
+
+def test_it_is_on_the_disk_before_it_takes_the_place(tmp_path, monkeypatch):
+    """A power cut leaves the old file or the new one: contents, then the name, then the folder."""
+    steps, replace = [], os.replace
+    monkeypatch.setattr(disk, "sync", lambda path: steps.append(path.name))
+    monkeypatch.setattr(disk.os, "replace", lambda old, new: (steps.append("replace"), replace(old, new)))
+    disk.write_whole(tmp_path / "a.txt", "a")
+    assert steps[0].startswith(".a.") and steps[1:] == ["replace", tmp_path.name]

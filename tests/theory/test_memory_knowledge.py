@@ -4,11 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import xarray as xr
 
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty
 from undertow.analysis.theory import SteadyWindow, theory_of
 from undertow.controllers import rcaf
-from undertow.controllers.robust.knowledge import load_knowledge, regressor_names, strongest
+from undertow.controllers.robust.knowledge import load_knowledge, regressor_names, save_knowledge, strongest
 from undertow.controllers.robust.memory import memory
 from undertow.core.contracts import TrackingError
 from undertow.core.errors import BadInput
@@ -104,6 +105,8 @@ def damage(kind, path):
         {"inertia": np.ones(2)},
         {"inertia": np.zeros(1)},
         {"inertia": np.full(1, np.inf)},
+        {"weights": np.full((3, 1), 1j)},
+        {"more": np.zeros(2_500_000)},
     ],
     ids=str,
 )
@@ -112,6 +115,41 @@ def test_a_damaged_file_is_refused_in_one_line(kind, tmp_path):
     with pytest.raises(BadInput, match="knowledge") as caught:
         load_knowledge(tmp_path / "learnt.npz")
     assert "\n" not in str(caught.value)
+
+
+def test_no_flipped_bit_is_more_than_a_damaged_file(tmp_path):
+    """Or than nothing: the numbers of a file are under a checksum."""
+    path, good, chance = tmp_path / "learnt.npz", tmp_path / "good.npz", np.random.default_rng(4)
+    damage({}, good)
+    whole, expected, refused = good.read_bytes(), load_knowledge(good), 0
+    for _ in range(300):
+        data = bytearray(whole)
+        data[chance.integers(len(data))] ^= 1 << int(chance.integers(8))
+        path.write_bytes(data)
+        try:
+            found = load_knowledge(path)
+        except BadInput:
+            refused += 1
+            continue
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+    assert refused > 100
+
+
+def test_knowledge_of_an_earlier_dive_stays_where_the_disk_is_full(tmp_path, monkeypatch):
+    path = tmp_path / "learnt.npz"
+    damage({}, path)
+    before = path.read_bytes()
+
+    def full(file, **arrays):
+        file.write_bytes(b"half")
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    run = {"memory_weights": xr.DataArray(np.zeros((1, 3, 1))), "memory_variance": xr.DataArray(np.ones((1, 3)))}
+    with pytest.raises(OSError, match="No space"):
+        save_knowledge(path, run)
+    assert path.read_bytes() == before and [one.name for one in tmp_path.iterdir()] == ["learnt.npz"]
 
 
 def test_weights_of_a_file_beyond_the_bound_are_projected_onto_it(tmp_path):

@@ -6,6 +6,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
+from undertow.core import disk
 from undertow.core.errors import BadInput
 from undertow.tuning.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.objective import Objective
@@ -218,3 +219,23 @@ def test_where_nothing_is_certified_the_worst_variant_is_named():
     assert "the nearest point has 1.02, with frequency 1.02. Widen the ranges beyond this point" in said
     assert "variant wu2018 (3 of 4 times the least stable one)" in said
     assert "variant" not in str(no_certificate(Certificate((1.1,), ("",)), {}, 12))
+
+
+def test_a_full_disk_costs_no_evaluation(tmp_path, monkeypatch):
+    """The last line was cut off by a kill; leaving it out must not lose those before it."""
+    objective(tmp_path, Bowl()).costs(np.linspace([0.0] * len(START), [1.0] * len(START), 5))
+    file = tmp_path / "j"
+    with file.open("a") as stream:
+        stream.write('{"what": "co')
+    before = file.read_bytes()
+
+    def full(descriptor):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(disk.os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        objective(tmp_path, Bowl(), resume=True)
+    assert file.read_bytes() == before
+    monkeypatch.undo()
+    objective(tmp_path, Bowl(), resume=True)
+    assert file.read_bytes() == before[: before.rindex(b"\n") + 1]

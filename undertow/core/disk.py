@@ -3,6 +3,8 @@
 import contextlib
 import fcntl
 import os
+import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -40,11 +42,31 @@ def lock_of(path: Path) -> Path:
     return path / name if path.is_dir() and not os.access(path.parent, os.W_OK) else path.with_name(name)
 
 
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A new file to write to, which takes the place of a path where the block ends well, and survives a power cut.
+
+    What was there stays until then, whatever happens, and gives its permissions. A link stays one, to its new file.
+    """
+    target = path.resolve()
+    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    try:
+        yield temporary
+        with contextlib.suppress(FileNotFoundError):
+            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+        sync(temporary)
+        os.replace(temporary, target)
+        sync(target.parent)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
 def write_whole(path: Path, text: str) -> None:
     """Write a text file whole or not at all."""
-    partial = path.with_suffix(".partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
+    with replacing(path) as file:
+        file.write_text(text, encoding="utf-8")
 
 
 def settle(path: Path) -> None:

@@ -1,7 +1,5 @@
 """A log: named time series with units, and how evenly they were sampled."""
 
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from undertow.core.disk import replacing
 from undertow.core.errors import BadInput, nearest
 from undertow.logs.known_signals import SIGNALS
 
@@ -139,16 +138,8 @@ class Log:
         path = Path(path)
         if path.suffix not in writers:
             raise BadInput("path", f"be a file whose name ends in {' or '.join(writers)}", str(path))
-        target = path.resolve()  # what a link points to, not the link
-        handle, temporary = tempfile.mkstemp(suffix=f"{path.suffix}.tmp", dir=target.parent)
-        os.close(handle)
-        try:
-            writers[path.suffix](self, Path(temporary))
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, target)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        with replacing(path) as file:
+            writers[path.suffix](self, file)
 
     def __repr__(self) -> str:
         lines = [f"Log of {self.source} ({self.format}), {self.duration():g} s"]

@@ -1,7 +1,5 @@
 """Run a scenario: outcome, metrics and a dataset from which the run can be repeated."""
 
-import os
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +11,7 @@ import xarray as xr
 from undertow.analysis.metrics import Gathered, accumulators
 from undertow.analysis.success import Success
 from undertow.core import runtime
+from undertow.core.disk import replacing
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
@@ -162,12 +161,5 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         OSError: the folder cannot be written.
     """
-    handle, temporary = tempfile.mkstemp(suffix=".nc.tmp", dir=path.parent)
-    os.close(handle)
-    try:
-        dataset.to_netcdf(temporary, engine="netcdf4")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacing(path) as file:
+        dataset.to_netcdf(file, engine="netcdf4")

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 
 Result = TypeVar("Result")
@@ -60,7 +61,7 @@ class Checkpoint:
         self._asked, self._spent = 0, self._known[-1]["elapsed"] if self._known else 0.0
         self._longest: dict[str, float] = {}
         if not self._known:
-            path.write_text(json.dumps({"about": about}) + "\n", encoding="utf-8")
+            write_whole(path, json.dumps({"about": about}) + "\n")
 
     @property
     def elapsed(self) -> float:
@@ -150,5 +151,6 @@ def _read(path: Path, about: str, resume: bool, what: str) -> list[dict[str, Any
         raise BadInput("--resume", "find a checkpoint that can be read", f"{path}: {error!r}", hint=hint) from None
     if entries[:1] not in ([], [{"about": about}]):  # a process may have been killed while it wrote the first line
         raise BadInput("--resume", "continue with the same scenario and method", "given with others")
-    path.write_text("".join(line for line in lines if line.endswith("\n")), encoding="utf-8")
+    if lines and not lines[-1].endswith("\n"):
+        write_whole(path, "".join(lines[:-1]))
     return known

@@ -11,9 +11,12 @@ import numpy as np
 from jaxtyping import Array
 
 from undertow.core import checks
+from undertow.core.disk import replacing
 from undertow.core.errors import BadInput
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)
+_DAMAGED += (MemoryError, RuntimeError, NotImplementedError)  # an impossible shape, encryption, unknown compression
+_LARGEST = 2_000_000  # numbers
 _MUST = "be a file of `save_knowledge`"
 # Entries of a file and the signals they come from.
 _SIGNALS = {"weights": "memory_weights", "variance": "memory_variance", "inertia": "inertia"}
@@ -29,13 +32,19 @@ class Knowledge(NamedTuple):
 
 
 def save_knowledge(path, run) -> None:
-    """Write what was learnt by the end of a run to a file (.npz).
+    """Write what was learnt by the end of a run to a file (.npz); one that was there stays until it is whole.
 
     Args:
         path: of the file.
         run: dataset with the signals `memory_weights` and `memory_variance`, and `inertia` where it was identified.
+
+    Raises:
+        OSError: the file cannot be written.
     """
-    np.savez(path, **{name: run[signal].values[-1] for name, signal in _SIGNALS.items() if signal in run})
+    path = Path(path)
+    path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
+    with replacing(path) as file:
+        np.savez(file, **{name: run[signal].values[-1] for name, signal in _SIGNALS.items() if signal in run})
 
 
 def load_knowledge(path) -> Knowledge:
@@ -46,7 +55,8 @@ def load_knowledge(path) -> Knowledge:
     """
     try:
         with Path(path).open("rb") as file, np.load(file) as held:
-            found = {name: np.asarray(held[name], dtype=float) for name in _SIGNALS if name in held or name in _ALWAYS}
+            _check_sizes(held.zip)
+            found = {name: _real(held[name]) for name in _SIGNALS if name in held or name in _ALWAYS}
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
     weights, variance, inertia = found["weights"], found["variance"], found.get("inertia")
@@ -63,6 +73,17 @@ def load_knowledge(path) -> Knowledge:
     if inertia is not None and (inertia <= 0).any():
         raise BadInput("knowledge", "have inertias above 0", str(path))
     return Knowledge(**{name: jnp.asarray(value) for name, value in found.items()})
+
+
+def _check_sizes(archive: zipfile.ZipFile) -> None:
+    if sum(one.file_size for one in archive.infolist()) > 8 * _LARGEST:
+        raise ValueError("larger than any memory")
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    if values.dtype.kind not in "fiu":
+        raise TypeError("not of real numbers")
+    return np.asarray(values, dtype=float)
 
 
 def regressor_names(axes: Sequence[str], rules: int, regressor: str, body: bool) -> list[str]:

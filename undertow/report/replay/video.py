@@ -1,7 +1,6 @@
 """A video of a run, frame by frame with matplotlib and encoded by ffmpeg: plan view, side view, thrust and errors."""
 
 import contextlib
-import os
 import shutil
 import subprocess
 import tempfile
@@ -13,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
 
+from undertow.core.disk import replacing
 from undertow.core.errors import BadInput
 from undertow.report.figures import style
 from undertow.report.replay.replay_data import COLOURS, Replay, rotations
@@ -74,19 +74,11 @@ def write_video(
     times = replay.time[0] + np.arange(0.0, span + 1e-9, speed / _RATE)
     frames = np.searchsorted(replay.time, times - 1e-9).clip(0, len(replay.time) - 1)
     scenes = _Scenes(replay, speed)
-    handle, temporary = tempfile.mkstemp(suffix=".mp4", dir=path.resolve().parent)
-    os.close(handle)
-    try:
-        with _encoder(temporary, scenes.size()) as encode:
-            for number, frame in enumerate(frames):
-                encode(scenes.pixels(int(frame)))
-                if number % _RATE == 0:
-                    progress("video", number / len(frames))
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacing(path) as file, _encoder(str(file), scenes.size()) as encode:
+        for number, frame in enumerate(frames):
+            encode(scenes.pixels(int(frame)))
+            if number % _RATE == 0:
+                progress("video", number / len(frames))
     progress("video", 1.0)
 
 
