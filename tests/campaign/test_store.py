@@ -198,6 +198,15 @@ def test_another_campaign_is_refused(small, tmp_path, campaign_file):
         ran(other, tmp_path / "whole")
 
 
+@pytest.mark.parametrize("edited", [{"campaign": "trials: 2"}, {"campaign": "[1"}, {"campaign": 3}, {"chunk": None}])
+def test_attributes_that_were_edited_are_an_error_of_one_line(small, tmp_path, edited):
+    path, _ = small
+    store = zarr.open_group(tmp_path / "whole" / STORE)
+    store.attrs.update({"campaign_hash": "another"} | edited)
+    with pytest.raises(BadInput, match="be the folder of the same campaign"):
+        ran(path, tmp_path / "whole", nothing)
+
+
 @pytest.mark.parametrize(
     "before, now, said",
     [

@@ -69,6 +69,7 @@ def test_a_changed_test_vector_is_noticed(exported, tmp_path):
     [
         (["--attitude", "both", "--velocity", "both"], "`attitude` must be one of"),
         (["--name", "My Controller"], "`name` must be lower-case letters, digits and underscores"),
+        (["--name", "example"], "`name` must not be one of test, example, clean, which are in the Makefile"),
         (["--precision", "half"], "`precision` must be one of float64, float32"),
         (["--output", "pwm"], "`output` must be one of input, newtons, pulses, wrench"),
     ],

@@ -145,6 +145,8 @@ def test_gradient_of_the_smooth_robustness(text):
         ("(depth < 1", "must have `)`"),
         ("depth < 1 depth > 0", "must end, or go on with"),
         ("depth ~ 1", "must be a formula such as"),
+        (5000 * "(" + "depth < 1" + 5000 * ")", "must have at most 40 formulas inside one another"),
+        (5000 * "not " + "depth < 1", "must have at most 40 formulas inside one another"),
         ("depth[", "must name an entry, after `depth[`, but is the end"),
         ("", "must name a signal, at the beginning"),
     ],

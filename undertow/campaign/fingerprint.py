@@ -25,7 +25,11 @@ class Identity(NamedTuple):
             BadInput: it belongs to another campaign.
         """
         other = [key for key, value in self.attributes.items() if found.get(key) != value]
-        why = self._why(other[0], found) if other else self._fewer(found)
+        try:
+            why = self._why(other[0], found) if other else self._fewer(found)
+            list(found["chunk"])
+        except (KeyError, TypeError, ValueError, AttributeError, BadInput) as error:
+            why = f"its attributes are damaged: {type(error).__name__}, {error}"
         if why:
             hint = "Choose another folder, or start again with --overwrite"
             must = "be the folder of the same campaign, by the same versions"

@@ -17,6 +17,7 @@ from undertow.loop.simd_batch import Unsupported, unavailable
 from undertow.loop.stepped import Step, put
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
+_TAKEN = ("test", "example", "clean")  # a file of this name would be overwritten, or a target of the Makefile
 _VECTORS = 50  # steps of the test
 
 
@@ -104,6 +105,8 @@ class Program:
     def __init__(self, system: System, functions: Sequence[Function] = ()):
         if not _NAME.fullmatch(system.name):
             raise BadInput("name", "be lower-case letters, digits and underscores, at most 31", repr(system.name))
+        if system.name in _TAKEN:
+            raise BadInput("name", f"not be one of {', '.join(_TAKEN)}, which are in the Makefile", system.name)
         check_compiler()
         from simdjit import c99
 

@@ -6,11 +6,13 @@ leave their cells empty. Lines end in CR LF, so that one that was cut off is kno
 
 import csv
 import re
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from undertow.core.errors import BadInput
+from undertow.core.number_text import number_in
 from undertow.logs.log import Log, Series
 from undertow.logs.recording import Recording, Table
 
@@ -92,9 +94,9 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, tuple[str, ...
     if len(numbered) < 2:
         raise BadInput("log", "have a header and at least one row", f"{path.name} with {len(numbered)} rows")
     header = numbered[0][1]
-    if len(set(header)) < len(header):
-        again = next(name for name in header if header.count(name) > 1)
-        raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs twice")
+    again, times = Counter(header).most_common(1)[0]
+    if times > 1:
+        raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs {times} times")
     numbers = np.array([_numbers(path.name, line, row, header) for line, row in numbered[1:]])
     return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), notes
 
@@ -111,7 +113,7 @@ def _numbers(name: str, line: int, row: list[str], header: list[str]) -> list[fl
     found = []
     for title, cell in zip(header, row, strict=True):
         try:
-            found.append(float(cell or "nan"))
+            found.append(number_in(cell) if cell else np.nan)
         except ValueError:
             words = {"true": 1.0, "false": 0.0}
             if cell.lower() not in words:

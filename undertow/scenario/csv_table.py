@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from undertow.core.errors import BadInput
+from undertow.core.number_text import number_in
 
 
 def read_samples(path: str | Path) -> list[list[float]]:
@@ -72,7 +73,7 @@ def _numbers(name: str, line: int, row: list[str], columns: int) -> list[float]:
     if len(row) != columns:
         raise BadInput("file", f"have {columns} columns in every row", f"{name}, line {line} with {len(row)}")
     try:
-        numbers = [float(cell) for cell in row]
+        numbers = [number_in(cell) for cell in row]
     except ValueError:
         raise BadInput("file", "hold numbers only", f"{name}, line {line}: {', '.join(row)}") from None
     if not all(map(math.isfinite, numbers)):

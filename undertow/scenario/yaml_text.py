@@ -186,7 +186,7 @@ class _Composer:
             "bool": construct.construct_yaml_bool,
             "null": construct.construct_yaml_null,
         }
-        if kind not in makers:  # dates, too, are text
+        if kind not in makers or (kind in ("int", "float") and "_" in event.value):  # dates, too, are text, and 1_000
             return _Node(event.value, {}, 1, 0)
         try:
             value = makers[kind](ScalarNode(kind, event.value))

@@ -33,6 +33,8 @@ from undertow.analysis.temporal.formula import (
 )
 from undertow.core.errors import BadInput, did_you_mean
 
+_DEEPEST = 40  # formulas inside one another
+
 _TOKENS = re.compile(r"\s*([A-Za-z_]\w*|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[<>()\[\],])")
 _WORDS = ("always", "never", "eventually", "within", "until", "not", "and", "or")
 _GROUPS = {"position_error": "m", "attitude_error": "rad"}
@@ -77,7 +79,7 @@ class _Reader:
     """Reads a text from the left."""
 
     def __init__(self, text: str, known: Known):
-        self._known, self._text, self._at = known, text, 0
+        self._known, self._text, self._at, self._depth = known, text, 0, 0
         self._tokens: list[tuple[str, int]] = []
         at = 0
         while text[at:].strip():
@@ -130,6 +132,14 @@ class _Reader:
         return found
 
     def _unary(self) -> Formula:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise BadInput("", f"have at most {_DEEPEST} formulas inside one another", "more deeply nested")
+        found = self._inner()
+        self._depth -= 1
+        return found
+
+    def _inner(self) -> Formula:
         word = self._next_is("not", "always", "never", "eventually", "within", "(")
         if word == "not":
             return Not(self._unary())
