@@ -1,5 +1,6 @@
 """rosbag2 of either storage: a run comes back in our axes, rosbags itself reads it, damage is one line."""
 
+import sqlite3
 import warnings
 
 import numpy as np
@@ -12,6 +13,7 @@ from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
 from undertow.interop.ros2 import read_rosbag2, to_messages
 from undertow.interop.ros2.from_messages import Frames
+from undertow.interop.ros2.link import Link
 from undertow.interop.ros2.write_bag import STORAGES, BagWriter, write_rosbag2
 from undertow.numerics.rotations import quaternion_from_euler
 
@@ -161,3 +163,20 @@ def test_damaged_bags_are_one_line(run, tmp_path, storage):
         path.write_bytes(whole[path])
     assert refused > 30
     assert read_rosbag2(tmp_path / "bag")["/thrusters"][1].shape == (3, 8)
+
+
+@pytest.mark.parametrize("error", [OSError("No space left on device"), sqlite3.OperationalError("disk is full")])
+def test_a_full_disk_ends_the_bag_and_not_the_node(domain, error):
+    class Full:
+        written = 0
+
+        def write(self, *message):
+            self.written += 1
+            raise error
+
+    bag, troubles = Full(), []
+    with Link(domain, localhost=True, bag=bag) as link:
+        link.on_trouble = troubles.append
+        for _ in range(3):
+            link.record("/t", ros.PoseStamped(ros.Header(ros.Time(), "map")))
+    assert bag.written == 1 and troubles == [f"the bag cannot be written any more: {error}"]

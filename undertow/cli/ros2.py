@@ -72,6 +72,7 @@ def _run(scenario: Path, options: Options) -> int:
     compiled = _compiled_controller if options.role == "controller" else _compiled_vehicle
     run = compiled(scenario, options, names, frames, reporter)
     with bag or contextlib.nullcontext(), Link(domain, localhost, options.reliability, bag) as link:
+        link.on_trouble = lambda sentence: reporter.trouble("bag ended", sentence)
         return run(link)
 
 

@@ -7,6 +7,7 @@ waits on a WaitSet; polling would cost milliseconds.
 import contextlib
 import functools
 import re
+import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, Generic
@@ -112,6 +113,7 @@ class Link:
 
     Attributes:
         now: time (ns) that the bag gets; the system's unless set.
+        on_trouble: gets a sentence where the bag cannot be written.
 
     Raises:
         BadInput: something given cannot be used, or the participant cannot be made.
@@ -124,6 +126,7 @@ class Link:
             raise BadInput("domain", f"be 0 to {_LARGEST_DOMAIN}", domain)
         checks.choice("reliability", reliability, RELIABILITIES)
         self.now: Callable[[], int] = time.time_ns
+        self.on_trouble: Callable[[str], None] = lambda sentence: None
         self._bag, self._qos = bag, _quality(reliability)
         try:
             if localhost:
@@ -201,9 +204,13 @@ class Link:
         }
 
     def record(self, topic: str, message: Any) -> None:
-        """Write a message into the bag, where there is one."""
+        """Write a message into the bag, where there is one. A disk that takes no more ends the bag, not the node."""
         if self._bag is not None:
-            self._bag.write(topic, message, self.now())
+            try:
+                self._bag.write(topic, message, self.now())
+            except (OSError, sqlite3.Error) as error:
+                self._bag = None
+                self.on_trouble(f"the bag cannot be written any more: {error}")
 
     def _topic(self, topic: str, kind: type[Message]) -> Topic:
         if not _NAME.fullmatch(topic):
