@@ -151,7 +151,7 @@ def ended_with_the_safe_output(folder, peer, out, error):
 
 def test_a_signal_ends_it_with_the_safe_output(scenario, tmp_path, peer):
     """SIGTERM, to a process of its own."""
-    process = started(peer, "--safe", "0.5", "--max-age", "10")
+    process = started(peer, "--safe", "0.5", "--max-age", "60")
     controlled(peer, lambda: process.poll() is not None)
     process.send_signal(signal.SIGTERM)
     peer.answer(30, until=lambda: process.poll() is not None)
@@ -173,13 +173,13 @@ def test_ctrl_c_ends_it_with_the_safe_output(scenario, tmp_path, peer, capfd):
     answering = threading.Thread(target=vehicle)
     answering.start()
     try:
-        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--safe", "0.5", "--max-age", "10"])
+        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--safe", "0.5", "--max-age", "60"])
     finally:
         ended.set()
         answering.join()
     peer.answer(0.3)
     out, error = capfd.readouterr()
-    assert code == 130
+    assert code == 130, (out, error)
     ended_with_the_safe_output(tmp_path / "runs/rov", peer, out, error)
 
 
@@ -200,7 +200,7 @@ def test_a_lost_vehicle_and_one_that_never_was(scenario, peer, capsys):
 
 
 def test_a_killed_process_leaves_a_log_that_replays(scenario, tmp_path, peer, capsys):
-    process = started(peer, "--max-age", "10")
+    process = started(peer, "--max-age", "60")
     controlled(peer, lambda: process.poll() is not None)
     process.kill()
     process.communicate(timeout=30)

@@ -212,7 +212,12 @@ def command(driven, port=0):
 @contextlib.contextmanager
 def controlling(driven, vehicle):
     """The command, with thrusters that turn, and the vehicle that it talks with."""
-    with subprocess.Popen(command(driven), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    pipe = subprocess.PIPE
+    hung_up = signal.getsignal(signal.SIGHUP)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # as in a terminal: tests may run under `nohup`
+    started = subprocess.Popen(command(driven), stdout=pipe, stderr=pipe, text=True)
+    signal.signal(signal.SIGHUP, hung_up)
+    with started as process:
         try:
             assert process.stdout is not None and process.stderr is not None
             for line in process.stdout:
