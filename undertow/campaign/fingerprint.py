@@ -27,7 +27,7 @@ class Identity(NamedTuple):
         other = [key for key, value in self.attributes.items() if found.get(key) != value]
         try:
             why = self._why(other[0], found) if other else self._fewer(found)
-            list(found["chunk"])
+            why = why or ("" if isinstance(found["chunk"], list) else "its attributes are damaged: `chunk`")
         except (KeyError, TypeError, ValueError, AttributeError, BadInput) as error:
             why = f"its attributes are damaged: {type(error).__name__}, {error}"
         if why:
@@ -38,14 +38,14 @@ class Identity(NamedTuple):
     def _why(self, key: str, found: Mapping[str, Any]) -> str:
         """The difference that an attribute indicates."""
         if key == "campaign_hash":
-            return difference(_decisive(found["campaign"]), _decisive(self.asked))
+            return difference(_decisive(str(found["campaign"])), _decisive(self.asked))
         if key == "scenario_hash":
             return "a file that the scenario names had other contents"
         return f"`{key}` was {found.get(key)}, is {self.attributes[key]}"
 
     def _fewer(self, found: Mapping[str, Any]) -> str:
         """A sentence where there would be fewer samples than before; otherwise empty."""
-        before, now = samples(found["campaign"]), samples(self.asked)
+        before, now = samples(str(found["campaign"])), samples(self.asked)
         return f"`trials` was {before}, is {now}" if now < before else ""
 
 
