@@ -10,8 +10,9 @@ from pymavlink.dialects.v20 import common as mavlink
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink import Companion
-from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, HEARTBEAT_TIMEOUT, NEUTRAL_PERIOD
+from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, NEUTRAL_PERIOD
 from undertow.interop.mavlink.link import parsed
+from undertow.interop.mavlink.permission import HEARTBEAT_TIMEOUT, Permission
 from undertow.interop.mavlink.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
@@ -67,23 +68,23 @@ def neutrals(messages):
     return [one for one in messages if one.get_type() == "RC_CHANNELS_OVERRIDE"]
 
 
+def copied(state):
+    """Attributes of a companion, with copies of those that change inside."""
+    changing = dict | SenderClock | Permission
+    return {name: copy.copy(value) if isinstance(value, changing) else value for name, value in state.items()}
+
+
 @pytest.fixture(scope="module")
 def made(driven):
     """Compiled once; `talk` begins with the state that a new one has."""
     companion = Companion(driven, blend=0.0, timeout=TIMEOUT)
-    fresh = {
-        name: copy.copy(value) if isinstance(value, dict | SenderClock) else value
-        for name, value in vars(companion).items()
-    }
-    return companion, fresh
+    return companion, copied(vars(companion))
 
 
 @pytest.fixture
 def talk(made):
     companion, fresh = made
-    vars(companion).update(
-        {name: copy.copy(value) if isinstance(value, dict | SenderClock) else value for name, value in fresh.items()}
-    )
+    vars(companion).update(copied(fresh))
     return Talk(companion)
 
 

@@ -14,6 +14,7 @@ from undertow.core.contracts import Inputs
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_of
 from undertow.interop.mavlink.odometry import Odometry, OdometryReader
+from undertow.interop.mavlink.permission import Permission
 from undertow.interop.mavlink.sender_clock import SenderClock
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.interop.thruster_channels import channels_of_vehicle
@@ -22,7 +23,6 @@ from undertow.power.esc import ESC, esc
 from undertow.realtime.plausible_motion import SPEED
 
 HEARTBEAT_PERIOD = 1.0  # s
-HEARTBEAT_TIMEOUT = 3.0  # s without one from the vehicle, after which the law stops
 NEUTRAL_PERIOD = 0.1  # s between neutral commands while the law is stopped
 JUMP = 1.0  # s, longest time between two odometries by which the law advances
 
@@ -73,7 +73,6 @@ class Companion:
         complaint: why the last message was ignored, or a command was rejected.
         timeout: s.
         running: whether the law runs.
-        armed: whether the vehicle is, as far as is known.
         channels: of the thrusters.
 
     Raises:
@@ -110,14 +109,12 @@ class Companion:
         with runtime.on_processor(), runtime.in_precision(self._autopilot.precision):
             self._drive = step_of(driven, (plant, self._esc), (), jnp.zeros(plant.inputs()))
         self.counts = dict.fromkeys(_COUNTS, 0)
-        self.complaint, self.running, self.armed = "", False, False
-        self._heartbeat, self._odometry, self._last = -np.inf, -np.inf, None
+        self.complaint, self.running = "", False
+        self._odometry, self._last = -np.inf, None
         self._sent_heartbeat = self._sent_neutral = -np.inf
         self._clock = SenderClock(self.timeout)
         self._placed: Odometry | None = None  # the last one with a position
-        self._mode: Any = None  # in which the law may run; None until it does
-        self._present_mode: Any = None
-        self._other_mode = self._emergency = self._leapt = False
+        self._permission = Permission(target_system)
 
     @property
     def sampling_time(self) -> float:
@@ -144,7 +141,8 @@ class Companion:
             self.counts["foreign"] += 1
             return []
         if message.get_type() == "HEARTBEAT":
-            self._note_heartbeat(message, now)
+            self._permission.note(message, now)
+            self._stop_if_lost(now)
         if message.get_type() == "COMMAND_ACK":
             self._note_acknowledgement(message)
         try:
@@ -175,33 +173,14 @@ class Companion:
             return []
         return self._made(np.full(len(self.channels.numbers), float(self._esc.neutral)), 0)
 
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle is, as far as is known."""
+        return self._permission.armed
+
     def state(self, now: float) -> str:
         """In words, what the companion does or waits for."""
-        if now - self._heartbeat > HEARTBEAT_TIMEOUT:
-            return f"no heartbeat of system {self._target.system}"
-        if not self.armed:
-            return "disarmed"
-        if self._emergency:
-            return "emergency or failsafe of the vehicle"
-        if self._other_mode:
-            return "another flight mode: the pilot has taken over"
-        if self._leapt:
-            return "the position has leapt: disarm and arm to go on"
-        return "running" if self.running else "no valid odometry"
-
-    def _note_heartbeat(self, message: Any, now: float) -> None:
-        """An autopilot's; cameras and the like of the same system say that they are none."""
-        if message.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
-            return
-        self._heartbeat = now
-        self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-        self._emergency = message.system_status >= mavlink.MAV_STATE_CRITICAL
-        mode = message.base_mode & ~mavlink.MAV_MODE_FLAG_SAFETY_ARMED, message.custom_mode
-        if not self.armed:
-            self._mode, self._leapt = None, False
-        self._present_mode = mode
-        self._other_mode = self._mode is not None and mode != self._mode
-        self._stop_if_lost(now)
+        return self._permission.why_not(now) or ("running" if self.running else "no valid odometry")
 
     def _note_acknowledgement(self, message: Any) -> None:
         ours = message.command in (mavlink.MAV_CMD_DO_SET_SERVO, mavlink.MAV_CMD_DO_SET_ACTUATOR)
@@ -211,8 +190,8 @@ class Companion:
             self.complaint = f"command {message.command} was answered {result.name if result else message.result}"
 
     def _stop_if_lost(self, now: float) -> None:
-        lost = now - self._heartbeat > HEARTBEAT_TIMEOUT or now - self._odometry > self.timeout
-        if self.running and (lost or not self._may_run()):
+        lost = now - self._odometry > self.timeout
+        if self.running and (lost or self._permission.why_not(now)):
             self.running, self._sent_neutral = False, -np.inf
 
     def _follow(self, odometry: Odometry, now: float) -> list[Any]:
@@ -229,17 +208,18 @@ class Companion:
             self.running = False
         elif self._has_leapt(odometry):
             self.counts["leaps"] += 1
-            self._leapt = self.armed
+            self._permission.note_leap()
             self._stop_if_lost(now)
         if odometry.has_pose:
             self._odometry, self._placed = now, odometry
-        if not self._may_run() or now - self._heartbeat > HEARTBEAT_TIMEOUT:
+        if self._permission.why_not(now):
             return []
         given = odometry.position, odometry.velocity, odometry.attitude
         if not self.running:
             if not odometry.is_whole:
                 return []
-            self.running, self._mode = True, self._present_mode
+            self.running = True
+            self._permission.begin()
             self.counts["starts"] += 1
             still = np.zeros(len(self.channels.numbers)) if self._from_neutral else None
             volts = self._autopilot.start(*given, applied=still)
@@ -250,9 +230,6 @@ class Companion:
         self._drive.inputs[...] = volts
         self._drive()
         return self._made(self._drive.outputs[0], odometry.time_usec)
-
-    def _may_run(self) -> bool:
-        return self.armed and not (self._emergency or self._other_mode or self._leapt)
 
     def _has_leapt(self, odometry: Odometry) -> bool:
         """Whether no vehicle moves so far from its last position in that time; false without one."""

@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.core.errors import BadInput
 from undertow.interop.latency import Latency
-from undertow.interop.mavlink.companion import HEARTBEAT_TIMEOUT, Companion
+from undertow.interop.mavlink.companion import Companion
 from undertow.interop.mavlink.odometry import ODOMETRIES
+from undertow.interop.mavlink.permission import HEARTBEAT_TIMEOUT
 from undertow.realtime.watchdog import Watchdog
 
 _LONGEST = 65535  # bytes of a datagram
