@@ -1,5 +1,7 @@
 """Where results go: refused before anything is computed, never half-written, never silently destroyed."""
 
+import os
+
 import pytest
 from good_scenario import SCENARIO
 from matplotlib.figure import Figure
@@ -127,6 +129,50 @@ def test_what_is_published_stays_whatever_follows(tmp_path):
             raise KeyboardInterrupt
         assert [path.name for path in folder.iterdir()] == ["run.nc"] and list(tmp_path.iterdir()) == [folder]
         (folder / "figures").mkdir()  # of an earlier one
+
+
+def test_a_folder_that_was_moved_and_linked_is_refused_before_anything_is_computed(tmp_path):
+    """As figures on a bigger disk: neither they nor the earlier result are touched."""
+    folder, bigger = tmp_path / "o", tmp_path / "bigger"
+    with results_folder(folder, NAMES, "run.nc", overwrite=False) as draft:
+        fill(draft.path, "old")
+    (folder / "figures").rename(bigger)
+    (folder / "figures").symlink_to(bigger)
+    with pytest.raises(BadInput, match="no links"), results_folder(folder, NAMES, "run.nc", overwrite=True):
+        pass
+    assert (folder / "run.nc").read_text() == "old" == (bigger / "a.svg").read_text()
+
+
+def test_a_link_to_nowhere_is_no_folder(tmp_path):
+    (tmp_path / "o").symlink_to(tmp_path / "gone")
+    with pytest.raises(BadInput, match="which is not there"), results_folder(tmp_path / "o", NAMES, "run.nc", False):
+        pass
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_results_that_cannot_be_moved_are_kept(tmp_path, monkeypatch, capsys, there):
+    """And so is the earlier one."""
+    folder, replace = tmp_path / "o", os.replace
+    if there:
+        with results_folder(folder, NAMES, "run.nc", overwrite=False) as draft:
+            fill(draft.path, "old")
+    failing = [True]
+
+    def failing_once(old, new):
+        if failing and failing.pop():
+            raise OSError("No space left on device")
+        replace(old, new)
+
+    monkeypatch.setattr(os, "replace", failing_once)
+    with pytest.raises(OSError, match="No space"), results_folder(folder, NAMES, "run.nc", overwrite=True) as draft:
+        fill(draft.path)
+    (place,) = tmp_path.rglob("o-rescued-1")
+    assert f"The results are in {place}." in capsys.readouterr().err
+    assert (place / "run.nc").read_text() == "new" == (place / "figures" / "a.svg").read_text()
+    assert not there or (folder / "run.nc").read_text() == "old"
+    with results_folder(folder, NAMES, "run.nc", overwrite=True) as draft:
+        fill(draft.path)
+    assert (place / "run.nc").exists(), "the next command leaves them alone"
 
 
 @pytest.mark.parametrize(

@@ -90,10 +90,16 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
     """
     check_folder(folder, names, marker, overwrite)
     staging = _stage(folder)
-    published = []
+    published: list[Path] = []
+    kept: list[Path] = []
 
     def publish() -> None:
-        _publish(staging, folder, names, marker)
+        try:
+            _publish(staging, folder, names, marker)
+        except OSError:
+            kept.append(_rescued(staging, folder))
+            print(f"The results are in {kept[0]}.", file=sys.stderr)
+            raise
         published.append(folder)
 
     try:
@@ -105,7 +111,8 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
         print(f"{left if published else f'No results were written to {folder}'}.", file=sys.stderr)
         raise
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        if not kept:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def check_folder(
@@ -127,6 +134,10 @@ def check_folder(
     if not (folder / marker).exists():
         got, move = f"{folder}, which has {taken[0]}", f"Choose another folder, or move {taken[0]} out of this one"
         raise BadInput("--out", "be a folder without files of the names of results", got, hint=move)
+    links = [name for name in names if (folder / name).is_symlink() and (folder / name).is_dir()]
+    if overwrite and links:
+        got, hint_ = f"{folder}, where {links[0]} is one", f"Remove the link {links[0]}, or choose another folder"
+        raise BadInput("--out", "be a folder whose folders are no links", got, hint=hint_)
     if not overwrite:
         raise BadInput("--out", "be a folder without an earlier result", f"{folder}, which has {marker}", hint=hint)
 
@@ -134,6 +145,9 @@ def check_folder(
 def _check_place(folder: Path) -> None:
     if not folder.resolve().name:
         raise BadInput("--out", "be a folder inside another one", str(folder), hint="Choose another name")
+    if folder.is_symlink() and not folder.exists():
+        got = f"{folder}, a link to {os.readlink(folder)}, which is not there"
+        raise BadInput("--out", "be a folder", got, hint="Make that folder, or choose another name")
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
             got = f"{folder}, a file" if part == folder else f"{folder}, and {part} is a file"
@@ -167,22 +181,41 @@ def _stage(folder: Path) -> Path:
 
 
 def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> None:
-    """Move all files, the marker last. With a marker, remove the rest of an earlier result."""
+    """Move all files, the marker last. With a marker, remove the rest of an earlier result before."""
     settle(staging)
     if folder.exists():
-        new = sorted((path.name for path in staging.iterdir()), key=lambda name: name == marker)
-        stale = [name for name in names if name not in new] if marker in new else []
-        for name in stale:
-            remove(folder / name)
+        new = [path.name for path in staging.iterdir()]
         for name in new:
-            if (folder / name).is_dir():
-                remove(folder / name)
-            os.replace(staging / name, folder / name)
+            if name != marker:
+                _move(staging / name, folder / name)
+        if marker in new:
+            for name in names:
+                if name not in new:
+                    remove(folder / name)
+            _move(staging / marker, folder / marker)
     else:
         os.replace(staging, folder)
         staging.mkdir()
     sync(folder)
     sync(folder.parent)
+
+
+def _move(new: Path, old: Path) -> None:
+    if old.is_dir():
+        remove(old)
+    os.replace(new, old)
+
+
+def _rescued(staging: Path, folder: Path) -> Path:
+    """Where results are that could not be moved to their folder: under a name that no later command removes."""
+    for number in itertools.count(1):
+        place = staging.with_name(f"{folder.resolve().name}-rescued-{number}")
+        if not place.exists():
+            with contextlib.suppress(OSError):
+                os.replace(staging, place)
+                return place
+            return staging
+    raise AssertionError("there are always further numbers")
 
 
 def remove(path: Path) -> None:
