@@ -227,3 +227,13 @@ def test_without_a_vehicle_nothing_is_written(scenario, tmp_path, peer, capsys):
     assert run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--patience", "0.05"]) == 1
     assert "no first measurement within 0.05 s" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["rov.yaml"]
+
+
+def test_a_silent_vehicle_costs_no_earlier_flight(scenario, tmp_path, peer, capsys):
+    (tmp_path / "axis.yaml").write_text(AXIS)
+    assert run(["run", "axis.yaml", "--fast", "--out", "flight"]) == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
+    silent = ["run", "rov.yaml", "--link", f"udp:{peer.place}", "--patience", "0.05", "--out", "flight", "--overwrite"]
+    assert run(silent) == 1
+    assert "no first measurement within 0.05 s" in capsys.readouterr().err
+    assert {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()} == before

@@ -39,6 +39,7 @@ from undertow.scenario.reading import dump, read
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
+_BEFORE = ".unbegun"  # where the log is before the first step, when an earlier one is still there
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
 
 
@@ -131,7 +132,7 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
         link = VehicleLink(built) if own else UdpVehicleLink(options.link.removeprefix("udp:"), built)
         given, troubles = built if own else _starting_anywhere(built), list[str]()
         with _logging(given, link, folder, troubles) as autopilot:
-            loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked)
+            loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked, lambda: _begin_log(folder))
             say = (lambda line: None) if options.json else typer.echo
             say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
             with stop.listening(), scheduled(options.priority, options.cpu):
@@ -142,7 +143,7 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
             (folder / "scenario.yaml").write_text(dump(built.resolved), encoding="utf-8")
             _print(found, folder, options.json)
         else:
-            remove(folder / "run.mcap")
+            remove(folder / _BEFORE)
             with contextlib.suppress(OSError):  # it held something before
                 folder.rmdir()
     for trouble in troubles:
@@ -169,23 +170,30 @@ def _starting_anywhere(built: Built) -> Built:
 
 @contextlib.contextmanager
 def _logging(built: Built, link: AbstractLink, folder: Path, troubles: list[str]) -> Iterator[Autopilot]:
-    """The autopilot, compiled, which logs to a folder; an earlier result there is removed.
+    """The autopilot, compiled, which logs to a folder; see `_begin_log`.
 
     What goes wrong with the log is added to `troubles`: it does not stop the controller.
     """
     form = link.form or Format()
     compiled = interruptible(lambda: _autopilot(built, form))
     folder.mkdir(parents=True, exist_ok=True)
-    for name in _WRITTEN:
-        remove(folder / name)
     with warnings.catch_warnings(record=True) as noted:
         warnings.simplefilter("always")
         try:
-            compiled.log_to(folder / "run.mcap")
+            (folder / _BEFORE).mkdir(exist_ok=True)
+            compiled.log_to(folder / _BEFORE / "run.mcap")
             yield compiled
         finally:
             compiled.close_log()
             troubles.extend(str(one.message) for one in noted)
+
+
+def _begin_log(folder: Path) -> None:
+    """The vehicle has answered: the log takes the place of an earlier result, which stays where no vehicle does."""
+    for name in _WRITTEN:
+        remove(folder / name)
+    os.replace(folder / _BEFORE / "run.mcap", folder / "run.mcap")
+    (folder / _BEFORE).rmdir()
 
 
 def _autopilot(built: Built, form: Format) -> Autopilot:

@@ -65,6 +65,7 @@ class RealTimeLoop:
         clock: the only clock that is used.
         settings: None for the usual ones.
         stop: asked once per step; the loop ends when it says so.
+        begun: called once, when the first measurement has come.
 
     Attributes:
         statistics: of the steps so far.
@@ -80,9 +81,10 @@ class RealTimeLoop:
         clock: AbstractLoopClock,
         settings: LoopSettings | None = None,
         stop: Callable[[], bool] = lambda: False,
+        begun: Callable[[], None] = lambda: None,
     ):
         settings = LoopSettings() if settings is None else settings
-        self._autopilot, self._link, self._clock, self._stop = autopilot, link, clock, stop
+        self._autopilot, self._link, self._clock, self._stop, self._begun = autopilot, link, clock, stop, begun
         self._period = autopilot.sampling_time
         self._deadline = self._period if settings.deadline is None else settings.deadline
         checks.positive("deadline", self._deadline, "s")
@@ -121,6 +123,7 @@ class RealTimeLoop:
         received = self._first_measurement()
         if received is None:
             return self._why_no_start()
+        self._begun()
         clock, period, seen = self._clock, self._period, self.statistics
         begin = started = last = clock.now()
         planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
