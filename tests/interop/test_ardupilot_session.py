@@ -66,6 +66,27 @@ def test_a_late_copy_is_ignored(session):
     assert session.vehicle.time == time and session.counts["late"] == 1
 
 
+def test_one_old_packet_or_flipped_bit_does_not_restart_the_physics(session):
+    """Of ten frames back, and with a bit of the count at zero; a reboot that goes on from there is believed."""
+    for count in range(60, 70):
+        session.answer(packet(count), SITL, 0.0)
+    time = session.vehicle.time
+    for wrong in (60, 69 & ~64, 12):
+        assert session.answer(packet(wrong), SITL, 0.0) is None
+        assert session.answer(packet(session._last + 1), SITL, 0.0) is not None
+    assert session.vehicle.time > time and session.counts["late"] == 3 and session.counts["restarts"] == 0
+    assert session.answer(packet(20), SITL, 0.0) is None
+    assert read(session.answer(packet(20), SITL, 1.0))["timestamp"] == 0.01 and session.counts["restarts"] == 1
+
+
+def test_another_process_of_the_machine_is_let_in_with_its_first_frame(session):
+    """ArduPilot gets another port when it reboots; a machine that is not the same has to wait."""
+    session.answer(packet(7), SITL, 0.0)
+    assert session.answer(packet(0), ("10.0.0.9", 40001), 0.1) is None
+    assert session.answer(packet(0), OTHER, 0.1) is not None
+    assert session.sender == OTHER and session.counts["restarts"] == 1 and session.vehicle.time == 0.01
+
+
 def test_lost_packets_are_counted_and_not_made_up(session):
     """The autopilot takes its time from the reply, so one packet is one frame."""
     session.answer(packet(5), SITL, 0.0)
@@ -86,7 +107,7 @@ def test_a_session_may_begin_at_any_count(session):
 
 def test_others_are_ignored_while_the_autopilot_is_there(session):
     session.answer(packet(7), SITL, 0.0)
-    assert session.answer(packet(0), OTHER, SILENCE - 0.1) is None
+    assert session.answer(packet(3), OTHER, SILENCE - 0.1) is None
     assert session.counts["strangers"] == 1 and session.vehicle.time == 0.01 and session.sender == SITL
     assert session.answer(packet(8), SITL, 1.0) is not None
     assert session.answer(packet(0), OTHER, 1.0 + SILENCE) is not None  # the autopilot again, from another port

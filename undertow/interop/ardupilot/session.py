@@ -24,10 +24,12 @@ class Session:
     The physics advances by 1 / frame rate for each new frame, never by the clock of the machine. Of a datagram:
 
     * no packet of the protocol: ignored (`invalid`);
-    * from another sender less than `SILENCE` after a packet of the autopilot: ignored (`strangers`);
+    * from another sender less than `SILENCE` after a packet of the autopilot: ignored (`strangers`), unless it is the
+      first frame of another process of the same machine;
     * the frame count of the last one: the autopilot has missed the reply, which is sent again (`repeated`);
-    * the frame count before that, from the same sender: a copy that comes late, ignored (`late`);
-    * a smaller frame count: the autopilot was restarted, and so is the vehicle (`restarts`);
+    * a smaller frame count: a copy that comes late, or a flipped bit, since the protocol has no checksum: ignored
+      (`late`), unless it is zero, or the same or the next one follows it. Then the autopilot was restarted, and so is
+      the vehicle (`restarts`);
     * a larger frame count than the next: packets were lost on the way (`lost`); the physics advances by one frame, as
       the autopilot takes its time from the reply.
 
@@ -54,6 +56,7 @@ class Session:
         self.complaint, self.ended, self.frame_rate, self.undriven = "", False, 0, 0
         self.sender: Any = None
         self._last, self._received, self._answer = -1, -np.inf, b""
+        self._smaller: int | None = None  # frame count that was smaller than the last one
 
     def answer(self, datagram: bytes, sender: Any, now: float) -> bytes | None:
         """The reply to a datagram; None where it gets none.
@@ -71,12 +74,18 @@ class Session:
             self.complaint = str(error)
             return None
         other = sender != self.sender
-        if other and now - self._received < SILENCE:
+        anew = packet.frame_count == 0 and self.sender is not None and sender[0] == self.sender[0]
+        if other and now - self._received < SILENCE and not anew:
             self.counts["strangers"] += 1
             return None
-        if not other and packet.frame_count == self._last - 1:
-            self.counts["late"] += 1
-            return None
+        smaller = packet.frame_count < self._last and (packet.frame_count > 0 or self._last == 1)
+        if not other and smaller:
+            follows = self._smaller is not None and packet.frame_count - self._smaller in (0, 1)
+            self._smaller = packet.frame_count
+            if not follows:
+                self.counts["late"] += 1
+                return None
+        self._smaller = None
         known, self.sender, self._received = self.sender, sender, now
         if packet.frame_count == self._last and not other:
             self.counts["repeated"] += 1
