@@ -11,7 +11,7 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 # Ctrl-C, `kill`, the end of the terminal or of an ssh connection, and Ctrl-\\.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 _AGAIN = 0.05  # s, until the next look whether modules are still being imported
 _LONGEST = 20.0  # s, longest wait for an import: a user's file may never end
@@ -23,12 +23,16 @@ def remember_interrupts() -> None:
     """Make the signals that end a command raise KeyboardInterrupt, and remember one that compiled code swallows.
 
     The first one is answered by a line on stderr. During an import the exception waits until it ends: a half-imported
-    compiled module crashes. What `nohup` switched off stays off.
+    compiled module crashes.
     """
-    for one in ENDING:
-        if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN:
-            signal.signal(one, _handler)
+    for one in ending_signals():
+        signal.signal(one, _handler)
     signal.signal(signal.SIGALRM, _handler)
+
+
+def ending_signals() -> list[signal.Signals]:
+    """The signals that end a command: all but what `nohup` switched off."""
+    return [one for one in _ENDING if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN]
 
 
 def interrupted_by() -> int:

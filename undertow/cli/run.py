@@ -20,7 +20,7 @@ import typer
 from undertow.autopilot.autopilot import Autopilot
 from undertow.autopilot.measured_motion import Format
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
-from undertow.cli.interruptible import ENDING, interruptible
+from undertow.cli.interruptible import ending_signals, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
@@ -80,7 +80,7 @@ class _Stop:
                 os.write(2, b"\nInterrupted: stopping.\n")
             self.number = number
 
-        before = {one: signal.signal(one, note) for one in ENDING if signal.getsignal(one) != signal.SIG_IGN}
+        before = {one: signal.signal(one, note) for one in ending_signals()}
         try:
             yield
         finally:
