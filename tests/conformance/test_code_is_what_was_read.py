@@ -14,7 +14,7 @@ TEXT = "def part():\n    return {!r}\n"
 
 @pytest.fixture(autouse=True)
 def byte_code(monkeypatch):
-    """Python writes and reads compiled files, as it does unless it is told not to."""
+    """Python writes and reads compiled files, as it does by default."""
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
 
 

@@ -146,19 +146,30 @@ def test_stopped_is_for_good():
     assert transitions(run.z.log)[-1].reason == "operator"
 
 
+def _with_a_dead_thruster(thruster, onset, **changes):
+    """A supervised BlueROV2 that keeps its place while a thruster dies: its run, and the one loss that was found."""
+    run = ut.simulate_scenario(
+        {
+            "plant": {"vehicle": "bluerov2", "thruster": {"kind": "t200", "supply": 16}},
+            "supervisor": True,
+            "reference": {"kind": "setpoint", "position": [0] * 6},
+            "faults": [{"target": f"thruster {thruster}", "mode": "off", "onset": onset}],
+            **changes,
+        }
+    ).dataset
+    (loss,) = losses_of(run)
+    return run, loss
+
+
 @pytest.mark.full
 def test_a_law_of_low_bandwidth_does_not_hide_a_dead_thruster():
-    scenario = {
-        "plant": {"vehicle": "bluerov2", "thruster": {"kind": "t200", "supply": 16}},
-        "controller": {"kind": "pid", "frequency": 1.0},
-        "supervisor": True,
-        "reference": {"kind": "setpoint", "position": [0] * 6},
-        "disturbance": {"kind": "current", "velocity": [0, 0.3, 0]},
-        "loop": {"dt": 0.01, "duration": 18, "record": 0.05},
-        "faults": [{"target": "thruster 2", "mode": "off", "onset": 15}],
-    }
-    run = ut.simulate_scenario(scenario).dataset
-    ((name, time),) = losses_of(run)
+    run, (name, time) = _with_a_dead_thruster(
+        2,
+        15,
+        controller={"kind": "pid", "frequency": 1.0},
+        disturbance={"kind": "current", "velocity": [0, 0.3, 0]},
+        loop={"dt": 0.01, "duration": 18, "record": 0.05},
+    )
     assert name.startswith("T2") and 15 < time < 16.5
     assert np.rad2deg(np.abs(run["error"].sel(axis="yaw")).max()) < 10  # 64 degrees in 15 s if it is not found
 
@@ -166,16 +177,12 @@ def test_a_law_of_low_bandwidth_does_not_hide_a_dead_thruster():
 @pytest.mark.full
 def test_an_integral_survives_the_loss_of_a_thruster():
     """The pitch that a BlueROV2 cannot give has wound up nothing when the thrusters that are left share the work."""
-    scenario = {
-        "plant": {"vehicle": "bluerov2", "thruster": {"kind": "t200", "supply": 16}},
-        "controller": "lqi",
-        "supervisor": True,
-        "reference": {"kind": "setpoint", "position": [0] * 6},
-        "disturbance": {"kind": "current", "velocity": [0.2, 0.1, 0]},
-        "loop": {"dt": 0.02, "duration": 60, "record": 0.1},
-        "faults": [{"target": "thruster 3", "mode": "off", "onset": 20}],
-    }
-    run = ut.simulate_scenario(scenario).dataset
-    ((name, _),) = losses_of(run)
+    run, (name, _) = _with_a_dead_thruster(
+        3,
+        20,
+        controller="lqi",
+        disturbance={"kind": "current", "velocity": [0.2, 0.1, 0]},
+        loop={"dt": 0.02, "duration": 60, "record": 0.1},
+    )
     assert name.startswith("T3")
     assert np.abs(run["position"].values[:, :3]).max() < 0.05  # 2.6 m where it has

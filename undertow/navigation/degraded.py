@@ -8,8 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core.contracts import Measurement
 from undertow.core.param import Param, param
+from undertow.navigation.noise_only import AbstractNoiseOnly
 from undertow.numerics.random_keys import numbered
 from undertow.sensors.sampling import Sampling, SensorState
 
@@ -22,7 +23,7 @@ class DegradedState(NamedTuple):
     held: tuple[Array, Array]  # last delivered position (m, rad) and velocity (m/s, rad/s)
 
 
-class Degraded(AbstractInformedNavigation):
+class Degraded(AbstractNoiseOnly):
     """Every output has a sensor of its own, all of the same period and delay; the last reading holds until the next.
 
     Before the first delivery the initial position and velocity are held.
@@ -40,15 +41,6 @@ class Degraded(AbstractInformedNavigation):
     def velocity_noise(self, dt):
         """The same noise density, spread over every control step."""
         return self.velocity.noise * jnp.sqrt(self.velocity.period / dt)
-
-    def ignored(self, state):
-        return jnp.zeros((), dtype=int)
-
-    def signals(self):
-        return {}
-
-    def diagnostics(self, state):
-        return {}
 
     def init(self, realization, truth: Measurement) -> DegradedState:
         for name, sampling in (("position", self.position), ("velocity", self.velocity)):

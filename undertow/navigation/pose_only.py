@@ -8,10 +8,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.core.measurement import with_outputs
 from undertow.core.param import Param, param
+from undertow.navigation.noise_only import AbstractNoiseOnly
 from undertow.numerics.random_keys import numbered
 
 ORDERS = (2, 3)
@@ -26,7 +27,7 @@ class PoseOnlyState(NamedTuple):
     samples: Int[Array, ""]  # so far
 
 
-class PoseOnly(AbstractInformedNavigation):
+class PoseOnly(AbstractNoiseOnly):
     """Observer of high gain (order 2), extended by the acceleration (order 3), with all poles at -w. No model is used.
 
     In continuous time with the innovation i = x_measured - x_hat of each output
@@ -76,15 +77,6 @@ class PoseOnly(AbstractInformedNavigation):
         else:
             gain = (13 + 50 * kept + 49 * kept**2) * (1 - kept) ** 3 / (2 * (1 + kept) ** 5)
         return self.noise * jnp.sqrt(gain) / self.sampling_time
-
-    def ignored(self, state):
-        return jnp.zeros((), dtype=int)
-
-    def signals(self):
-        return {}
-
-    def diagnostics(self, state):
-        return {}
 
     def init(self, realization, truth: Measurement) -> PoseOnlyState:
         for name in ("noise", "bandwidth"):

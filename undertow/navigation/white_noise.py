@@ -6,13 +6,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core import checks
-from undertow.core.contracts import AbstractInformedNavigation, Measurement
+from undertow.core.contracts import Measurement
 from undertow.core.measurement import with_outputs
 from undertow.core.param import Param, param
+from undertow.navigation.noise_only import AbstractNoiseOnly
 from undertow.numerics.random_keys import numbered
 
 
-class WhiteNoise(AbstractInformedNavigation):
+class WhiteNoise(AbstractNoiseOnly):
     """Independent Gaussian errors, new at every sample of the control loop; their key comes from the sample's number.
 
     Raises:
@@ -33,15 +34,6 @@ class WhiteNoise(AbstractInformedNavigation):
 
     def velocity_noise(self, dt):
         return self.velocity
-
-    def ignored(self, state):
-        return jnp.zeros((), dtype=int)
-
-    def signals(self):
-        return {}
-
-    def diagnostics(self, state):
-        return {}
 
     def init(self, realization, truth) -> Int[Array, ""]:
         """Samples so far."""

@@ -96,6 +96,7 @@ class RealTimeLoop:
         self._safe = numbers("safe", given, (inputs,))
         checks.finite("safe", self._safe)
         self._max_age, self._patience = settings.max_age, settings.patience
+        self._standstill = max(settings.max_age, _STANDSTILL * self._period)
         self._missing = self._nothing()
         self.statistics = LoopStatistics()
 
@@ -113,7 +114,7 @@ class RealTimeLoop:
         Whatever happens, the last thing sent is the safe output.
         """
         try:
-            self._link.guard(self._safe, max(self._max_age, _STANDSTILL * self._period))
+            self._link.guard(self._safe, self._standstill)
             with _without_collection():
                 return self._run(steps, periods)
         finally:
@@ -149,7 +150,7 @@ class RealTimeLoop:
             started = clock.now()
             before, at = at, self._instant(started - begin)
             elapsed = (at - before) * period
-            if elapsed > max(self._max_age, _STANDSTILL * period):
+            if elapsed > self._standstill:
                 return Reason.STALLED
             received = self._link.receive(elapsed)
             if self._link.ended:

@@ -146,13 +146,15 @@ class Received:
 
         Otherwise a single datagram of a wrong number would end the connection.
         """
-        last = 0 if self.newest is None else self.newest.sequence
-        ahead = (sequence - last) % _SEQUENCES
-        if ahead == 0 or (ahead > _SEQUENCES // 2 and self.newest is not None) or sequence == 0:
+        if sequence == 0:
             raise Refused("repeated")
-        if ahead > _WINDOW and self.newest is not None and not 0 < (sequence - self._far) % _SEQUENCES <= _WINDOW:
-            self._far = sequence
-            raise Refused("far ahead")
+        if self.newest is not None:
+            ahead = (sequence - self.newest.sequence) % _SEQUENCES
+            if not 0 < ahead <= _SEQUENCES // 2:
+                raise Refused("repeated")
+            if ahead > _WINDOW and not 0 < (sequence - self._far) % _SEQUENCES <= _WINDOW:
+                self._far = sequence
+                raise Refused("far ahead")
         self._far = sequence
 
 
@@ -174,8 +176,8 @@ class Sender:
         return self._packed(self._sequence, values, time, answered, flag)
 
     def following(self, values: np.ndarray, time: int, count: int) -> list[bytes]:
-        """The next datagrams, should somebody else send them."""
-        return [self._packed(_next(self._sequence, k), values, time, 0, False) for k in range(1, count + 1)]
+        """The datagrams after the next one, should somebody else send them."""
+        return [self._packed(_next(self._sequence, k), values, time, 0, False) for k in range(2, count + 2)]
 
     def _packed(self, sequence: int, values: np.ndarray, time: int, answered: int, flag: bool) -> bytes:
         datagram = Datagram(self._kind, flag, self._session, sequence, time, answered, values)

@@ -4,6 +4,8 @@ One wrong number that is finite can end control: a law that believes a velocity 
 limits let through, such as a position that jumps by 100 m, is for a supervisor to judge.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -21,9 +23,7 @@ def is_plausible(position: ArrayLike, velocity: ArrayLike) -> bool:
         position: north, east, down, m.
         velocity: u, v, w, m/s, and p, q, r, rad/s.
     """
-    return not any(
-        _beyond(values, limit) for values, (_, limit, _) in zip(_parts(position, velocity), _LIMITS, strict=True)
-    )
+    return next(_beyond(position, velocity), None) is None
 
 
 def check_plausible(what: str, position: ArrayLike, velocity: ArrayLike) -> None:
@@ -32,17 +32,16 @@ def check_plausible(what: str, position: ArrayLike, velocity: ArrayLike) -> None
     Raises:
         BadInput: it is not; `what` is the message in which it came.
     """
-    for values, (name, limit, unit) in zip(_parts(position, velocity), _LIMITS, strict=True):
-        if _beyond(values, limit):
-            hint = "Give positions from a place nearby" if name == "position" else ""
-            largest = np.abs(values[np.isfinite(values)]).max()
-            raise BadInput(f"{what} {name}", f"be at most {limit:g} {unit}", f"{largest:.4g} {unit}", hint=hint)
+    for name, limit, unit, largest in _beyond(position, velocity):
+        hint = "Give positions from a place nearby" if name == "position" else ""
+        raise BadInput(f"{what} {name}", f"be at most {limit:g} {unit}", f"{largest:.4g} {unit}", hint=hint)
 
 
-def _parts(position: ArrayLike, velocity: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _beyond(position: ArrayLike, velocity: ArrayLike) -> Iterator[tuple[str, float, str, float]]:
+    """What is beyond its limit: name, limit, unit and the largest number."""
     velocity = np.asarray(velocity, dtype=float)
-    return np.asarray(position, dtype=float), velocity[:3], velocity[3:]
-
-
-def _beyond(values: np.ndarray, limit: float) -> bool:
-    return bool((np.abs(values[np.isfinite(values)]) > limit).any())
+    parts = np.asarray(position, dtype=float), velocity[:3], velocity[3:]
+    for values, (name, limit, unit) in zip(parts, _LIMITS, strict=True):
+        largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+        if largest > limit:
+            yield name, limit, unit, float(largest)

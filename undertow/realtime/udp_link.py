@@ -80,8 +80,7 @@ class UdpVehicleLink(AbstractLink):
 
     def send(self, command: np.ndarray) -> None:
         if self._watchdog is not None:
-            following = self._sender.following(self._safe, time.monotonic_ns(), 1 + _LAST)
-            self._watchdog.hold(self._peer, following[1:])
+            self._watchdog.hold(self._peer, self._sender.following(self._safe, time.monotonic_ns(), _LAST))
         self._send(command, False)
 
     def await_measurement(self, safe: np.ndarray) -> None:
