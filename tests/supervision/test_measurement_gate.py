@@ -9,6 +9,7 @@ import pytest
 from recorded import is_as_recorded
 
 from undertow.core.measurement import measurement_of_outputs
+from undertow.supervision.innovations import InnovationMonitor
 from undertow.supervision.measurement_gate import MeasurementGate
 from undertow.supervision.stuck_readings import StuckReadings
 from undertow.thrusters.thruster import PropellerReport
@@ -22,7 +23,7 @@ JUMPS = {"jump_position": 1.0, "jump_angle": 0.5, "jump_velocity": 2.0, "jump_ra
 @functools.cache
 def gate():
     stuck = StuckReadings(0.02, 0.03, 10.0, (False, False, False, True, True, True))
-    return MeasurementGate(stuck, **LIMITS, **JUMPS)
+    return MeasurementGate(stuck, InnovationMonitor(), **LIMITS, **JUMPS)
 
 
 measured = jax.jit(measurement_of_outputs)

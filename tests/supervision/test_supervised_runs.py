@@ -123,7 +123,7 @@ def test_a_thousand_transfers_make_no_jump():
             controls = run.z.state in (State.ACTIVE, State.DEGRADED)
             transfers += whom is not None and whom != (controls, bool(run.z.fallback_controls))
             whom = (controls, bool(run.z.fallback_controls))
-            in_transfer = bool(run.z.turning) or not controls
+            in_transfer = bool(run.z.transfer) or not controls
             output = run.step(request)
             largest = max(largest, np.abs(output - before).max() if in_transfer else 0.0)
             before = output

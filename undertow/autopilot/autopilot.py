@@ -320,15 +320,18 @@ class Autopilot(Uncopied):
         """Ask the supervisor for something, from the next step on.
 
         Args:
-            what: `run`, `hold` (the safe output until another request), `stop` (the same until `start`), `law` or
-                `fallback` (which of them controls).
+            what: `run` (and on to the target, where a place is held after a jump), `hold` (the safe output until
+                another request), `stop` (the same until `start`), `law` or `fallback` (which of them controls).
 
         Raises:
             BadInput: there is no such request, the scenario has no supervisor, or `start` was not called.
         """
         self._check_started("request")
         checks.choice("request", what, tuple(one.name.lower() for one in Request))
-        self._supervised("request").request[...] = int(Request[what.upper()])
+        supervised, request = self._supervised("request"), Request[what.upper()]
+        supervised.request[...] = int(request)
+        if request is Request.RUN:
+            supervised.place.held[...] = 0
 
     @property
     def state(self) -> tuple[str, str]:
@@ -433,8 +436,9 @@ class Autopilot(Uncopied):
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
         low, high, most = transfer(self._loop.controller)
         begun, command = np.clip(applied, low, high), self._go_on.outputs.command
-        supervised.output[...], supervised.turning[...] = begun, True
-        command[...] = np.clip(command, begun - most, begun + most)
+        beyond = begun - command
+        supervised.beyond[...] = beyond - np.clip(beyond, -most, most)
+        command[...] += supervised.beyond
 
     def _answered(self) -> np.ndarray:
         """The output for the law's command; a command that is not finite leaves the output as it was."""

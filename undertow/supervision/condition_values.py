@@ -27,22 +27,25 @@ class View(NamedTuple):
     """What a step sees and decides."""
 
     passed: Passed
-    r: Target
+    given: Target  # the reference, or the last valid one
+    r: Target  # that the law pursues
     rejected: Scalar  # entries of the reference
     controls: Bool[Array, ""]  # whether the law's command may leave
     command: Inputs  # of the law
     signals: dict[str, Array]  # of the law
     output: Inputs
-    reached: Bool[Array, ""]  # whether the output is the law's command within limits
+    beyond: Inputs  # by which the output exceeds the law's command within limits since a transfer
 
 
 class Occasion(NamedTuple):
     """What else the conditions depend on."""
 
     u: Inputs  # applied
+    contradicted: Scalar  # log-likelihood ratio against the reported input relative to its threshold
     errors: tuple[Scalar, Scalar]  # tracking errors of position and attitude relative to the allowed ones
     variation: Scalar  # of the input, ranges per second
     restarts: Scalar  # within `RESTART_WINDOW`
+    place_held: Bool[Array, ""]  # whether the law holds a place in place of its reference
     broken: Bool[Array, ""]  # whether the state of the law is not finite
     elapsed: Scalar  # time since the last step, sampling times; NaN where the clock does not run
 
@@ -84,9 +87,13 @@ class ConditionValues(eqx.Module):
             "measurement_not_finite": passed.not_finite,
             "measurement_implausible": passed.implausible,
             "measurement_jump": passed.jump,
+            "measurement_inconsistent": passed.contradiction,
+            "measurement_noisy": passed.noise,
             "measurement_stuck": passed.missing,
             "report_lost": passed.unreported,
+            "applied_contradicted": what.contradicted,
             "reference_rejected": view.rejected,
+            "place_held": what.place_held,
             "estimator_diverged": jnp.where(what.broken, jnp.inf, self._estimate_ratio(view)),
             "restarts_exhausted": what.restarts,
             "thruster_lost": lost("lost_thrusters"),
@@ -100,7 +107,9 @@ class ConditionValues(eqx.Module):
     def limits(self) -> PerCondition:
         """Limits of all conditions: 0 of what is counted, 1 of what is relative to a limit, and a few others."""
         counted = ("measurement_not_finite", "report_lost", "reference_rejected", "output_not_finite", "saturated")
-        found = dict.fromkeys(NAMES, 1.0) | dict.fromkeys((*counted, "thruster_lost", "axes_lost", "clock_fault"), 0.0)
+        found = dict.fromkeys(NAMES, 1.0) | dict.fromkeys(
+            (*counted, "thruster_lost", "axes_lost", "clock_fault", "place_held"), 0.0
+        )
         found |= {
             "restarts_exhausted": float(self.restarts),
             "chattering": self.max_variation,

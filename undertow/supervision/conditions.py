@@ -59,7 +59,8 @@ class Condition(NamedTuple):
         name: the reason as it is recorded.
         value: what is compared.
         limit: what with; an option of the supervisor in backquotes.
-        degraded_after, safe_after: time for which it has to hold before the state changes, s; inf for never.
+        degraded_after, safe_after: time for which it has to hold before the state changes, s; inf for never. Time for
+            which it does not hold is taken off again, so that what comes and goes counts as what stays.
         recovers_after: time without it after which it counts no longer, s; inf for never.
         reaction: what else is done.
     """
@@ -105,6 +106,25 @@ CONDITIONS = (
         _PREDICTED + ". In SAFE the new value is taken as the truth",
     ),
     Condition(
+        "measurement_inconsistent",
+        "way by which position and integral of the velocity contradict each other, or attitude and angular velocity; "
+        "forgotten within 2 s",
+        "1, of `jump_position` and `jump_angle`",
+        0.0,
+        0.2,
+        1.0,
+        "None: nobody knows which of them is wrong",
+    ),
+    Condition(
+        "measurement_noisy",
+        "mean difference between readings and their predictions within 1 s",
+        "0.1 of `jump_position`, `jump_angle`, `jump_velocity` or `jump_rate`",
+        0.0,
+        1.0,
+        1.0,
+        "",
+    ),
+    Condition(
         "measurement_stuck",
         "motion missing from readings of the same bits, ten times or for three times `update_period`",
         "1, of `stuck_distance` and `stuck_angle`",
@@ -123,6 +143,15 @@ CONDITIONS = (
         "The last report is held",
     ),
     Condition(
+        "applied_contradicted",
+        "log-likelihood ratio of the commanded against the reported input, from the motion and the nominal model",
+        "4",
+        0.0,
+        _NEVER,
+        1.0,
+        "The command counts as applied",
+    ),
+    Condition(
         "reference_rejected",
         "entries of the reference that are not finite, or beyond `max_distance`, `max_speed` or `max_rate`",
         "0",
@@ -130,6 +159,15 @@ CONDITIONS = (
         _NEVER,
         1.0,
         "The last valid reference is held, at rest",
+    ),
+    Condition(
+        "place_held",
+        "whether control began again after readings had jumped or contradicted each other",
+        "0",
+        0.0,
+        _NEVER,
+        0.0,
+        "The place where control began again is held, until the operator asks for `run` or gives another target",
     ),
     Condition(
         "output_not_finite",
@@ -165,7 +203,7 @@ CONDITIONS = (
         "variation of the input, ranges from limit to limit per second",
         "`max_variation`",
         1.0,
-        _NEVER,
+        5.0,
         1.0,
         "The `fallback` controls, if there is one",
     ),
@@ -249,7 +287,7 @@ def code_of(reason: str) -> int:
 class Conditions(NamedTuple):
     """State of the conditions."""
 
-    held: PerCondition  # for how long each has held, s
+    held: PerCondition  # for how long each has held, less the time for which it has not, s
     clear: PerCondition  # for how long it has not, s
     level: PerCondition  # 0; 1 for DEGRADED; 2 for SAFE
 
@@ -272,7 +310,7 @@ def held_for(
         tolerated: which cannot lead to SAFE.
     """
     degraded, safe, recovers = _times()
-    held = jnp.where(holds, state.held + dt, 0.0)
+    held = jnp.maximum(state.held + jnp.where(holds, dt, -dt), 0.0)
     clear = jnp.where(holds, 0.0, state.clear + dt)
     # A step counts in whole: what holds at k instants has held for k sampling times.
     reached = jnp.where(holds & (held >= degraded * _WHOLE), 1.0, 0.0)

@@ -15,6 +15,7 @@ from undertow.core import checks
 from undertow.core.contracts import Measurement
 from undertow.core.param import Param, param
 from undertow.numerics.rotations import attitude_error
+from undertow.supervision.innovations import InnovationMonitor, InnovationState, JumpLimits
 from undertow.supervision.motion import Motion, length, motion_of, predicted, split, with_motion
 from undertow.supervision.stuck_readings import StuckReadings, StuckState
 
@@ -30,6 +31,7 @@ class GateState(NamedTuple):
     expected: Motion  # at this instant
     rates: Array  # believed rates of the outputs, m/s and rad/s
     stuck: StuckState
+    innovations: InnovationState
     since: Scalar  # time since the last step, s
     actuator: Any  # last finite report of the actuators
 
@@ -39,9 +41,12 @@ class Passed(NamedTuple):
 
     measurement: Measurement
     stuck: StuckState
+    innovations: InnovationState
     not_finite: Scalar  # entries
     implausible: Scalar  # largest size relative to its limit
     jump: Scalar  # largest difference from the prediction relative to its limit
+    contradiction: Scalar  # between position and velocity, relative to the limit of a jump
+    noise: Scalar  # mean size of the differences relative to the largest one
     missing: Scalar  # motion missing from stuck readings relative to its limit
     unreported: Scalar  # entries of the report of the actuators that are not finite, or no speed of a propeller
 
@@ -54,6 +59,7 @@ class MeasurementGate(eqx.Module):
     """
 
     stuck: StuckReadings
+    innovations: InnovationMonitor
     max_distance: Float[Param, ""] = param("m", "largest plausible coordinate")
     max_speed: Float[Param, ""] = param("m/s", "largest plausible velocity")
     max_rate: Float[Param, ""] = param("rad/s", "largest plausible angular velocity")
@@ -74,7 +80,8 @@ class MeasurementGate(eqx.Module):
         attitude = jnp.where(jnp.isfinite(read.attitude).all(), read.attitude, level)
         expected = Motion(zero(read.position), attitude, zero(read.velocity))
         believed, actuator = with_motion(y, expected), jax.tree.map(zero, y.actuator)
-        return GateState(expected, believed.velocity, self.stuck.init(y), jnp.zeros(()), actuator)
+        stuck, innovations = self.stuck.init(y), self.innovations.init(expected)
+        return GateState(expected, believed.velocity, stuck, innovations, jnp.zeros(()), actuator)
 
     def pass_through(self, state: GateState, y: Measurement, believe: Bool[Array, ""]) -> Passed:
         """The measurement, with predictions in place of readings that cannot be true.
@@ -107,23 +114,35 @@ class MeasurementGate(eqx.Module):
         unreported = sum((~good).sum(dtype=float) for good in jax.tree.leaves(usable))
         y = y._replace(actuator=reported)
 
-        def mended() -> Measurement:
-            chosen = (jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True))
-            return with_motion(y, Motion(*chosen))
+        chosen = Motion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
 
         all_good = jnp.stack([one.all() for one in good]).all()
         missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
         largest = lambda ratios: jnp.stack([one.max(initial=0.0) for one in ratios]).max()
-        measurement = jax.lax.cond(all_good, lambda: y, mended)
+        measurement = jax.lax.cond(all_good, lambda: y, lambda: with_motion(y, chosen))
+        jump_limits = JumpLimits(self.jump_position, self.jump_angle, self.jump_velocity, self.jump_rate)
+        innovations = self.innovations.after(state.innovations, chosen, expected, jump_limits, believe, state.since)
         # Actuators of which nobody has ever reported anything but rest are not lost.
         before = jnp.stack([jnp.zeros(()), *(jnp.abs(one).max() for one in jax.tree.leaves(state.actuator))]).max()
         lost = jnp.where(before > 0, jnp.asarray(unreported, dtype=float), 0.0)
-        return Passed(measurement, stuck_state, missing, largest(sizes), largest(jumps), stuck.missing, lost)
+        return Passed(
+            measurement=measurement,
+            stuck=stuck_state,
+            innovations=innovations,
+            not_finite=missing,
+            implausible=largest(sizes),
+            jump=largest(jumps),
+            contradiction=self.innovations.contradiction(innovations),
+            noise=self.innovations.noise_ratio(innovations),
+            missing=stuck.missing,
+            unreported=lost,
+        )
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:
         """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s)."""
         y = passed.measurement
-        return GateState(predicted(y, rate, dt), y.velocity, passed.stuck, jnp.asarray(dt), y.actuator)
+        expected = predicted(y, rate, dt)
+        return GateState(expected, y.velocity, passed.stuck, passed.innovations, jnp.asarray(dt), y.actuator)
 
     def _sizes(self, read: Motion) -> Motion:
         """Sizes of readings relative to their limits."""

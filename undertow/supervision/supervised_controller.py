@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -39,8 +40,10 @@ from undertow.supervision.conditions import (
     none_held,
 )
 from undertow.supervision.fault_tolerant_law import FaultTolerantController
+from undertow.supervision.held_place import PlaceState, after_jump, is_another, no_place, released, target
 from undertow.supervision.measurement_gate import GateState, MeasurementGate
 from undertow.supervision.motion import rate_of_velocity
+from undertow.supervision.reported_input import ReportedInput, ReportState
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
 from undertow.supervision.transition_log import TransitionLog, empty_log, logged
 
@@ -50,6 +53,7 @@ _AVERAGED = 0.5  # s over which the variation of the input is averaged
 _BELIEVED = 0.1  # share of a jump that the estimate may add to a prediction in a step
 _SHORTEST = 1e-3  # sampling times between two steps of a clock that runs
 _TURNS = 1e5  # rad, of a reference
+_MOVED = ("measurement_jump", "measurement_inconsistent")  # after which the vehicle may be anywhere
 _SUDDEN = 0.05  # s in which no vehicle reaches its largest speed
 _LONG_AGO = -1e9  # s
 _BIG = 1e30  # stands for what is not finite in the log
@@ -76,7 +80,9 @@ class SupervisedState(NamedTuple):
     law: PyTree
     fallback: PyTree  # () without one
     gate: GateState
-    reference: Target  # last valid one
+    report: ReportState
+    reference: Target  # last valid one that was given
+    place: PlaceState
     allowance: AllowanceState
     conditions: Conditions
     state: Int[Array, ""]
@@ -86,7 +92,8 @@ class SupervisedState(NamedTuple):
     time: Float[Array, ""]  # s since the start
     safe_for: Float[Array, ""]  # s in SAFE
     output: Inputs  # applied last
-    turning: Int[Array, ""]  # whether the output turns into that of the law, no faster than `slew`
+    transfer: Int[Array, ""]  # 1 where control has begun with this step, and `beyond` is not known yet
+    beyond: Inputs  # by which the output exceeds that of the law since a transfer; it ends no slower than `slew`
     variation: Float[Array, ""]  # of the input, ranges per second, averaged
     restarts: Float[Array, " kept"]  # times of the last restarts, s, the latest first
     restarted: Int[Array, ""]  # how often
@@ -105,6 +112,7 @@ class Supervised(AbstractGatedController):
     law: AbstractController
     fallback: AbstractController | None
     gate: MeasurementGate
+    report: ReportedInput
     tracking: TrackingAllowance
     watch: ConditionValues
     model: Model
@@ -112,6 +120,7 @@ class Supervised(AbstractGatedController):
     safe_output: Float[Param, " m"] = param("as input", "input in all states but ACTIVE and DEGRADED")
     slew: Float[Param, ""] = param("1/s", "fastest change of the input at a transfer, ranges from limit to limit")
     stop_after: Float[Param, ""] = param("s", "time in SAFE after which the state is STOPPED")
+    hold_after_jump: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
         for name in ("sampling_time", "slew", "stop_after"):
@@ -125,15 +134,17 @@ class Supervised(AbstractGatedController):
         usable = (passed.not_finite == 0) & (passed.implausible <= 1)
         known = passed.measurement
         law, fallback = self.law.init(known, target), () if self.fallback is None else self.fallback.init(known, target)
-        new = self._fresh(law, fallback, gate, self.tracking.start(self.model.coordinates, known, target), target)
+        new = self._fresh(
+            law, fallback, gate, known, self.tracking.start(self.model.coordinates, known, target), target
+        )
         log, zero, none = new.log, jnp.zeros(()), jnp.zeros((), dtype=int)
         for entered in (State.READY, State.ACTIVE):
             log = logged(log, usable, (zero, jnp.asarray(int(entered)), none, zero, zero))
         state = jnp.where(usable, int(State.ACTIVE), int(State.INIT)).astype(int)
-        return new._replace(state=state, turning=jnp.where(usable, 0, 1).astype(int), log=log)
+        return new._replace(state=state, transfer=jnp.where(usable, 0, 1).astype(int), log=log)
 
     def _fresh(
-        self, law: PyTree, fallback: PyTree, gate: GateState, allowance: AllowanceState, r: Target
+        self, law: PyTree, fallback: PyTree, gate: GateState, y: Measurement, allowance: AllowanceState, r: Target
     ) -> SupervisedState:
         """A state in which nothing has happened yet, in INIT."""
         zero, none = jnp.zeros(()), jnp.zeros((), dtype=int)
@@ -141,7 +152,9 @@ class Supervised(AbstractGatedController):
             law=law,
             fallback=fallback,
             gate=gate,
+            report=self.report.init(self.model, y),
             reference=r,
+            place=no_place(r),
             allowance=allowance,
             conditions=none_held(),
             state=jnp.asarray(int(State.INIT)),
@@ -151,7 +164,8 @@ class Supervised(AbstractGatedController):
             time=zero,
             safe_for=zero,
             output=self.safe_output,
-            turning=jnp.ones((), dtype=int),
+            transfer=jnp.ones((), dtype=int),
+            beyond=jnp.zeros_like(self.safe_output),
             variation=zero,
             restarts=jnp.full(self.watch.restarts + 1, _LONG_AGO),
             restarted=none,
@@ -178,7 +192,12 @@ class Supervised(AbstractGatedController):
         runs = jnp.isfinite(dt) & (dt > _SHORTEST * nominal)
         elapsed = jnp.where(runs, jnp.minimum(dt, _PREDICTED), nominal)
         step = jnp.where(runs & (dt <= CLOCK_FAULT * nominal), jnp.minimum(dt, _ADVANCED * nominal), nominal)
-        u = jnp.where(jnp.isfinite(u_applied), jnp.clip(u_applied, self.watch.low, self.watch.high), self.safe_output)
+        reported = jnp.where(
+            jnp.isfinite(u_applied), jnp.clip(u_applied, self.watch.low, self.watch.high), self.safe_output
+        )
+        report = self.report.after(z.report, self.model, view.passed.measurement, reported, view.output, elapsed)
+        contradicted = self.report.contradicted(report)
+        u = jnp.where(contradicted > 1, view.output, reported)
         laws = self._advanced(z, view, u, step)
         broken = ~all_finite(laws)
         allowance = self._allowance(z, view, elapsed)
@@ -186,10 +205,12 @@ class Supervised(AbstractGatedController):
 
         occasion = Occasion(
             u=u,
+            contradicted=contradicted,
             errors=self.tracking.ratios(allowance, self.model.coordinates, view.passed.measurement, view.r),
             variation=variation,
             restarts=(z.time - z.restarts < RESTART_WINDOW).sum(dtype=float),
             broken=broken,
+            place_held=z.place.held > 0,
             elapsed=jnp.where(runs, dt / nominal, jnp.nan),
         )
         values, limits = self.watch.values(view, occasion, self.model.coordinates), self.watch.limits()
@@ -213,6 +234,9 @@ class Supervised(AbstractGatedController):
             broken, lambda: ~all_finite((z.law, z.fallback)), lambda: jnp.asarray(False)
         )
         again = begins | diverged | switches | damaged
+        place = released(z.place, is_another(z.reference, view.given, self.model.coordinates, elapsed))
+        jumps, safe = self._jumped(conditions), state == int(State.SAFE)
+        place = after_jump(place, safe, jumps, begins, view.passed.measurement, view.given)
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
         # What has begun again gets its time before it is judged.
@@ -222,12 +246,14 @@ class Supervised(AbstractGatedController):
         # A condition may be named after it has held: its value is the last one beyond the limit.
         exceeding = jnp.where(holds, jnp.where(jnp.isfinite(values), values, _BIG), z.exceeding)
         cause = jnp.where(changed, _cause(exceeding, limits, reason), z.cause)
-        law, fallback = self._continued(z, view, laws, again, broken)
+        law, fallback = self._continued(z, view._replace(r=place.pursued), laws, again, broken)
         after = SupervisedState(
             law=(),
             fallback=(),
             gate=self.gate.after(view.passed, self._rate(z, view, u), elapsed),
-            reference=view.r,
+            report=report,
+            reference=view.given,
+            place=place,
             allowance=allowance,
             conditions=conditions,
             state=state,
@@ -237,7 +263,8 @@ class Supervised(AbstractGatedController):
             time=time,
             safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
             output=u,
-            turning=(again | ((z.turning > 0) & ~view.reached)).astype(int),
+            transfer=again.astype(int),
+            beyond=jnp.where(view.controls, view.beyond, 0.0),
             variation=variation,
             restarts=jnp.where(switches, _LONG_AGO, times),
             restarted=z.restarted + jnp.where(counted, 1, 0),
@@ -251,7 +278,7 @@ class Supervised(AbstractGatedController):
     def _mended(self, after: SupervisedState, z: SupervisedState, y: Measurement) -> SupervisedState:
         """The state without laws after damage to the memory: as at the start, with what can be read of the log."""
         none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
-        new = self._fresh((), (), self.gate.init(y), none, _readable(after.reference))
+        new = self._fresh((), (), self.gate.init(y), y, none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
         entry = (time, new.state, jnp.asarray(code_of(MEMORY)), *new.cause)
         new = new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
@@ -266,7 +293,8 @@ class Supervised(AbstractGatedController):
     def _view(self, z: SupervisedState, y: Measurement, r: Target) -> View:
         controls = _controls(z.state)
         passed = self.gate.pass_through(z.gate, y, ~controls)
-        r, rejected = self._checked(z.reference, r)
+        given, rejected = self._checked(z.reference, r)
+        r = target(z.place, given)
         y, own = passed.measurement, lambda: self.law.command(z.law, passed.measurement, r)
         if self.fallback is None:
             command, signals = own()
@@ -275,14 +303,18 @@ class Supervised(AbstractGatedController):
         most = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
         within = jnp.clip(command, self.watch.low, self.watch.high)
         towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
-        output = jnp.where((z.turning > 0), towards(within), within)
+        # The difference at a transfer ends by itself. Were the output led to that of the law instead, the law's loop
+        # would have a slower actuator until then, and might never settle.
+        beyond = jnp.where(z.transfer > 0, z.output - within, z.beyond)
+        beyond = jnp.where(jnp.isfinite(beyond), beyond - jnp.clip(beyond, -most, most), 0.0)
+        output = jnp.where(beyond == 0, within, within + beyond)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
         safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
         # Whatever the memory holds.
         output = jnp.where(jnp.isfinite(output), jnp.clip(output, self.watch.low, self.watch.high), self.safe_output)
-        return View(passed, r, rejected, controls, command, signals, output, (output == within).all())
+        return View(passed, given, r, rejected, controls, command, signals, output, beyond)
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
         """Command of the fallback; of the signals those that it declares, too, the others are zero."""
@@ -343,7 +375,7 @@ class Supervised(AbstractGatedController):
         """Allowed tracking error; where nobody controls, it is the present one."""
         coordinates = self.model.coordinates
         here = self.tracking.start(coordinates, view.passed.measurement, view.r)
-        targets = z.reference, view.r
+        targets = z.place.pursued, view.r
         later = self.tracking.after(z.allowance, coordinates, view.passed.measurement, targets, elapsed)
         return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, here, strict=True)))
 
@@ -351,7 +383,13 @@ class Supervised(AbstractGatedController):
         """Average variation of the input, ranges from limit to limit per second."""
         now = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
-        return jnp.where(view.controls & ~(z.turning > 0), z.variation + share * (now - z.variation), 0.0)
+        settled = (z.transfer == 0) & (view.beyond == 0).all()
+        return jnp.where(view.controls & settled, z.variation + share * (now - z.variation), 0.0)
+
+    def _jumped(self, conditions: Conditions) -> Bool[Array, ""]:
+        """Whether readings that have jumped ask for SAFE, and a place has to be held for that."""
+        level = jnp.stack([conditions.level[NUMBER[name]] for name in _MOVED]).max()
+        return (level >= 2) & self.hold_after_jump
 
     def _tolerated(self, z: SupervisedState) -> Bool[Array, " conditions"]:
         """Conditions that do not lead to SAFE now: the law has failed, but there is a fallback."""

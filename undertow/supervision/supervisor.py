@@ -12,7 +12,9 @@ from undertow.core.contracts import AbstractController, AbstractPlant, Inputs, M
 from undertow.core.errors import BadInput
 from undertow.supervision.condition_values import ConditionValues
 from undertow.supervision.fault_tolerant_law import fault_tolerant
+from undertow.supervision.innovations import InnovationMonitor
 from undertow.supervision.measurement_gate import MeasurementGate
+from undertow.supervision.reported_input import ReportedInput
 from undertow.supervision.stuck_readings import StuckReadings
 from undertow.supervision.supervised_controller import Supervised
 from undertow.supervision.tracking_allowance import TrackingAllowance
@@ -22,6 +24,7 @@ _PERIODS = 3  # the same where readings are rarer than control steps
 _SHARE = 10.0  # of the largest acceleration of the actuators that an estimate may have
 _LEAST = 1.0  # m/s^2 or rad/s^2 that an estimate may have in any case
 _UNLIMITED = 500.0  # the same without limits of the actuators
+_MODEL_ERROR = 0.1  # of that acceleration that the nominal model may miss
 _BEYOND = 1e9  # more than any actuator takes, in its unit
 _DECAY = 10.0  # s in which an allowed tracking error of the size of its limit decays
 
@@ -51,6 +54,7 @@ def supervisor(
     thruster_faults: bool = True,
     restarts: int = 3,
     stop_after: float = 60.0,
+    hold_after_jump: bool = True,
 ) -> Supervised:
     """A supervisor around a controller.
 
@@ -79,6 +83,8 @@ def supervisor(
         thruster_faults: whether failed thrusters of a vehicle are looked for, and replaced by the others.
         restarts: of the law within ten minutes; one more, and the fallback takes over, or the state is SAFE.
         stop_after: time in SAFE after which control does not begin again by itself, s.
+        hold_after_jump: whether control that begins again after readings have jumped holds the present place until the
+            operator asks for `run` or gives another target; if not, it goes on to its reference.
 
     Raises:
         BadInput: a value is out of its range.
@@ -101,6 +107,7 @@ def supervisor(
     readings = max(_EQUAL, int(np.ceil(_PERIODS * update_period / sampling_time)))
     gate = MeasurementGate(
         StuckReadings(stuck_distance, stuck_angle, float(readings), law.model.coordinates.angles),
+        InnovationMonitor(),
         max_distance=of_vehicle(max_distance),
         max_speed=of_vehicle(max_speed),
         max_rate=of_vehicle(max_rate),
@@ -112,12 +119,14 @@ def supervisor(
     if thruster_faults and vehicle:
         law = fault_tolerant(law, sampling_time, (low, high))
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
-    estimate = _plausible_estimate(law.model, start, (low, high)) if max_estimate is None else max_estimate
+    authority = _authority(law.model, start, (low, high))
+    estimate = _plausible_estimate(authority) if max_estimate is None else max_estimate
     least, largest = jnp.maximum(low, -_BEYOND), jnp.minimum(high, _BEYOND)
     return Supervised(
         law=law,
         fallback=fallback,
         gate=gate,
+        report=_reported_input(authority),
         tracking=TrackingAllowance(max_position_error, max_angle_error, _DECAY),
         watch=ConditionValues(least, largest, estimate, max_variation, restarts),
         model=law.model,
@@ -125,6 +134,7 @@ def supervisor(
         safe_output=jnp.broadcast_to(jnp.asarray(safe_output, dtype=float), (count,)),
         slew=slew,
         stop_after=stop_after,
+        hold_after_jump=hold_after_jump,
     )
 
 
@@ -136,10 +146,21 @@ def limits_of(plant: AbstractPlant, x: PyTree) -> tuple[Inputs, Inputs]:
     return low, high
 
 
-def _plausible_estimate(model: Model, start: Measurement, limits: tuple[Any, Any]) -> Outputs:
-    """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2."""
+def _authority(model: Model, start: Measurement, limits: tuple[Any, Any]) -> Outputs:
+    """Largest acceleration of the actuators along each axis of a model, m/s^2 and rad/s^2; infinite without limits."""
     gain = jnp.abs(model.dynamics.gain(start))
     forces = jnp.stack([jnp.abs(force_of(model.actuators, limit)) for limit in limits]).max(0)
-    authority = jnp.where(gain > 0, gain * forces[None, :], 0.0).sum(1)
+    return jnp.where(gain > 0, gain * forces[None, :], 0.0).sum(1)
+
+
+def _plausible_estimate(authority: Outputs) -> Outputs:
+    """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2."""
     known = jnp.isfinite(authority) & (authority > 0)
     return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
+
+
+def _reported_input(authority: Outputs) -> ReportedInput:
+    """The test of the reported input; axes that no actuator moves tell nothing."""
+    test = ReportedInput(jnp.ones_like(authority))
+    unit = jnp.where(authority > 0, _MODEL_ERROR * authority * test.memory, jnp.inf)
+    return ReportedInput(unit)  # pyright: ignore[reportArgumentType] - an array is a Param

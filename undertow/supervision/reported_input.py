@@ -1,0 +1,89 @@
+"""Whether the input that is reported as applied is the one that moves the plant, or the command is.
+
+A driver that reports another input than it applies makes every part that knows the applied input wrong: the law's
+estimate, the prediction of readings, the search for lost thrusters. Of two hypotheses, that the report is true and that
+the command is applied whatever is reported, each explains the motion by the nominal model up to an error. The sum of
+their log-likelihood ratio, Wald's sequential test with a sum that never falls below zero and fades, says when the
+report cannot be true.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import checks
+from undertow.core.contracts import Inputs, Measurement, Model
+from undertow.core.param import Param, param
+from undertow.numerics.linear_algebra import matvec
+
+Scalar = Float[Array, ""]
+PerAxis = Float[Array, " n"]
+
+
+class ReportState(NamedTuple):
+    """What is known of the report."""
+
+    predicted: PerAxis  # velocity by the model with the reported input, m/s and rad/s
+    residual: PerAxis  # velocity that this prediction misses, of the last time
+    difference: PerAxis  # velocity that the reported input adds to that by the command, of the last time
+    likelihood: Scalar  # log-likelihood ratio for the command
+
+
+class ReportedInput(eqx.Module):
+    """The test, and how much the nominal model may be wrong.
+
+    Raises:
+        BadInput: a number is not positive.
+    """
+
+    unit: Float[Param, " n"] = param("m/s or rad/s", "error of the model's velocity within `memory`, of each axis")
+    memory: Float[Param, ""] = param("s", "over which velocities are compared", default=0.5)
+    fading: Float[Param, ""] = param("s", "in which the likelihood is forgotten", default=2.0)
+    threshold: Float[Param, ""] = param("", "log-likelihood ratio from which on the report is wrong", default=4.0)
+
+    def __check_init__(self):
+        checks.positive("unit", self.unit, finite=False)
+        for name in ("memory", "fading", "threshold"):
+            checks.positive(name, getattr(self, name))
+
+    def init(self, model: Model, y: Measurement) -> ReportState:
+        """State at a measurement."""
+        velocity = model.coordinates.velocity(y)
+        velocity = jnp.where(jnp.isfinite(velocity), velocity, 0.0)
+        return ReportState(velocity, jnp.zeros_like(velocity), jnp.zeros_like(velocity), jnp.zeros(()))
+
+    def after(
+        self, state: ReportState, model: Model, y: Measurement, reported: Inputs, command: Inputs, dt: Scalar
+    ) -> ReportState:
+        """State with one more measurement.
+
+        Args:
+            state: before.
+            model: nominal.
+            y: measurement of now, which the gate has let through.
+            reported: input from now on, as it is reported.
+            command: the same as commanded.
+            dt: time from now on, s.
+        """
+        velocity, dynamics = model.coordinates.velocity(y), model.dynamics
+        forget = jnp.exp(-dt / self.memory)
+        residual = forget * (state.residual + velocity - state.predicted)
+        ratio = ((-2 * residual - state.difference) * state.difference / self.unit**2).sum() / 2
+        most = 2 * self.threshold
+        likelihood = jnp.clip((1 - dt / self.fading) * state.likelihood + dt / self.memory * ratio, 0.0, most)
+        actuators, effect = model.actuators.quasi_static(), dynamics.gain(y)
+        forces = lambda u: actuators.force(actuators.init(), u)
+        by_report = matvec(effect, forces(reported))
+        more = by_report - matvec(effect, forces(command))
+        return ReportState(
+            predicted=velocity + dt * (dynamics.drift(y) + by_report),
+            residual=residual,
+            difference=forget * (state.difference + dt * more),
+            likelihood=likelihood,
+        )
+
+    def contradicted(self, state: ReportState) -> Scalar:
+        """Log-likelihood ratio for the command, relative to its threshold."""
+        return state.likelihood / self.threshold
