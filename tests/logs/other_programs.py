@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-_STRUCT = {"Q": "Q", "f": "f", "c": "h", "C": "H", "H": "H", "B": "B", "b": "b", "d": "d", "I": "I"}
+_STRUCT = {"Q": "Q", "f": "f", "c": "h", "C": "H", "H": "H", "B": "B", "b": "b", "d": "d", "I": "I", "N": "16s"}
 
 
 def ardupilot_bin(tables):

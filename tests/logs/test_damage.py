@@ -251,7 +251,8 @@ def test_missing_topics_and_columns(tmp_path):
 
 @pytest.mark.full
 def test_pulses_become_volts_as_the_speed_controllers_have_it():
-    from undertow.logs.mapping import Entry, volts
+    from undertow.logs.mapped_log import volts
+    from undertow.logs.mapping import Entry
     from undertow.power.esc import esc
 
     pulses = np.arange(1050.0, 1950.0, 7.0)

@@ -141,8 +141,8 @@ def test_a_signal_that_is_missing_is_mapped(tmp_path):
     assert str(refused.value) == (
         "`log` must have the signal `input` or `commanded_input`, but is dive.bin, which has position, velocity, "
         "attitude, angular_velocity, specific_force, depth, pulses. Add it to the mapping with which the file is read, "
-        "or was converted, by the file's own columns: `signals: {input: {topic: RCOU, columns: [C1, C2, ...], unit: "
-        "us, supply: 16}}`, one column per thruster; `supply` is in V"
+        "or was converted: `signals: {input: {frame: vectored_6dof, unit: us, supply: 16}}`, with the frame of the "
+        "vehicle (FRAME_CONFIG); `supply` is in V"
     )
     entry = {"topic": "RCOU", "columns": ["C1", "C2"], "unit": "us", "supply": 16}
     mapped = read_log(tmp_path / "dive.bin", mapping_of({"signals": {"input": entry}}))

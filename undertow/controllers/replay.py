@@ -96,9 +96,10 @@ def replay(model: Model, commands, interpolation: str = "hold") -> Replay:
     return Replay(model.in_body_axes(), commands, interpolation == "linear")
 
 
-def _of_log(log: Log) -> np.ndarray:
-    """Rows of a log, from its first sample on."""
-    series = inputs_of(log)
+def _of_log(log: Log, model: Model) -> np.ndarray:
+    """Rows of a log, from its first sample on; the motors of a frame of ArduSub become the thrusters of the model."""
+    dynamics = getattr(model.dynamics, "affine", model.dynamics)
+    series = inputs_of(log, thruster_matrix=getattr(dynamics, "thruster_matrix", None))
     return np.column_stack([series.time - series.time[0], series.values])
 
 

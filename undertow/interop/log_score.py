@@ -92,7 +92,8 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
         raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
     checks.positive("horizons", horizons, "s")
     checks.positive("every", every, "s")
-    motion, inputs = motion_of(log), inputs_of(log, ("input", "commanded_input"))
+    motion = motion_of(log)
+    inputs = inputs_of(log, ("input", "commanded_input"), np.asarray(plant.thruster_matrix))
     if not (np.isfinite(motion.outputs).all() and np.isfinite(motion.nu).all()):
         raise BadInput("log", "have attitudes and velocities that are finite", f"{log.source}, where one never is")
     if inputs.values.shape[1] != plant.inputs():

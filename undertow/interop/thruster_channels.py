@@ -7,29 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.logs.ardusub_frames import FRAMES, motors_of_thrusters
 
 MOST_CHANNELS = 32  # of ArduPilot
 
-# How each motor of an ArduSub frame pushes the vehicle at a pulse above neutral: roll, pitch, yaw, up, forward, right.
-# Factors of ArduPilot libraries/AP_Motors/AP_Motors6DOF.cpp@0fd5fbf; motor n is on servo output n.
-_HORIZONTAL = ((0, 0, 1, 0, -1, 1), (0, 0, -1, 0, -1, -1), (0, 0, -1, 0, 1, 1), (0, 0, 1, 0, 1, -1))
-FRAMES = {
-    "vectored_6dof": (
-        *_HORIZONTAL,
-        (1, -1, 0, -1, 0, 0),
-        (-1, -1, 0, -1, 0, 0),
-        (1, 1, 0, -1, 0, 0),
-        (-1, 1, 0, -1, 0, 0),
-    ),
-    "vectored": (*_HORIZONTAL, (1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0)),
-}
-
-# Rows of a thruster matrix (surge, sway, heave, roll, pitch, yaw) in the order of those factors; heave is down.
-_ROWS, _SIGNS = [3, 4, 5, 2, 0, 1], np.array([1, 1, 1, -1, 1, 1])
-
-_FORCES = slice(3, 6)
-
-_SMALL = 1e-6  # share of the largest entry of a column below which an entry of a thruster matrix is zero
+_HINT = "Give the channel of each thruster, such as --channels 1,2,-3"
 
 
 class Channels(NamedTuple):
@@ -95,18 +77,7 @@ def channels_of_frame(frame: str, thruster_matrix: ArrayLike) -> Channels:
     Raises:
         BadInput: there is no such frame, or its motors are not the thrusters of the vehicle.
     """
-    checks.choice("frame", frame, tuple(FRAMES))
-    pushes = np.asarray(thruster_matrix, dtype=float)[_ROWS].T * _SIGNS
-    pushes = np.sign(np.where(np.abs(pushes) > _SMALL * np.abs(pushes).max(axis=1, keepdims=True), pushes, 0.0))
-    found = [_motor(push, np.array(FRAMES[frame])) for push in pushes]
-    numbers = [number for number, _ in found]
-    if len(found) != len(FRAMES[frame]) or sorted(numbers) != list(range(1, len(found) + 1)):
-        names = ", ".join(str(number or "none") for number in numbers)
-        hint = "Give the channel of each thruster, such as --channels 1,2,-3"
-        raise BadInput(
-            "frame", "have the thrusters of the vehicle", f"{frame}: thrusters are motors {names}", hint=hint
-        )
-    return Channels(np.array(numbers), np.array([sign for _, sign in found]))
+    return Channels(*motors_of_thrusters(frame, thruster_matrix, _HINT))
 
 
 def channels_of_vehicle(thruster_matrix: ArrayLike, frame: str | None = None, channels: str | None = None) -> Channels:
@@ -122,19 +93,5 @@ def channels_of_vehicle(thruster_matrix: ArrayLike, frame: str | None = None, ch
         return channels_from_text(channels, thrusters)
     fitting = [name for name, motors in FRAMES.items() if len(motors) == thrusters]
     if frame is None and not fitting:
-        hint = "Give the channel of each thruster, such as --channels 1,2,-3"
-        raise BadInput("channels", f"be given for {thrusters} thrusters, which no known frame has", hint=hint)
+        raise BadInput("channels", f"be given for {thrusters} thrusters, which no known frame has", hint=_HINT)
     return channels_of_frame(frame or fitting[0], thruster_matrix)
-
-
-def _motor(push: NDArray, motors: NDArray) -> tuple[int, int]:
-    """Number, from 1, of the motor that pushes in the same directions, and the sign; (0, 1) where there is none.
-
-    Forces are in the same axes; moments may be more, such as the pitch of a thruster that is mounted low.
-    """
-    for number, motor in enumerate(motors, start=1):
-        acts = motor != 0
-        for sign in (1, -1):
-            if (push[acts] == sign * motor[acts]).all() and not push[_FORCES][~acts[_FORCES]].any():
-                return number, sign
-    return 0, 1

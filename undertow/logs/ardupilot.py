@@ -90,7 +90,7 @@ def read_ardupilot(path: Path) -> Recording:
     data = path.read_bytes()
     if not data.startswith(_HEAD):
         raise BadInput("log", "be a .bin file of ArduPilot", f"{path.name}, which does not begin like one")
-    scan, tables = _scanned(data), {}
+    scan, tables, parameters = _scanned(data), {}, {}
     for kind, places in scan.places.items():
         if kind.fields.names is None or kind.fields.names[0] != "TimeUS":
             continue
@@ -98,11 +98,22 @@ def read_ardupilot(path: Path) -> Recording:
             raise BadInput("log", "have numbers as TimeUS", f"{path.name}, whose messages {kind.name} have text there")
         rows = np.frombuffer(b"".join(data[at + 3 : at + kind.size] for at in places), kind.fields)
         tables |= _tables(kind, rows, scan.numbered.get(kind.name, ""))
+        if kind.name == "PARM":
+            parameters |= _parameters(kind, rows)
     if not tables:
         got = f"{path.name}, which has none in {len(data)} bytes"
         raise BadInput("log", "have messages with TimeUS", got)
     notes = (f"{scan.lost} of {len(data)} bytes are damaged or cut off, and left out",) if scan.lost else ()
-    return Recording(tables, path.name, "ArduPilot", notes)
+    return Recording(tables, path.name, "ArduPilot", notes, parameters)
+
+
+def _parameters(kind: _Kind, rows: np.ndarray) -> dict[str, float]:
+    """Parameters of the autopilot, by name, from its messages PARM; the last value of each."""
+    forms = dict(zip(kind.fields.names or (), kind.divisors, strict=True))
+    if forms.get("Name") != 0.0 or not forms.get("Value"):
+        return {}
+    names = [name.decode("latin-1") for name in rows["Name"].tolist()]
+    return dict(zip(names, (rows["Value"] / forms["Value"]).tolist(), strict=True))
 
 
 def _scanned(data: bytes) -> _Scan:

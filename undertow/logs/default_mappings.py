@@ -4,7 +4,9 @@ ArduPilot: ardupilot.org/sub/docs/logmessages.html and the LogStructure.h of eac
 msg_docs. ROS 2: REP 103 (units, axes) and nav_msgs/Odometry, whose twist is in the axes of the body.
 """
 
+from undertow.logs.ardupilot_parameters import barometers, motor_channels, primary_barometer, pulse_columns
 from undertow.logs.mapping import Entry, LogMapping
+from undertow.logs.recording import Recording
 
 _ENU = ("ENU", "FLU")
 
@@ -18,11 +20,13 @@ def _indexed(name: str, number: int) -> tuple[str, ...]:
 
 
 # Positions are relative to the origin of the estimator; ATT and XKF1 in degrees; RCOU in us; the gyro in rad/s and the
-# accelerometer in m/s^2 along FRD; BARO.Alt is a height, m, so that its depth points up.
+# accelerometer in m/s^2 along FRD; BARO.Alt, and CTUN.BAlt of the primary barometer, are heights, m, so that their
+# depth points up.
 _EKF = tuple(
     (Entry(("PN", "PE", "PD"), kind), Entry(("VN", "VE", "VD"), kind), Entry(("Roll", "Pitch", "Yaw"), kind, "deg"))
     for kind in ("XKF1", "NKF1")
 )
+_HEIGHTS = (("BAlt", "CTUN"), ("Alt", "BARO"), ("Alt", "CTUN"))
 ARDUPILOT = LogMapping(
     {
         "position": tuple(position for position, _, _ in _EKF),
@@ -30,13 +34,15 @@ ARDUPILOT = LogMapping(
         "attitude": (Entry(("Roll", "Pitch", "Yaw"), "ATT", "deg"), *(attitude for _, _, attitude in _EKF)),
         "angular_velocity": (Entry(("GyrX", "GyrY", "GyrZ"), "IMU", "rad/s"),),
         "specific_force": (Entry(("AccX", "AccY", "AccZ"), "IMU"),),
-        "depth": (Entry(("Alt",), "BARO", frame=_ENU), Entry(("Alt",), "CTUN", frame=_ENU)),
+        "depth": tuple(Entry((column,), kind, frame=_ENU) for column, kind in _HEIGHTS),
         "pulses": tuple(Entry(tuple(f"C{i}" for i in range(1, most + 1)), "RCOU") for most in (14, 12, 8)),
     }
 )
 
 # vehicle_local_position: NED; vehicle_attitude.q: w, x, y, z, FRD to NED; vehicle_odometry has pose_frame 1 for NED,
-# and velocity_frame 1 for NED, 3 for FRD of the body; actuator_motors.control: from -1 to 1, NaN while disarmed.
+# and velocity_frame 1 for NED, 3 for FRD of the body; actuator_motors.control: from -1 to 1, NaN while disarmed. Old
+# files have the rates of the body in vehicle_attitude; those of the gyro have its bias.
+_SPEEDS = ("rollspeed", "pitchspeed", "yawspeed")
 PX4 = LogMapping(
     {
         "position": (
@@ -56,7 +62,9 @@ PX4 = LogMapping(
         "angular_velocity": (
             Entry(_indexed("xyz", 3), "vehicle_angular_velocity"),
             Entry(_indexed("angular_velocity", 3), "vehicle_odometry"),
-            Entry(("rollspeed", "pitchspeed", "yawspeed"), "vehicle_odometry"),
+            Entry(_SPEEDS, "vehicle_odometry"),
+            Entry(_SPEEDS, "vehicle_attitude"),
+            Entry(_indexed("gyro_rad", 3), "sensor_combined"),
         ),
         "specific_force": (Entry(_indexed("accelerometer_m_s2", 3), "sensor_combined"),),
         "duty": (Entry(_indexed("control", 12), "actuator_motors"),),
@@ -82,4 +90,71 @@ ROS2 = LogMapping(
     }
 )
 
-DEFAULTS = {"ArduPilot": ARDUPILOT, "PX4": PX4, "ROS 2 bag": ROS2}
+_ACCELERATIONS = ("xacc", "yacc", "zacc")
+
+
+def _servos(most: int) -> tuple[str, ...]:
+    return tuple(f"servo{i}_raw" for i in range(1, most + 1))
+
+
+# LOCAL_POSITION_NED in m; ATTITUDE in rad, with the rates of the body; accelerations in m/s^2 or mg (those of RAW_IMU
+# as ArduPilot sends them); relative_alt in mm above home, so that its depth points up; pulses in us.
+MAVLINK = LogMapping(
+    {
+        "position": (Entry(("x", "y", "z"), "LOCAL_POSITION_NED"),),
+        "velocity": (Entry(("vx", "vy", "vz"), "LOCAL_POSITION_NED"),),
+        "attitude": (Entry(("roll", "pitch", "yaw"), "ATTITUDE"),),
+        "angular_velocity": (Entry(_SPEEDS, "ATTITUDE"),),
+        "specific_force": (
+            Entry(_ACCELERATIONS, "HIGHRES_IMU"),
+            Entry(_ACCELERATIONS, "RAW_IMU", "mg"),
+            Entry(_ACCELERATIONS, "SCALED_IMU", "mg"),
+        ),
+        "depth": (Entry(("relative_alt",), "GLOBAL_POSITION_INT", "mm", frame=_ENU),),
+        "pulses": tuple(
+            Entry(tuple(f"servo{i}_raw" for i in range(1, most + 1)), "SERVO_OUTPUT_RAW") for most in (16, 8)
+        ),
+    }
+)
+
+DEFAULTS = {"ArduPilot": ARDUPILOT, "PX4": PX4, "ROS 2 bag": ROS2, "MAVLink": MAVLINK}
+
+
+def usual_mapping(recording: Recording) -> tuple[LogMapping, tuple[str, ...]]:
+    """What the messages of a file mean, and what a reader should know of it.
+
+    The parameters of an ArduPilot vehicle say which barometer is in the water, and which channels drive motors.
+    """
+    mapping = DEFAULTS.get(recording.format, LogMapping({}))
+    if recording.format not in ("ArduPilot", "MAVLink"):
+        return mapping, ()
+    signals, notes = dict(mapping.signals), []
+    if recording.format == "ArduPilot":
+        entries, note = _depth(recording)
+        signals["depth"], notes = entries + signals["depth"], [note] if note else []
+    entries, note = _pulses(recording)
+    signals["pulses"] = entries + signals["pulses"]
+    return mapping._replace(signals=signals), tuple(notes + [note] if note else notes)
+
+
+def _depth(recording: Recording) -> tuple[tuple[Entry, ...], str]:
+    """Where the depth of an ArduPilot log stands, before CTUN, and a note where that is a guess."""
+    present, primary = barometers(recording), primary_barometer(recording)
+    height = recording.find("CTUN")
+    if primary or (primary is None and len(present) == 1):
+        return (Entry(("Alt",), primary or present[0], frame=_ENU),), ""
+    if (height is not None and "BAlt" in height[1].fields) or len(present) < 2:
+        return (), ""
+    others = f"{present[0]} is read as depth, the first of {', '.join(present)}"
+    return (), f"{others}: no parameter BARO_PRIMARY of the file says which of them is in the water"
+
+
+def _pulses(recording: Recording) -> tuple[tuple[Entry, ...], str]:
+    """The pulses of the motors in their order, where the parameters tell motors from lights and cameras."""
+    topic, columns = pulse_columns(recording)
+    channels = [channel for channel in motor_channels(recording.parameters).values() if channel in columns]
+    if not channels:
+        return (), ""
+    others = [column for channel, column in columns.items() if channel not in channels]
+    note = f"{topic} {', '.join(others)} are no pulses of motors (SERVOn_FUNCTION) and are left out" if others else ""
+    return (Entry(tuple(columns[channel] for channel in channels), topic),), note

@@ -77,7 +77,7 @@ class Log:
         signals: by name; see `undertow.logs.known_signals` for the names of what other programs measure. A run of
             undertow has those of its result file.
         source: the file.
-        format: `undertow`, `CSV`, `MCAP`, `ROS 2 bag`, `ArduPilot` or `PX4`.
+        format: `undertow`, `CSV`, `MCAP`, `ROS 2 bag`, `ArduPilot`, `MAVLink` or `PX4`.
         notes: what a reader should know: a file without its end, samples left out, frames converted.
         facts: further text by name, such as the scenario of a run.
     """
@@ -171,10 +171,11 @@ def _how_to_add(log: Log, name: str) -> str:
 
 
 def mapping_hint(log: Log, name: str, columns: str, how: str, topic: str = "TOPIC") -> str:
-    """Sentence with a mapping that gives a log a signal, from columns of the file; a CSV file has no topics."""
-    where = "" if log.format == "CSV" else f"topic: {topic}, "
-    entry = f"`signals: {{{name}: {{{where}columns: [{columns}], {how}}}}}`"
-    return f"Add it to the mapping with which the file is read, or was converted, by the file's own columns: {entry}"
+    """Sentence with a mapping that gives a log a signal, from columns of the file if any; a CSV file has no topics."""
+    where = "" if log.format == "CSV" or not columns else f"topic: {topic}, "
+    entry = f"`signals: {{{name}: {{{where}{f'columns: [{columns}], ' if columns else ''}{how}}}}}`"
+    source = ", by the file's own columns" if columns else ""
+    return f"Add it to the mapping with which the file is read, or was converted{source}: {entry}"
 
 
 def check_times(name: str, time: np.ndarray, source: str) -> None:

@@ -3,10 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from undertow.core.errors import BadInput
 from undertow.logs import frames
+from undertow.logs.ardusub_frames import frame_of_columns, motors_of_thrusters
 from undertow.logs.default_mappings import DEFAULTS
+from undertow.logs.known_signals import thruster_columns
 from undertow.logs.log import Log, Series, mapping_hint, missing
 
 _INPUTS = ("commanded_input", "input")
@@ -27,11 +30,16 @@ class LoggedMotion(NamedTuple):
     nu: np.ndarray
 
 
-def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS) -> Series:
+def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS, thruster_matrix: ArrayLike | None = None) -> Series:
     """The input of the thrusters: the first of the named signals that the log has.
 
+    Args:
+        log: with the inputs.
+        names: of the signals that will do.
+        thruster_matrix: of the vehicle, (6, N), body axes; by it the motors of a frame of ArduSub become its thrusters.
+
     Raises:
-        BadInput: it has none of them, or not enough samples.
+        BadInput: it has none of them, or not enough samples; or the motors are not the thrusters of the vehicle.
     """
     found = next((log[name] for name in names if name in log), None)
     if found is None:
@@ -39,12 +47,26 @@ def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS) -> Series:
     good = np.isfinite(found.values).all(axis=1)
     if good.sum() < 2:
         raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(good.sum())}")
-    return found._replace(time=found.time[good], values=found.values[good])
+    found = found._replace(time=found.time[good], values=found.values[good])
+    frame = frame_of_columns(found.columns)
+    return found if not frame else _of_thrusters(found, frame, thruster_matrix)
+
+
+def _of_thrusters(inputs: Series, frame: str, thruster_matrix: ArrayLike | None) -> Series:
+    """Inputs of the motors of a frame as those of the thrusters of a vehicle, in their order and direction."""
+    hint = "Map the column of each thruster instead, negative where it turns the other way: `columns: [C1, -C2, ...]`"
+    if thruster_matrix is None:
+        raise BadInput("plant", f"be a vehicle whose thrusters are the motors of {frame}", "another plant", hint=hint)
+    motors, signs = motors_of_thrusters(frame, thruster_matrix, hint)
+    return inputs._replace(values=signs * inputs.values[:, motors - 1], columns=thruster_columns(len(motors)))
 
 
 def _input_hint(log: Log) -> str:
     """How to map an input: from the commands to speed controllers that the log has, or else from pulses by example."""
     commands = next((name for name in _COMMANDS if name in log), "pulses")
+    if log.format in ("ArduPilot", "MAVLink"):
+        example = mapping_hint(log, "input", "", "frame: vectored_6dof, unit: us, supply: 16")
+        return f"{example}, with the frame of the vehicle (FRAME_CONFIG); `supply` is in V"
     usual = DEFAULTS[log.format].signals.get(commands) if log.format in DEFAULTS else None
     columns, topic = (usual[0].columns, usual[0].topic) if usual else (("pwm1", "pwm2"), "TOPIC")
     how = f"unit: {_COMMANDS[commands]}, supply: 16"

@@ -7,16 +7,15 @@ from pathlib import Path
 from undertow.core.errors import BadInput, within
 from undertow.logs.ardupilot import read_ardupilot
 from undertow.logs.csv_file import read_csv
-from undertow.logs.default_mappings import DEFAULTS
+from undertow.logs.default_mappings import DEFAULTS, usual_mapping
 from undertow.logs.log import Log
-from undertow.logs.mapping import LogMapping, log_of, suited
+from undertow.logs.mapped_log import log_of, suited
+from undertow.logs.mapping import LogMapping
 from undertow.logs.mcap_reader import has_ros_messages, read_mcap
 from undertow.logs.px4 import read_px4
 from undertow.logs.recording import Recording
 from undertow.logs.ros2_bag import read_ros2_bag
 from undertow.logs.run_log import read_run
-
-_NO_MAPPING = LogMapping({})
 
 
 def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[str], str] = lambda name: "") -> Log:
@@ -43,8 +42,9 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
 
 
 def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
-    usual, frames = suited(found, DEFAULTS.get(found.format, _NO_MAPPING))
-    found = found._replace(notes=(*found.notes, *frames))
+    usual, guesses = usual_mapping(found)
+    usual, frames = suited(found, usual)
+    found = found._replace(notes=(*found.notes, *guesses, *frames))
     if mapping is None:
         if not usual.signals:
             hint = f"Give a mapping. It has {_listed(found)}"

@@ -1,6 +1,7 @@
 """What a file holds, as it stands there: tables of named columns, before frames and units are known."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +16,13 @@ class Table(NamedTuple):
         time: s, shape (rows,).
         fields: columns by name, shape (rows,).
         kind: type of the messages, by which a mapping may name them too.
+        texts: the first cell, and where it stands, of the columns that hold text and are therefore no fields.
     """
 
     time: np.ndarray
     fields: Mapping[str, np.ndarray]
     kind: str = ""
+    texts: Mapping[str, str] = MappingProxyType({})
 
 
 class Recording(NamedTuple):
@@ -30,12 +33,14 @@ class Recording(NamedTuple):
         source: name of the file.
         format: as in `Log`.
         notes: as in `Log`.
+        parameters: of the autopilot, by name, where the file has them; the last value of each.
     """
 
     tables: Mapping[str, Table]
     source: str
     format: str
     notes: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = MappingProxyType({})
 
     def find(self, topic: str) -> tuple[str, Table] | None:
         """The table of a topic, or the first whose messages are of a type; None without one."""
@@ -70,4 +75,4 @@ def cleaned(table: Table) -> tuple[Table, int]:
     if not again.any():
         return table, 0
     fields = {name: column[~again] for name, column in table.fields.items()}
-    return Table(table.time[~again], fields, table.kind), int(again.sum())
+    return table._replace(time=table.time[~again], fields=fields), int(again.sum())

@@ -98,7 +98,8 @@ def make(
     if kind in _ADJUSTABLE:
         changes = {key: options.pop(key) for key in list(options) if key not in own}
     if argument := next((name for name in _TABLES if name in own), ""):
-        table = _samples(options, folder, argument, getattr(function, "rows_of_log", None))
+        rows_of_log = getattr(function, "rows_of_log", None)
+        table = _samples(options, folder, argument, rows_of_log and (lambda log: rows_of_log(log, *given)))
     part, resolved = call(function, options, given, folder, context)
     if not isinstance(part, _CONTRACTS[kind]):
         must = f"name a function that returns {_title(_CONTRACTS[kind])}"

@@ -1,0 +1,165 @@
+"""The log that a mapping makes of what a file holds."""
+
+import numpy as np
+
+from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.logs import frames, units
+from undertow.logs.ardupilot_parameters import motor_channels, motor_direction, pulse_columns
+from undertow.logs.ardusub_frames import FRAMES, motor_columns
+from undertow.logs.known_signals import SIGNALS, Known, thruster_columns
+from undertow.logs.log import Log, Series
+from undertow.logs.mapping import INPUTS, Entry, LogMapping, factor_of
+from undertow.logs.recording import Recording, Table, cleaned
+
+
+def log_of(recording: Recording, mapping: LogMapping) -> Log:
+    """The log that a mapping makes of what a file holds. Signals none of whose entries the file has are an error.
+
+    Raises:
+        BadInput: a topic or a column is missing, a time does not increase, or a frame is not the one named.
+    """
+    notes, signals = list(recording.notes), {}
+    for name, entries in mapping.signals.items():
+        with within("signals"), within(name):
+            entries = tuple(_with_motors(entry, recording) for entry in entries)
+            entry = next((one for one in entries if _has(recording, one)), entries[-1])
+            topic, table = recording.table(entry.topic)
+        used, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
+        if repeated:
+            notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
+        with within("signals"), within(name):
+            ours, series = _series(name, entry, topic, used, recording)
+            signals[ours] = series
+    return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
+
+
+def _with_motors(entry: Entry, recording: Recording) -> Entry:
+    """An entry of motors with their columns in the file and with the directions that its parameters give them.
+
+    Raises:
+        BadInput: the file does not say which columns these are.
+    """
+    if not entry.motors:
+        return entry
+    numbers = range(1, len(FRAMES[entry.motors]) + 1)
+    turned = tuple(motor_direction(recording.parameters, number) for number in numbers)
+    if entry.columns:
+        return entry._replace(signs=tuple(sign * other for sign, other in zip(entry.signs, turned, strict=True)))
+    topic, columns = pulse_columns(recording)
+    channels = motor_channels(recording.parameters) or {number: number for number in numbers}  # as ArduSub has it
+    names = [columns.get(channels.get(number, 0), "") for number in numbers]
+    if not all(names):
+        lacking = ", ".join(str(number) for number, name in zip(numbers, names, strict=True) if not name)
+        got = f"{entry.motors}, and {recording.source} has no pulses of motor {lacking}"
+        hint = f"Give the columns of the motors 1 to {len(numbers)} as well: `columns: [C1..C{len(numbers)}]`"
+        raise BadInput("frame", "be that of the vehicle that wrote the log", got, hint=hint)
+    return entry._replace(columns=tuple(names), signs=turned, topic=entry.topic or topic)
+
+
+def suited(recording: Recording, mapping: LogMapping) -> tuple[LogMapping, tuple[str, ...]]:
+    """The mapping without what a file does not have, and a sentence for each topic that has another frame."""
+    kept, notes = {}, []
+    for name, entries in mapping.signals.items():
+        fitting = []
+        for entry in entries:
+            other = _other_frame(recording, entry) if _has(recording, entry) else ""
+            if other:
+                notes.append(f"{entry.topic} is not read as {name}: {other}")
+            elif _has(recording, entry):
+                fitting.append(entry)
+        if fitting:
+            kept[name] = tuple(fitting)
+    return mapping._replace(signals=kept), tuple(notes)
+
+
+def _has(recording: Recording, entry: Entry) -> bool:
+    found = recording.find(entry.topic) if entry.topic else None
+    return found is not None and all(column in found[1].fields for column in entry.columns)
+
+
+def _other_frame(recording: Recording, entry: Entry) -> str:
+    """Where a column has not the number that it must have: which one, and what it is. "" where all have."""
+    _, table = recording.table(entry.topic)
+    for column, number in entry.must:
+        values = table.fields.get(column, np.array([np.nan]))
+        if (values != number).any():
+            return f"its {column} is {values[np.argmax(values != number)]:g}, not {number:g}"
+    return ""
+
+
+def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
+    """The table with the time of one of its columns."""
+    column, unit = time
+    with within("time"):
+        values = _column(table, column, source, "column")
+    return table._replace(time=np.asarray(values, dtype=float) * units.seconds(unit))
+
+
+def _column(table: Table, name: str, source: str, key: str = "columns") -> np.ndarray:
+    if name in table.texts:
+        raise BadInput("log", "hold numbers", table.texts[name])
+    if name not in table.fields:
+        raise BadInput(key, f"be in {source}", name, hint=did_you_mean(name, table.fields))
+    return table.fields[name]
+
+
+def _series(name: str, entry: Entry, topic: str, table: Table, recording: Recording) -> tuple[str, Series]:
+    """A signal in our unit and frame, and its name: quaternions become an attitude."""
+    known, source = SIGNALS[name], recording.source
+    columns = [np.asarray(_column(table, column, source), dtype=float) for column in entry.columns]
+    values = factor_of(name, entry) * _signed(np.stack(columns, axis=1), entry, known)
+    unit, ours, titles = known.unit, name, known.columns
+    if known.columns == ("thruster",):
+        titles = motor_columns(entry.motors) if entry.motors else thruster_columns(len(columns))
+        unit = "N" if entry.unit == "N" else unit
+        if name in INPUTS and entry.supply is not None:
+            values = volts(values, entry, entry.supply)
+    elif known.kind == "quaternion":
+        ours, unit, titles = "attitude", "rad", SIGNALS["attitude"].columns
+        values = frames.attitudes_of_quaternions(values, *entry.frame)
+    else:
+        values = _in_our_frame(values, known, entry.frame)
+    shown = f"{topic} " if topic else ""
+    used = entry.unit or known.unit
+    signed = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
+    named = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signed)
+    origin = f"{shown}{named} ({used}{_frame_note(known, entry.frame)})"
+    return ours, Series(table.time, values[:, 0] if not titles else values, titles, unit, SIGNALS[ours].meaning, origin)
+
+
+def _signed(values: np.ndarray, entry: Entry, known: Known) -> np.ndarray:
+    """Values, with the negative of those columns whose sign is -1. The negative of a pulse is as far from neutral."""
+    if not entry.signs:
+        return values
+    pulses = entry.unit == "us" or (known.unit == "us" and not entry.unit)
+    middle = entry.esc["neutral"] if pulses else 0.0
+    sent = values != 0.0 if pulses else True  # 0 us is no pulse
+    return np.where(sent, middle + np.array(entry.signs) * (values - middle), 0.0)
+
+
+def _in_our_frame(values: np.ndarray, known: Known, frame: tuple[str, str]) -> np.ndarray:
+    world, body = frame
+    if known.kind == "world":
+        return frames.world_vectors(values, world)
+    if known.kind == "body":
+        return frames.body_vectors(values, body)
+    if known.kind == "attitude":
+        return frames.attitudes(values, world, body)
+    return -values if known.kind == "down" and world == "ENU" else values
+
+
+def _frame_note(known: Known, frame: tuple[str, str]) -> str:
+    shown = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
+    note = shown.get(known.kind, f"{frame[1]} in {frame[0]}")
+    return f", {note}" if note else ""
+
+
+def volts(commands: np.ndarray, entry: Entry, supply: float) -> np.ndarray:
+    """Volts of pulses in us, as `ESC.voltage` has them: the share of the supply beyond the dead band; or of a duty.
+
+    A pulse of 0 us is none, at which the speed controller stops the motor.
+    """
+    if entry.unit == "us":
+        offset = np.where(commands == 0.0, 0.0, commands - entry.esc["neutral"])
+        commands = np.where(np.abs(offset) > entry.esc["dead_band"], offset / entry.esc["span"], 0.0)
+    return np.clip(commands, -1.0, 1.0) * supply
