@@ -121,5 +121,7 @@ def _score(
     for axis, unit, errors in zip(AXES, UNITS, found.rms.T, strict=True):
         table.add_row(axis, *(f"{error:.4g}" for error in errors), unit)
     console.print(table)
+    for warning in found.warnings:
+        console.print(f"Warning: {warning}.", highlight=False, soft_wrap=True)
     console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
     return DONE

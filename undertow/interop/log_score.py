@@ -10,22 +10,16 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import checks
-from undertow.core.contracts import Inputs, Outputs
 from undertow.core.errors import BadInput
-from undertow.core.measurement import BODY_OUTPUTS, body_of
-from undertow.core.runtime import on_processor
-from undertow.logs.log import Log, Series
-from undertow.logs.motion import LoggedMotion, inputs_of, motion_of
-from undertow.loop.closed_loop import Realization
-from undertow.numerics.integrators import METHODS
-from undertow.numerics.random_keys import key_of_seed
-from undertow.plants.hybrid_vehicle import HybridVehicle, VehicleState
+from undertow.core.measurement import BODY_OUTPUTS
+from undertow.interop.log_prediction import RUN_IN, logged, predict, starts_of, time_together
+from undertow.interop.log_signs import warnings_of_signs
+from undertow.logs.log import Log
+from undertow.logs.motion import inputs_of, motion_of
+from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
 
 AXES = (*BODY_OUTPUTS, "surge", "sway", "heave", "p", "q", "r")
@@ -34,11 +28,9 @@ UNITS = (*("m",) * 3, *("rad",) * 3, *("m/s",) * 3, *("rad/s",) * 3)
 HORIZONS = (1.0, 5.0, 10.0)  # s
 EVERY = 5.0  # s between starts
 
-_RUN_IN = 2.0  # s; rotors forget within tenths of a second
 _CURVE = 0.1  # s between points of the error over the horizon
 _ROUNDING = 1e-9  # share of a horizon
 _ENDLESS = 1e15  # m, rad, m/s or rad/s; a prediction beyond it has diverged
-_EARLY = 1e-2  # share of the median interval by which a command counts early, as in controllers/replay.py
 
 
 class Score(NamedTuple):
@@ -50,6 +42,7 @@ class Score(NamedTuple):
         starts: times of the log at which the model started, s.
         curve: times after the start, s.
         growth: rms at these times, shape (times, 12).
+        warnings: sentences on thrusters that seem to be mapped wrongly.
     """
 
     horizons: tuple[float, ...]
@@ -57,11 +50,13 @@ class Score(NamedTuple):
     starts: np.ndarray
     curve: np.ndarray
     growth: np.ndarray
+    warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """All of it for a JSON file."""
         rows = {f"{horizon:g}": dict(zip(AXES, row.tolist(), strict=True)) for horizon, row in self._rows()}
-        return {"starts": self.starts.tolist(), "units": dict(zip(AXES, UNITS, strict=True)), "rms": rows}
+        units = dict(zip(AXES, UNITS, strict=True))
+        return {"starts": self.starts.tolist(), "units": units, "rms": rows, "warnings": list(self.warnings)}
 
     def _rows(self):
         return zip(self.horizons, self.rms, strict=True)
@@ -105,27 +100,22 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
     if min(horizons) < spacing * (1 - _ROUNDING):
         raise BadInput("horizons", f"be {spacing:g} s or longer, the step of the curve", f"{min(horizons):g} s")
     steps = math.ceil(max(horizons) / spacing * (1 - _ROUNDING)) * stride
-    starts = _starts(motion, inputs, log, loop.dt * steps, every)
-    before = round(_RUN_IN / loop.dt)
-    times = starts[:, None] + loop.dt * np.arange(-before, steps)
-    with on_processor():
-        realization = built.closed_loop.realize(key_of_seed(built.scenario.seed))
-        given = _Windows(
-            time=jnp.asarray(times - motion.time[0]),
-            inputs=jnp.asarray(held(inputs, times)),
-            before=_states(plant, motion, times[:, 0]),
-            start=_states(plant, motion, starts),
-        )
-        settings = (before, stride, loop.method if loop.method in METHODS else "rk4", loop.substeps)
-        limited = "input" not in log
-        predicted = jax.device_get(_predicted(realization, given, jnp.asarray(loop.dt, dtype=float), limited, settings))
-    after = spacing * np.arange(1, steps // stride + 1)
-    _check_finite(np.asarray(predicted), after, log)
-    errors = np.asarray(predicted, dtype=float) - _logged(motion, starts[:, None] + after)
+    longest = loop.dt * steps
+    starts = starts_of(motion, inputs, longest, every)
+    if not starts.size:
+        got = f"{log.source}, which has both for {time_together(motion, inputs):.4g} s"
+        raise BadInput("log", f"have motion and inputs together for {RUN_IN + longest:g} s or longer", got)
+    limited = "input" not in log
+    as_logged = np.ones((1, plant.inputs()))
+    prediction = predict(built, motion, inputs, starts, steps, stride, limited, as_logged)
+    predicted, after = prediction.motion[0], prediction.after
+    _check_finite(predicted, after, log)
+    errors = np.asarray(predicted, dtype=float) - logged(motion, starts[:, None] + after)
     errors[..., 3:6] -= 2 * np.pi * np.round(errors[..., 3:6] / (2 * np.pi))
     growth = np.sqrt((errors**2).mean(axis=0))
     rms = np.stack([np.interp(horizons, after, column) for column in growth.T], axis=1)
-    return Score(tuple(map(float, horizons)), rms, starts, after, growth)
+    warnings = warnings_of_signs(built, motion, inputs, limited)
+    return Score(tuple(map(float, horizons)), rms, starts, after, growth, warnings)
 
 
 def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:
@@ -139,78 +129,3 @@ def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:
         got = f"{log.source}, with which it diverges within {after[np.argmin(good)]:.4g} s of a start"
         hint = "Check the units of the inputs, and their order: pulses that are declared as volts are 1500 V"
         raise BadInput("log", "have motions and inputs with which the model stays finite", got, hint=hint)
-
-
-class _Windows(NamedTuple):
-    """What the starts differ in; each with a leading axis over them."""
-
-    time: Any  # of each step, s
-    inputs: Any  # held over each step
-    before: VehicleState  # where the rotors are run in
-    start: VehicleState
-
-
-def _starts(motion: LoggedMotion, inputs: Series, log: Log, longest: float, every: float) -> np.ndarray:
-    """Times at which the model starts: samples of the motion, with commands before and a motion to compare after."""
-    first = max(motion.time[0], inputs.time[0]) + _RUN_IN
-    last = min(motion.time[-1], inputs.time[-1]) - longest
-    tolerance = 1e-9 * max(1.0, abs(last))
-    if first > last + tolerance:
-        needed = _RUN_IN + longest
-        got = f"{log.source}, which has both for {last + longest - first + _RUN_IN:.4g} s"
-        raise BadInput("log", f"have motion and inputs together for {needed:g} s or longer", got)
-    asked = np.arange(first, last + tolerance, every)
-    places = np.searchsorted(motion.time, asked - tolerance).clip(0, len(motion.time) - 1)
-    found = np.unique(motion.time[places])
-    return found[found <= last + tolerance]
-
-
-def held(inputs: Series, times: np.ndarray) -> np.ndarray:
-    """Inputs at times: those of the last sample until then."""
-    early = _EARLY * np.median(np.diff(inputs.time))
-    places = np.searchsorted(inputs.time, times + early, side="right") - 1
-    return inputs.values[places.clip(0, len(inputs.time) - 1)]
-
-
-def _logged(motion: LoggedMotion, times: np.ndarray) -> np.ndarray:
-    """Outputs and body velocity of the log at times, linear between samples."""
-    rows = np.hstack([motion.outputs, motion.nu])
-    return np.stack([np.interp(times, motion.time, column) for column in rows.T], axis=-1)
-
-
-def _states(plant: HybridVehicle, motion: LoggedMotion, times: np.ndarray) -> VehicleState:
-    """States of the vehicle at times of the log, rotors at rest."""
-    rows = jnp.asarray(_logged(motion, times))
-
-    def state(row: Outputs) -> VehicleState:
-        return plant.initial_state(row[:6])._replace(nu=row[6:])
-
-    return jax.jit(jax.vmap(state))(rows)
-
-
-@eqx.filter_jit
-def _predicted(realization: Realization, windows: _Windows, dt, limited: bool, settings: tuple[int, int, str, int]):
-    """Outputs and body velocity after every stride of each window."""
-    before, stride, method, substeps = settings
-    plant, integrate = realization.loop.plant, METHODS[method]
-
-    def step(x: VehicleState, given: tuple[Any, Inputs]):
-        t, u = given
-        u = plant.admissible(x, u) if limited else u
-        h = dt / substeps
-        for i in range(substeps):
-            x = integrate(lambda t, x: realization.motion(jnp.asarray(t), x, u), t + i * h, x, h)
-        return x, None
-
-    def several(x: VehicleState, given: tuple[Any, Inputs]):
-        x, _ = jax.lax.scan(step, x, given)
-        y = plant.output(given[0][-1] + dt, x)
-        return x, jnp.concatenate([y.position, body_of(y).nu])
-
-    def window(one: _Windows):
-        ran_in, _ = jax.lax.scan(step, one.before, (one.time[:before], one.inputs[:before]))
-        start = one.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
-        rest = one.time[before:].reshape(-1, stride), one.inputs[before:].reshape(-1, stride, one.inputs.shape[1])
-        return jax.lax.scan(several, start, rest)[1]
-
-    return jax.vmap(window)(windows)
