@@ -1,11 +1,13 @@
-"""Packages that only some formats need, and what their readers print."""
+"""Packages that only some formats need, what their readers print, and why they fail."""
 
 import contextlib
 import importlib.util
 import io
 from collections.abc import Iterator
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, printable
+
+_LONGEST = 160  # characters of a reason
 
 
 def check_installed(package: str, title: str) -> None:
@@ -29,3 +31,9 @@ def quiet(notes: list[str]) -> Iterator[None]:
     if lines:
         more = f" (and {len(lines) - 1} more such messages of the reader)" if len(lines) > 1 else ""
         notes.append(f"{lines[0]}{more}")
+
+
+def reason_of(error: Exception) -> str:
+    """What an error of a reader says, in one line and not too long."""
+    text = printable(str(error)) or type(error).__name__
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."

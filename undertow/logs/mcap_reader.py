@@ -7,20 +7,20 @@ import dataclasses
 import io
 import json
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.logs.log import Log
 from undertow.logs.mcap_writer import METADATA
+from undertow.logs.message_fields import MessageFields
 from undertow.logs.messages import is_ours, number, signals_of
-from undertow.logs.recording import Recording, Table
+from undertow.logs.recording import Recording
 
 _LARGEST = 2**28  # bytes of a record; none of ours comes near
 _LARGEST_CHUNK = 2**26  # bytes of an unpacked chunk: small files can be made that unpack to any size
+_MOST_UNPACKED, _MOST_TIMES = 2**28, 100  # bytes of all chunks, or the size of the file times this if that is more
 
 _HEAD = struct.Struct("<BQ")  # of a record: its kind, and the bytes that follow
 _DATA_END, _IN_CHUNKS = 0x0F, (0x03, 0x04, 0x05)  # kinds; chunks hold schemas, channels and messages
@@ -29,11 +29,13 @@ _DATA_END, _IN_CHUNKS = 0x0F, (0x03, 0x04, 0x05)  # kinds; chunks hold schemas, 
 class _Contents(NamedTuple):
     """Messages of a file by topic."""
 
-    messages: dict[str, list[tuple[int, Any]]]  # time in ns, and what the JSON says
+    ours: dict[str, list[Any]]  # what the JSON says
+    others: dict[str, MessageFields]
+    left_out: dict[str, str]
     schemas: dict[str, tuple[str, Any]]  # name and what it says, by topic
     facts: dict[str, str]
     encodings: set[str]
-    notes: tuple[str, ...]
+    notes: list[str]
 
 
 def has_ros_messages(path: Path) -> bool:
@@ -42,7 +44,7 @@ def has_ros_messages(path: Path) -> bool:
     Raises:
         BadInput: damaged before it.
     """
-    for record in _records(path, []):
+    for record in records(path, []):
         if type(record).__name__ == "Channel":
             return record.message_encoding == "cdr"
     return False
@@ -56,38 +58,29 @@ def read_mcap(path: Path) -> Log | Recording:
     """
     found = _contents(path)
     others = found.encodings - {"json"}
-    if not found.messages:
+    if not found.ours and not found.others:
         got = f"whose messages are {', '.join(sorted(others))}" if others else "which has none"
         if found.notes:
             got = f"{got} before it ends: {found.notes[-1]}"
         raise BadInput("log", "have messages in JSON", f"{path.name}, {got}")
-    ours = {topic: messages for topic, messages in found.messages.items() if is_ours(found.schemas[topic][0])}
-    if ours:
-        return _our_log(path, found, ours)
-    notes = (*found.notes, *(f"channels in {one} are left out" for one in sorted(others)))
-    tables = {topic: _table(messages, found.schemas[topic][0]) for topic, messages in found.messages.items()}
-    return Recording(tables, path.name, "MCAP", notes)
+    if found.ours:
+        return _our_log(path, found)
+    notes = [*found.notes, *(f"channels in {encoding} are left out" for encoding in sorted(others))]
+    notes += [f"{topic} is left out: {reason}" for topic, reason in found.left_out.items()]
+    tables = {topic: fields.table() for topic, fields in found.others.items()}
+    return Recording(tables, path.name, "MCAP", tuple(notes), left_out=found.left_out)
 
 
-def _our_log(path: Path, found: _Contents, ours: Mapping[str, list[tuple[int, Any]]]) -> Log:
+def _our_log(path: Path, found: _Contents) -> Log:
     facts, signals = dict(found.facts), {}
-    for topic, messages in ours.items():
+    for topic, messages in found.ours.items():
         try:
-            signals |= signals_of(found.schemas[topic][1], [message for _, message in messages])
+            signals |= signals_of(found.schemas[topic][1], messages)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(path, f"messages of {topic}: {error}") from None
     kept = tuple(filter(None, facts.pop("notes", "").split("\n")))
     facts.pop("source", "")
     return Log(signals, path.name, facts.pop("format", "undertow"), (*kept, *found.notes), facts)
-
-
-def _table(messages: list[tuple[int, Any]], kind: str) -> Table:
-    """Numbers of all messages of a topic; NaN where a message lacks one."""
-    rows = [dict(_leaves(message, "")) for _, message in messages]
-    names = dict.fromkeys(name for row in rows for name in row)
-    time = np.array([stamp for stamp, _ in messages], dtype=np.int64)
-    fields = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Table(time * 1e-9, fields, kind)
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, float]]:
@@ -103,31 +96,43 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, float]]:
 
 
 def _contents(path: Path) -> _Contents:
-    notes: list[str] = []
-    schemas, channels, facts = {}, {}, {}
-    messages: dict[str, list[tuple[int, Any]]] = {}
-    encodings: set[str] = set()
-    for record in _records(path, notes):
+    contents = _Contents({}, {}, {}, {}, {}, set(), [])
+    schemas, channels = {}, {}
+    for record in records(path, contents.notes):
         kind = type(record).__name__
         if kind == "Schema":
             schemas[record.id] = record
         elif kind == "Channel":
             channels[record.id] = record
-            encodings.add(record.message_encoding)
+            contents.encodings.add(record.message_encoding)
         elif kind == "Metadata" and record.name == METADATA:
-            facts |= record.metadata
+            contents.facts.update(record.metadata)
         elif kind == "Message":
             channel = channels.get(record.channel_id)
             if channel is None:
                 raise _damaged(path, f"a message of channel {record.channel_id}, which is not declared")
-            if channel.message_encoding == "json":
-                messages.setdefault(channel.topic, []).append((record.log_time, _parsed(path, record.data)))
-    described = {}
+            if channel.message_encoding == "json" and channel.topic not in contents.left_out:
+                schema = schemas.get(channel.schema_id)
+                name = schema.name if schema is not None else ""
+                _add(contents, channel.topic, name, record.log_time, _parsed(path, record.data))
     for channel in channels.values():
         schema = schemas.get(channel.schema_id)
         text = _parsed(path, schema.data) if schema is not None and schema.encoding == "jsonschema" else {}
-        described[channel.topic] = (schema.name if schema is not None else "", text)
-    return _Contents(messages, described, facts, encodings, tuple(notes))
+        contents.schemas[channel.topic] = (schema.name if schema is not None else "", text)
+    return contents
+
+
+def _add(contents: _Contents, topic: str, schema: str, nanoseconds: int, message: Any) -> None:
+    """Add a message to the contents. Those of others are kept as numbers at once, which are smaller."""
+    if is_ours(schema):
+        contents.ours.setdefault(topic, []).append(message)
+        return
+    fields = contents.others.setdefault(topic, MessageFields(schema))
+    try:
+        fields.add(nanoseconds, len(fields.stamps), _leaves(message, ""))
+    except (ValueError, OverflowError) as error:
+        contents.left_out[topic] = str(error)
+        del contents.others[topic]
 
 
 def _parsed(path: Path, data: bytes) -> Any:
@@ -137,12 +142,21 @@ def _parsed(path: Path, data: bytes) -> Any:
         raise _damaged(path, f"a message is no JSON: {error}") from None
 
 
-def _records(path: Path, notes: list[str]) -> Iterator[Any]:
-    """Records of the data section. A file that ends early gives those that are whole, and a note."""
+def records(path: Path, notes: list[str]) -> Iterator[Any]:
+    """Records of the data section of a file, those within chunks as if they stood alone.
+
+    Args:
+        path: of the file. One that ends early gives the records that are whole.
+        notes: to which a sentence is added where it ends early.
+
+    Raises:
+        BadInput: the file is damaged, or unpacks to far more than its size.
+    """
     from mcap.stream_reader import StreamReader
 
     data = path.read_bytes()
     size, stream = len(data), io.BytesIO(_without_zeros(path, data))
+    unpacked, most = 0, max(_MOST_UNPACKED, _MOST_TIMES * size)
     end = stream.getbuffer().nbytes
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST)
     records = iter(reader.records)
@@ -158,6 +172,10 @@ def _records(path: Path, notes: list[str]) -> Iterator[Any]:
             raise _damaged(path, f"at byte {place}: {str(error) or type(error).__name__}") from None
         if record is None or type(record).__name__ == "DataEnd":
             return
+        unpacked += getattr(record, "uncompressed_size", 0)
+        if unpacked > most:
+            what = f"chunks of {unpacked} bytes in all, more than the {most} that are read of a file of this size"
+            raise _damaged(path, f"at byte {place}: {what}")
         place = stream.tell()
         yield from parts
 
@@ -195,25 +213,27 @@ def _broken_up(chunk: Any) -> list[Any]:
     from mcap.stream_reader import breakup_chunk
 
     size = chunk.uncompressed_size
-    data = _unpacked(chunk.compression, chunk.data) if size <= _LARGEST_CHUNK else b""
-    if max(size, len(data)) > _LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {max(size, len(data))} bytes, more than the {_LARGEST_CHUNK} that are read")
+    if size > _LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes, more than the {_LARGEST_CHUNK} that are read")
+    data = _unpacked(chunk.compression, chunk.data, size)
+    if len(data) != size:
+        raise ValueError(f"a chunk of {'more' if len(data) > size else 'fewer'} than the {size} bytes that it declares")
     other = _first_other(data, 0, _IN_CHUNKS)
     if other < len(data):
         raise ValueError(f"a record of kind {data[other]} in a chunk, where there is none of it")
     return breakup_chunk(dataclasses.replace(chunk, compression="", data=data), validate_crc=True)
 
 
-def _unpacked(compression: str, data: bytes) -> bytes:
-    """The data of a chunk, or a little more of it than is read. The size that the file declares may be a lie."""
+def _unpacked(compression: str, data: bytes, size: int) -> bytes:
+    """The data of a chunk, or one byte more than the size that it declares, which may be a lie."""
     if compression == "zstd":
         import zstandard
 
-        return zstandard.ZstdDecompressor().stream_reader(data).read(_LARGEST_CHUNK + 1)
+        return zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
     if compression == "lz4":
         import lz4.frame
 
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=_LARGEST_CHUNK + 1)
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
     return data
 
 

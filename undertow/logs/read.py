@@ -1,21 +1,25 @@
 """Reads a log of any known format, with a mapping or with what the messages of that format mean."""
 
 import contextlib
-from collections.abc import Callable
+import functools
+import itertools
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from undertow.core.errors import BadInput, within
 from undertow.logs.ardupilot import read_ardupilot
 from undertow.logs.csv_file import read_csv
-from undertow.logs.default_mappings import DEFAULTS, usual_mapping
+from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mapping
 from undertow.logs.log import Log
 from undertow.logs.mapped_log import log_of, suited
 from undertow.logs.mapping import LogMapping
 from undertow.logs.mcap_reader import has_ros_messages, read_mcap
 from undertow.logs.px4 import read_px4
-from undertow.logs.recording import Recording
+from undertow.logs.recording import Recording, Table
 from undertow.logs.ros2_bag import read_ros2_bag
 from undertow.logs.run_log import read_run
+
+_SHOWN_TOPICS, _SHOWN_COLUMNS = 4, 6  # in an error
 
 
 def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[str], str] = lambda name: "") -> Log:
@@ -32,13 +36,20 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
     if not path.exists():
         raise BadInput("log", "be an existing file", str(path))
     with _readable(path):
-        found = _reader(path)(path)
+        found = _reader(path, _names(mapping))(path)
     if isinstance(found, Log):
         if mapping is not None:
             got = f"given for {found.source}, which holds them by name"
             raise BadInput("mapping", "be left out for a log whose signals are known", got)
         return found
     return _mapped(found, mapping, location)
+
+
+def _names(mapping: LogMapping | None) -> set[str]:
+    """Topics and types that are looked for in a bag or a telemetry log; "" where the only topic is meant."""
+    given = () if mapping is None else mapping.signals.values()
+    usual = (ROS2.signals.values(), MAVLINK.signals.values())
+    return {entry.topic for entries in (*given, *usual[0], *usual[1]) for entry in entries if not entry.motors}
 
 
 def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
@@ -75,22 +86,28 @@ def _replaced(name: str, mapping: LogMapping) -> bool:
 
 
 def _listed(found: Recording) -> str:
-    names = [
-        f"{topic or 'columns'} ({', '.join(list(table.fields)[:6])}, ...)" for topic, table in found.tables.items()
-    ]
-    return "; ".join(names[:4])
+    names = [f"{topic or 'columns'} ({_columns(table)})" for topic, table in found.tables.items()]
+    names += [f"{topic}, which is left out: {reason}" for topic, reason in found.left_out.items()]
+    return "; ".join(names[:_SHOWN_TOPICS]) + ("; ..." if len(names) > _SHOWN_TOPICS else "")
 
 
-def _reader(path: Path) -> Callable[[Path], Log | Recording]:
+def _columns(table: Table) -> str:
+    """Names of the columns of a table, or of the first of them."""
+    names = list(itertools.islice(table.fields, _SHOWN_COLUMNS))
+    more = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []
+    return ", ".join([*names, *more]) or "no numbers"
+
+
+def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Recording]:
     if path.is_dir():
         if not (path / "metadata.yaml").is_file():
             raise BadInput("log", "be a file, or the folder of a bag of ROS 2", f"{path}, without metadata.yaml")
-        return read_ros2_bag
+        return functools.partial(read_ros2_bag, names=names)
     suffix = path.suffix.lower()
     if suffix == ".mcap":
-        return read_ros2_bag if has_ros_messages(path) else read_mcap
+        return functools.partial(read_ros2_bag, names=names) if has_ros_messages(path) else read_mcap
     known = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
-    known |= {".db3": read_ros2_bag}
+    known |= {".db3": functools.partial(read_ros2_bag, names=names)}
     if suffix not in known:
         raise BadInput("log", f"be one of .mcap, {', '.join(known)}, or the folder of a bag", path.name)
     return known[suffix]

@@ -1,6 +1,6 @@
 """What a file holds, as it stands there: tables of named columns, before frames and units are known."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -34,6 +34,7 @@ class Recording(NamedTuple):
         format: as in `Log`.
         notes: as in `Log`.
         parameters: of the autopilot, by name, where the file has them; the last value of each.
+        left_out: reason why a topic of the file is no table, by name.
     """
 
     tables: Mapping[str, Table]
@@ -41,6 +42,7 @@ class Recording(NamedTuple):
     format: str
     notes: tuple[str, ...] = ()
     parameters: Mapping[str, float] = MappingProxyType({})
+    left_out: Mapping[str, str] = MappingProxyType({})
 
     def find(self, topic: str) -> tuple[str, Table] | None:
         """The table of a topic, or the first whose messages are of a type; None without one."""
@@ -58,6 +60,10 @@ class Recording(NamedTuple):
         if not topic and len(self.tables) == 1:
             return next(iter(self.tables.items()))
         found = self.find(topic)
+        if found is None and topic in self.left_out:
+            raise BadInput(
+                "topic", "name messages that can be read", f"{topic} of {self.source}: {self.left_out[topic]}"
+            )
         if found is None:
             got = f"not in {self.source}"
             raise BadInput(
@@ -69,10 +75,28 @@ class Recording(NamedTuple):
         return found
 
 
+class _Rows(Mapping[str, np.ndarray]):
+    """Some rows of the columns of a table, taken when a column is asked for."""
+
+    def __init__(self, fields: Mapping[str, np.ndarray], rows: np.ndarray):
+        self._fields, self._rows = fields, rows
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._fields[name][self._rows]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._fields
+
+    def __len__(self) -> int:
+        return len(self._fields)
+
+
 def cleaned(table: Table) -> tuple[Table, int]:
     """The table without samples of the same time as the one before, and how many these were."""
     again = np.concatenate([[False], np.diff(table.time) == 0])
     if not again.any():
         return table, 0
-    fields = {name: column[~again] for name, column in table.fields.items()}
-    return table._replace(time=table.time[~again], fields=fields), int(again.sum())
+    return table._replace(time=table.time[~again], fields=_Rows(table.fields, ~again)), int(again.sum())

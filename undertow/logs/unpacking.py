@@ -1,0 +1,46 @@
+"""Unpacks what is compressed as Zstandard, up to a size: small files can be made that unpack to any size."""
+
+from pathlib import Path
+
+_MAGIC = b"\x28\xb5\x2f\xfd"  # which begins no message in CDR
+_LARGEST = 2**26  # bytes of a message
+_MOST, _TIMES = 2**28, 100  # bytes of a file, or the size of the packed one times this if that is more
+_PIECE = 2**16
+
+
+def unpacked(data: bytes) -> bytes:
+    """The bytes of a message, which some bags compress.
+
+    Raises:
+        ValueError: they are too many.
+    """
+    if not data.startswith(_MAGIC):
+        return data
+    import zstandard
+
+    reader, whole = zstandard.ZstdDecompressor().stream_reader(data), bytearray()
+    while piece := reader.read(_PIECE):
+        whole += piece
+        if len(whole) > _LARGEST:
+            raise ValueError(f"a message of more than the {_LARGEST} bytes that are read")
+    return bytes(whole)
+
+
+def unpacked_file(file: Path, folder: Path) -> Path:
+    """A compressed file, unpacked into a folder under its name without the last suffix.
+
+    Raises:
+        ValueError: it is too large.
+    """
+    import zstandard
+
+    most = max(_MOST, _TIMES * file.stat().st_size)
+    target, size = folder / file.stem, 0
+    with file.open("rb") as packed, target.open("wb") as stream:
+        reader = zstandard.ZstdDecompressor().stream_reader(packed)
+        while piece := reader.read(_PIECE):
+            size += len(piece)
+            if size > most:
+                raise ValueError(f"{file.name} unpacks to more than the {most} bytes that are read of it")
+            stream.write(piece)
+    return target
