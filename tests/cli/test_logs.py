@@ -102,6 +102,16 @@ def test_a_line_of_the_mapping_is_named(tmp_path, capsys, monkeypatch):
         assert said in capsys.readouterr().err
 
 
+def test_times_since_1970(tmp_path, capsys):
+    """Six digits would be the same for all of them."""
+    (tmp_path / "dive.csv").write_text("t,depth\n" + "".join(f"{1710773350.35 + k / 8},{k}\n" for k in range(9)))
+    (tmp_path / "dive.yaml").write_text("time: t\nsignals: {depth: {columns: depth}}\n")
+    assert run(["logs", str(tmp_path / "dive.csv"), "--mapping", str(tmp_path / "dive.yaml")]) == 0
+    said = capsys.readouterr().out
+    assert "1710773350.350" in said and "1710773351.350" in said
+    assert "times are from 2024-03-18 14:49:10 to 2024-03-18 14:49:11 UTC" in said
+
+
 def test_the_score(folder, capsys, monkeypatch):
     """Against itself the model is as near as its records are; the results hold what is printed."""
     monkeypatch.chdir(folder)

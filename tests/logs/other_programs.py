@@ -1,7 +1,7 @@
 """Files as other programs write them, made byte by byte from the description of their formats.
 
 ArduPilot: libraries/AP_Logger/LogStructure.h (FMT, FMTU, and the messages). PX4: docs.px4.io/main/en/dev_log/
-ulog_file_format. ROS 2: rosbags, a package of others.
+ulog_file_format. ROS 2: rosbags, a package of others. MAVLink: frames by pymavlink, and before each its time.
 """
 
 import json
@@ -116,3 +116,18 @@ def json_mcap(path, channels, encoding="json"):
             for ns, message in messages:
                 writer.add_message(channel, ns, json.dumps(message).encode(), ns)
         writer.finish()
+
+
+def mavlink_tlog(messages, version=2):
+    """Bytes of a .tlog file. `messages`: (us, (system, component), name, fields) each, in this order."""
+    from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+    out, senders = b"", {}
+    for microseconds, sender, name, fields in messages:
+        link = senders.setdefault(sender, dialect.MAVLink(None, *sender))
+        kind = next(one for one in dialect.mavlink_map.values() if one.msgname == name)
+        values = {field: fields.get(field, 0) for field in kind.fieldnames}
+        values |= {"param_id": fields["param_id"]} if "param_id" in fields else {}
+        packed = kind(**values).pack(link, force_mavlink1=version == 1)
+        out += struct.pack(">Q", microseconds) + bytes(packed)
+    return out

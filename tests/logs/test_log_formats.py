@@ -99,6 +99,23 @@ def ulg_file(path, odometry=False, velocity=VELOCITY, frame=1):
     return path
 
 
+def test_old_px4(tmp_path):
+    """Before vehicle_angular_velocity: rates in vehicle_attitude, or those of the gyro."""
+    clock, floats = MICROSECONDS.tolist(), lambda several: [tuple(map(float, row)) for row in several]
+    quaternion = floats(np.roll(TURNED.as_quat(), 1, axis=1))
+    gyro = (
+        "sensor_combined",
+        0,
+        "uint64_t timestamp;float[3] gyro_rad;",
+        [(t, *w) for t, w in zip(clock, floats(RATES + 1), strict=True)],
+    )
+    fields = "uint64_t timestamp;float rollspeed;float pitchspeed;float yawspeed;float[4] q;"
+    attitude = ("vehicle_attitude", 0, fields, [(t, *w, *q) for t, w, q in zip(clock, floats(RATES), quaternion, strict=True)])  # fmt: skip
+    for topics, expected in (([gyro], RATES + 1), ([gyro, attitude], RATES)):
+        (tmp_path / "old.ulg").write_bytes(px4_ulg(topics))
+        close(read_log(tmp_path / "old.ulg")["angular_velocity"], expected)
+
+
 def bag(folder, storage):
     quaternion = np.roll(Rotation.from_matrix(ENU_OF_NED @ TURNED.as_matrix() @ FLU_OF_FRD).as_quat(), 1, axis=1)
     start = 1_700_000_000 * 10**9
@@ -248,6 +265,22 @@ def test_csv_with_any_header(tmp_path):
     close(log["angular_velocity"], RATES, 1e-12)
     close(log["depth"], POSITION[:, 2], 1e-12)
     np.testing.assert_array_equal(log["pulses"].values, PULSES)
+
+
+def test_columns_of_text_in_a_csv_file(tmp_path):
+    """Clock times and words refuse the file only where a mapping names their column."""
+    rows = "".join(f"{k},10:50:{k:02d},{'ROV' if k else ''},{k / 2}\n" for k in range(10))
+    (tmp_path / "dive.csv").write_text("s,clock,name,depth\n" + rows)
+    signals = {"signals": {"depth": {"columns": "depth"}}}
+    log = read_log(tmp_path / "dive.csv", mapping_of(signals | {"time": "s"}))
+    close(log["depth"], np.arange(10) / 2)
+    assert log.notes == ("columns of text are left out: clock, name",)
+    with pytest.raises(
+        BadInput, match=r"time.column` must hold numbers, but is dive.csv, line 2, column clock: 10:50:00"
+    ):
+        read_log(tmp_path / "dive.csv", mapping_of(signals | {"time": "clock"}))
+    with pytest.raises(BadInput, match=r"columns` must hold numbers, but is dive.csv, line 3, column name: ROV"):
+        read_log(tmp_path / "dive.csv", mapping_of({"time": "s", "signals": {"depth": {"columns": "name"}}}))
 
 
 def test_json_of_others(tmp_path):

@@ -1,6 +1,7 @@
 """`undertow logs`: what is in a log, conversion to MCAP or CSV, a layout for Foxglove, and the score of a model."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 from rich.console import Console
@@ -17,6 +18,8 @@ from undertow.scenario.log_file import read_log
 _LAYOUT = Path("undertow-foxglove.json")
 _NUMBERS = ("samples", "rate, Hz", "from, s", "to, s", "gaps", "longest, s", "missing")
 _SHOWN = 3  # names of columns
+_LONG = 1e5  # s; longer times are those of a clock
+_UNIX = (9e8, 4.1e9)  # s since 1970, from 1998 to 2099
 _SCORED = ("score.json", "figures")
 
 
@@ -70,6 +73,8 @@ def _print(log: Log, console: Console) -> None:
         table.add_row(*(row[i] for i in kept))
     console.print(table)
     console.print("World axes are north, east, down; body axes forward, starboard, down.", highlight=False)
+    if dates := _dates(log):
+        console.print(dates, highlight=False)
     for note in log.notes:
         console.print(f"Note: {note}.", highlight=False, soft_wrap=True)
 
@@ -78,10 +83,24 @@ def _row(log: Log, name: str) -> tuple[str, ...]:
     series, how = log[name], log.sampling(name)
     names = series.column_names()
     shown = ", ".join(names) if len(names) <= _SHOWN else f"{names[0]}, ..., {names[-1]} ({len(names)})"
-    times = f"{how.start:.6g}", f"{how.end:.6g}"
+    times = _clock(how.start), _clock(how.end)
     gaps = (str(how.gaps), f"{how.longest_gap:.3g}") if how.gaps else ("", "")
     missing = f"{100 * how.missing:.3g} %" if how.missing else ""
     return name, shown, series.unit, str(how.samples), f"{how.rate:.4g}", *times, *gaps, missing, series.origin
+
+
+def _clock(seconds: float) -> str:
+    """A time in s. Six digits tell no two Unix times apart, and so these have milliseconds."""
+    return f"{seconds:.6g}" if abs(seconds) < _LONG else f"{seconds:.3f}"
+
+
+def _dates(log: Log) -> str:
+    """The dates of the first and last sample, where times seem to be seconds since 1970; "" otherwise."""
+    ends = [time for series in log.signals.values() if len(series.time) for time in (series.time[0], series.time[-1])]
+    if not ends or not _UNIX[0] < min(ends) <= max(ends) < _UNIX[1]:
+        return ""
+    first, last = (datetime.fromtimestamp(time, UTC) for time in (min(ends), max(ends)))
+    return f"As seconds since 1970, times are from {first:%Y-%m-%d %H:%M:%S} to {last:%Y-%m-%d %H:%M:%S} UTC."
 
 
 def _layout(out: Path, overwrite: bool) -> int:

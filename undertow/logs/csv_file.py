@@ -17,6 +17,7 @@ from undertow.logs.log import Log, Series
 from undertow.logs.recording import Recording, Table
 
 _TIME = "time [s]"
+_WORDS = {"true": 1.0, "false": 0.0, "": np.nan}
 _OURS = re.compile(r"(?P<signal>[a-z_0-9]+)(?:\.(?P<column>[^\[\]]+))? \[(?P<unit>[^\[\]]*)\]")
 
 
@@ -50,13 +51,17 @@ def read_csv(path: Path) -> Log | Recording:
     """What a file holds: a log where `write_csv` wrote it, otherwise one table of its columns.
 
     Raises:
-        BadInput: not text, without rows, rows of different length, or cells that are no numbers.
+        BadInput: not text, without rows, rows of different length, or cells of ours that are no numbers.
     """
-    header, numbers, empty, notes = _read(path)
-    fields = {name: numbers[:, i] for i, name in enumerate(header)}
+    header, numbers, empty, texts, notes = _read(path)
     if header[0] == _TIME and all(_OURS.fullmatch(name) for name in header[1:]):
+        if texts:
+            raise BadInput("log", "hold numbers", next(iter(texts.values())))
         return _our_log(path, header, numbers, empty, notes)
-    return Recording({"": Table(np.arange(len(numbers), dtype=float), fields)}, path.name, "CSV")
+    fields = {name: numbers[:, i] for i, name in enumerate(header) if name not in texts}
+    table = Table(np.arange(len(numbers), dtype=float), fields, texts=texts)
+    left_out = (f"columns of text are left out: {', '.join(texts)}",) if texts else ()
+    return Recording({"": table}, path.name, "CSV", left_out)
 
 
 def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray, notes: tuple[str, ...]) -> Log:
@@ -75,8 +80,8 @@ def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarr
     return Log(signals, path.name, "CSV", notes)
 
 
-def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Header, numbers, which cells are empty, and notes."""
+def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str], tuple[str, ...]]:
+    """Header, numbers, which cells are empty, the first cell of columns that hold text, and notes."""
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -97,8 +102,9 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, tuple[str, ...
     again, times = Counter(header).most_common(1)[0]
     if times > 1:
         raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs {times} times")
-    numbers = np.array([_numbers(path.name, line, row, header) for line, row in numbered[1:]])
-    return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), notes
+    texts: dict[str, str] = {}
+    numbers = np.array([_numbers(path.name, line, row, header, texts) for line, row in numbered[1:]])
+    return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), texts, notes
 
 
 def _delimiter(text: str) -> str:
@@ -107,18 +113,16 @@ def _delimiter(text: str) -> str:
     return max(",;\t", key=first.count)
 
 
-def _numbers(name: str, line: int, row: list[str], header: list[str]) -> list[float]:
+def _numbers(name: str, line: int, row: list[str], header: list[str], texts: dict[str, str]) -> list[float]:
+    """Numbers of a row, NaN where a cell is empty or text; the first text of each column is added to `texts`."""
     if len(row) != len(header):
         raise BadInput("log", f"have {len(header)} cells in every row", f"{name}, line {line} with {len(row)}")
-    found = []
+    values = []
     for title, cell in zip(header, row, strict=True):
         try:
-            found.append(number_in(cell) if cell else np.nan)
+            values.append(_WORDS[cell.lower()] if cell.lower() in _WORDS else number_in(cell))
         except ValueError:
-            words = {"true": 1.0, "false": 0.0}
-            if cell.lower() not in words:
-                hint = "Write decimal points" if cell.replace(",", "").isdecimal() else ""
-                got = f"{name}, line {line}, column {title}: {cell}"
-                raise BadInput("log", "hold numbers", got, hint=hint) from None
-            found.append(words[cell.lower()])
-    return found
+            remedy = ", which needs a decimal point" if cell.replace(",", "").isdecimal() else ""
+            texts.setdefault(title, f"{name}, line {line}, column {title}: {cell}{remedy}")
+            values.append(np.nan)
+    return values

@@ -97,7 +97,7 @@ def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
 
 def _column(table: Table, name: str, source: str, key: str = "columns") -> np.ndarray:
     if name in table.texts:
-        raise BadInput("log", "hold numbers", table.texts[name])
+        raise BadInput(key, "hold numbers", table.texts[name])
     if name not in table.fields:
         raise BadInput(key, f"be in {source}", name, hint=did_you_mean(name, table.fields))
     return table.fields[name]

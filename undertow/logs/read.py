@@ -13,6 +13,7 @@ from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mappin
 from undertow.logs.log import Log
 from undertow.logs.mapped_log import log_of, suited
 from undertow.logs.mapping import LogMapping
+from undertow.logs.mavlink_log import read_mavlink
 from undertow.logs.mcap_reader import has_ros_messages, read_mcap
 from undertow.logs.px4 import read_px4
 from undertow.logs.recording import Recording, Table
@@ -26,7 +27,8 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
     """The log in a file.
 
     Args:
-        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .ulg (PX4), .db3, or the folder of a bag of ROS 2.
+        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .tlog (MAVLink), .ulg (PX4), .db3, or the folder of a bag of
+            ROS 2.
         mapping: where signals stand; they go before those that the format itself explains.
         location: file and line of a key of the mapping.
 
@@ -108,6 +110,7 @@ def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Record
         return functools.partial(read_ros2_bag, names=names) if has_ros_messages(path) else read_mcap
     known = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
     known |= {".db3": functools.partial(read_ros2_bag, names=names)}
+    known |= {".tlog": functools.partial(read_mavlink, names=names)}
     if suffix not in known:
         raise BadInput("log", f"be one of .mcap, {', '.join(known)}, or the folder of a bag", path.name)
     return known[suffix]

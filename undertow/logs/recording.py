@@ -99,4 +99,9 @@ def cleaned(table: Table) -> tuple[Table, int]:
     again = np.concatenate([[False], np.diff(table.time) == 0])
     if not again.any():
         return table, 0
-    return table._replace(time=table.time[~again], fields=_Rows(table.fields, ~again)), int(again.sum())
+    return rows_of(table, ~again), int(again.sum())
+
+
+def rows_of(table: Table, rows: np.ndarray) -> Table:
+    """The table of some rows, by their numbers or by whether each is taken."""
+    return table._replace(time=table.time[rows], fields=_Rows(table.fields, rows))
