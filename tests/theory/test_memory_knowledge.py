@@ -1,5 +1,7 @@
 """What was learnt has names, survives a file, and enters the bound of the estimation error."""
 
+import tracemalloc
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -242,3 +244,15 @@ def test_the_run_says_what_was_learnt(dives):
     names = regressor_names(["x"], 5, "both", body=False)
     assert strongest(weights, variance, names, ["x"])[0].regressor == names[largest]
     assert found["memory_trust"] == run["memory_trust"].values.min(0).tolist()
+
+
+def test_a_small_file_of_many_bytes(tmp_path):
+    """Whole numbers of a byte each would take eight times their size, twice, before anything is found wrong."""
+    ones = np.ones((1000, 15_000), dtype=np.uint8)
+    np.savez_compressed(tmp_path / "large.npz", weights=ones, variance=np.ones(1000, dtype=np.uint8))
+    assert (tmp_path / "large.npz").stat().st_size < 50_000
+    tracemalloc.start()
+    with pytest.raises(BadInput, match="be a file of `save_knowledge`"):
+        load_knowledge(tmp_path / "large.npz")
+    assert tracemalloc.get_traced_memory()[1] < 5e7
+    tracemalloc.stop()

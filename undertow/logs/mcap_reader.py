@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput
+from undertow.core.unpacked_size import most_unpacked
 from undertow.logs.log import Log
 from undertow.logs.mcap_writer import METADATA
 from undertow.logs.message_fields import MessageFields
@@ -20,7 +21,6 @@ from undertow.logs.recording import Recording
 
 _LARGEST = 2**28  # bytes of a record; none of ours comes near
 _LARGEST_CHUNK = 2**26  # bytes of an unpacked chunk: small files can be made that unpack to any size
-_MOST_UNPACKED, _MOST_TIMES = 2**28, 100  # bytes of all chunks, or the size of the file times this if that is more
 
 _HEAD = struct.Struct("<BQ")  # of a record: its kind, and the bytes that follow
 _DATA_END, _IN_CHUNKS = 0x0F, (0x03, 0x04, 0x05)  # kinds; chunks hold schemas, channels and messages
@@ -156,7 +156,7 @@ def records(path: Path, notes: list[str]) -> Iterator[Any]:
 
     data = path.read_bytes()
     size, stream = len(data), io.BytesIO(_without_zeros(path, data))
-    unpacked, most = 0, max(_MOST_UNPACKED, _MOST_TIMES * size)
+    unpacked, most = 0, most_unpacked(size)
     end = stream.getbuffer().nbytes
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST)
     records = iter(reader.records)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from undertow.core.errors import BadInput
+from undertow.core.unpacked_size import size_complaint
 from undertow.logs.known_signals import thruster_columns
 from undertow.logs.log import Log, Series
 from undertow.logs.messages import group_of
@@ -59,6 +60,8 @@ def read_run(path: Path) -> Log:
 
     try:
         with xr.open_dataset(path, engine="netcdf4") as run:
+            if complaint := size_complaint(path, run.nbytes):
+                raise BadInput("log", "be the run.nc of a run", f"{path.name}, {complaint}")
             return log_of_run(run.load(), path.name)
     except BadInput:
         raise

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from undertow.core.unpacked_size import most_unpacked
+
 _MAGIC = b"\x28\xb5\x2f\xfd"  # which begins no message in CDR
 _LARGEST = 2**26  # bytes of a message
-_MOST, _TIMES = 2**28, 100  # bytes of a file, or the size of the packed one times this if that is more
 _PIECE = 2**16
 
 
@@ -34,7 +35,7 @@ def unpacked_file(file: Path, folder: Path) -> Path:
     """
     import zstandard
 
-    most = max(_MOST, _TIMES * file.stat().st_size)
+    most = most_unpacked(file.stat().st_size)
     target, size = folder / file.stem, 0
     with file.open("rb") as packed, target.open("wb") as stream:
         reader = zstandard.ZstdDecompressor().stream_reader(packed)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.core.errors import BadInput, nearest
+from undertow.core.unpacked_size import size_complaint
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
 
@@ -165,7 +166,11 @@ def _from_result(path: Path, what: str, allow_code: bool) -> Text:
     must = "be a result file of undertow"
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
+            if complaint := size_complaint(path, dataset.nbytes):
+                raise wrong_file(path, what, must, complaint)
             attributes, actual = dict(dataset.attrs), checksum(dataset)
+    except BadInput:
+        raise
     except Exception:  # netCDF and xarray raise many kinds of errors for a file that is torn, or none of theirs
         empty = path.stat().st_size == 0
         got = "empty (0 bytes)" if empty else "damaged, incomplete, or not a netCDF file"

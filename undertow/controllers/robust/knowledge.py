@@ -56,7 +56,8 @@ def load_knowledge(path) -> Knowledge:
     try:
         with Path(path).open("rb") as file, np.load(file) as held:
             _check_sizes(held.zip)
-            found = {name: _real(held[name]) for name in _SIGNALS if name in held or name in _ALWAYS}
+            raw = {name: held[name] for name in _SIGNALS if name in held or name in _ALWAYS}
+            found = _real(raw)
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
     weights, variance, inertia = found["weights"], found["variance"], found.get("inertia")
@@ -80,10 +81,13 @@ def _check_sizes(archive: zipfile.ZipFile) -> None:
         raise ValueError("larger than any memory")
 
 
-def _real(values: np.ndarray) -> np.ndarray:
-    if values.dtype.kind not in "fiu":
+def _real(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Arrays as floating-point numbers, which take eight times the memory of bytes."""
+    if any(values.dtype.kind not in "fiu" for values in arrays.values()):
         raise TypeError("not of real numbers")
-    return np.asarray(values, dtype=float)
+    if sum(values.size for values in arrays.values()) > _LARGEST:
+        raise ValueError("larger than any memory")
+    return {name: np.asarray(values, dtype=float) for name, values in arrays.items()}
 
 
 def regressor_names(axes: Sequence[str], rules: int, regressor: str, body: bool) -> list[str]:
