@@ -100,7 +100,7 @@ def test_some_messages_of_a_topic_cannot_be_decoded(tmp_path, channels):
     )
 
 
-def test_only_what_is_wanted_is_decoded(tmp_path, channels, monkeypatch):
+def test_only_what_is_requested_is_decoded(tmp_path, channels, monkeypatch):
     """Of other topics the first message, so that an error can list their columns."""
     seen = []
 

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core.contracts import Inputs, Outputs
+from undertow.core.errors import BadInput
 from undertow.core.measurement import body_of
 from undertow.core.runtime import on_processor
 from undertow.logs.log import Series
@@ -70,7 +71,7 @@ def predict(
         limited: whether the inputs are commands, which the vehicle limits, rather than what was applied.
         factors: on the input of each thruster, a row per variant.
     """
-    plant, loop = built.closed_loop.plant, built.scenario.loop
+    plant, loop = vehicle_of(built), built.scenario.loop
     before = round(RUN_IN / loop.dt)
     times = starts[:, None] + loop.dt * np.arange(-before, steps)
     with on_processor():
@@ -85,6 +86,18 @@ def predict(
         dt = jnp.asarray(loop.dt, dtype=float)
         predicted = jax.device_get(_predicted(realization, windows, jnp.asarray(factors), dt, limited, settings))
     return Prediction(np.asarray(predicted), loop.dt * stride * np.arange(1, steps // stride + 1))
+
+
+def vehicle_of(built: Built) -> HybridVehicle:
+    """The vehicle of a scenario.
+
+    Raises:
+        BadInput: its plant is none.
+    """
+    plant = built.closed_loop.plant
+    if not isinstance(plant, HybridVehicle):
+        raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
+    return plant
 
 
 def starts_of(motion: LoggedMotion, inputs: Series, longest: float, every: float) -> np.ndarray:

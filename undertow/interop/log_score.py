@@ -15,11 +15,10 @@ import numpy as np
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
-from undertow.interop.log_prediction import RUN_IN, logged, predict, starts_of, time_together
+from undertow.interop.log_prediction import RUN_IN, logged, predict, starts_of, time_together, vehicle_of
 from undertow.interop.log_signs import warnings_of_signs
 from undertow.logs.log import Log
 from undertow.logs.motion import inputs_of, motion_of
-from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
 
 AXES = (*BODY_OUTPUTS, "surge", "sway", "heave", "p", "q", "r")
@@ -82,9 +81,7 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
         BadInput: the plant is no vehicle, the log is of another one or too short, horizons are too short, or the model
             diverges.
     """
-    plant, loop = built.closed_loop.plant, built.scenario.loop
-    if not isinstance(plant, HybridVehicle):
-        raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
+    plant, loop = vehicle_of(built), built.scenario.loop
     checks.positive("horizons", horizons, "s")
     checks.positive("every", every, "s")
     motion = motion_of(log)

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from undertow.interop.log_prediction import logged, predict, starts_of
+from undertow.interop.log_prediction import logged, predict, starts_of, vehicle_of
 from undertow.logs.log import Series
 from undertow.logs.motion import LoggedMotion
 from undertow.scenario.build import Built
@@ -39,7 +39,7 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
         return ()
     starts = starts[:: -(-len(starts) // _WINDOWS)]
     truth = logged(motion, starts + dt * steps)[:, 6:]
-    root = np.linalg.cholesky(np.asarray(built.closed_loop.plant.body.mass_matrix)).T
+    root = np.linalg.cholesky(np.asarray(vehicle_of(built).body.mass_matrix)).T
 
     def errors(rows: np.ndarray) -> np.ndarray:
         predicted = predict(built, motion, inputs, starts, steps, steps, limited, rows).motion[:, :, 0, 6:]

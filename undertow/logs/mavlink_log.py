@@ -51,7 +51,7 @@ def read_mavlink(path: Path, names: Collection[str] = ("",)) -> Recording:
 
     Args:
         path: of the file.
-        names: types that are wanted; "" for all. Of others, the first message alone is read.
+        names: types of which all messages are read; "" for all. Of others, the first message alone is read.
 
     Raises:
         BadInput: no such file, without frames, or pymavlink is not installed.
@@ -101,7 +101,7 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
         size = 0 if frame is None else 8 + len(frame.data)
         name = types[frame.kind].msgname if frame is not None and frame.kind in types else ""
         message = None
-        if frame is not None and name and _wanted(name, frame, names, scan):
+        if frame is not None and name and _requested(name, frame, names, scan):
             try:
                 message = decoder.decode(bytearray(frame.data))
             except Exception:  # whatever bytes may cause
@@ -119,8 +119,8 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
     return scan._replace(lost=lost, times=damaged_times)
 
 
-def _wanted(name: str, frame: _Frame, names: Collection[str], scan: _Scan) -> bool:
-    """Whether a frame is decoded: it is wanted, of use to the reader itself, or the first of its type and sender."""
+def _requested(name: str, frame: _Frame, names: Collection[str], scan: _Scan) -> bool:
+    """Whether a frame is decoded: it is requested, of use to the reader itself, or the first of its type and sender."""
     if "" in names or name in names or frame.kind in (_PARAMETER, _HEARTBEAT):
         return True
     return (name, frame.sender) not in scan.fields

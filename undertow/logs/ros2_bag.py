@@ -38,7 +38,7 @@ def read_ros2_bag(path: Path, names: Collection[str] = ("",)) -> Recording:
 
     Args:
         path: of the bag.
-        names: topics and types that are wanted; "" for all. Of others, the first message alone is read.
+        names: topics and types of which all messages are read; "" for all. Of others, the first message alone is read.
 
     Raises:
         BadInput: damaged, no message that can be decoded, or rosbags is not installed.
@@ -85,7 +85,7 @@ class _Topics:
         self._names, self._decoder = names, Decoder()
         self._errors: dict[str, list[str]] = {}  # of each topic and type
 
-    def wanted(self, topic: str, kind: str) -> bool:
+    def requested(self, topic: str, kind: str) -> bool:
         """Whether all messages of a topic are to be read, not only the first."""
         return "" in self._names or topic in self._names or kind in self._names
 
@@ -93,7 +93,7 @@ class _Topics:
         """Add a message, or what is wrong with it."""
         self.place = f"at the message of {message.topic} at {message.recorded} ns"
         first = message.topic not in self.fields and message.topic not in self._errors
-        if not first and not self.wanted(message.topic, message.kind):
+        if not first and not self.requested(message.topic, message.kind):
             return
         try:
             decoded = self._decoder.decoded(message.data, message.kind, message.definition)
@@ -117,9 +117,9 @@ class _Topics:
         ]
 
     def start(self) -> int:
-        """Time of the first message of the topics that are wanted, or of any if none is, ns."""
+        """Time of the first message of the requested topics, or of any if none is, ns."""
         stamps = {topic: min(fields.stamps) for topic, fields in self.fields.items()}
-        used = [stamp for topic, stamp in stamps.items() if self.wanted(topic, self.fields[topic].kind)]
+        used = [stamp for topic, stamp in stamps.items() if self.requested(topic, self.fields[topic].kind)]
         return min(used or stamps.values())
 
 
@@ -149,7 +149,8 @@ def _messages(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Messag
 def _of_mcap(file: Path, notes: list[str]) -> Iterator[_Message]:
     """Messages in CDR of an MCAP file, in its order."""
     forms = {"ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
-    types, channels = {}, {}
+    types: dict[int, tuple[str, Definition]] = {}
+    channels: dict[int, tuple[str, str, Definition]] = {}
     for record in records(file, notes):
         match type(record).__name__:
             case "Schema":
@@ -162,19 +163,19 @@ def _of_mcap(file: Path, notes: list[str]) -> Iterator[_Message]:
 
 
 def _of_sqlite(file: Path, topics: _Topics) -> Iterator[_Message]:
-    """Messages in CDR of a .db3 file; of topics that are not wanted the first one."""
+    """Messages in CDR of a .db3 file; of topics that are not requested the first one."""
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.rosbag2 import Reader
 
     forms = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
     with Reader(file) as reader:
         connections = [one for one in reader.connections if getattr(one.ext, "serialization_format", "") == "cdr"]
-        wanted = [one for one in connections if topics.wanted(one.topic, one.msgtype)]
-        for chosen in (wanted, *([one] for one in connections if one not in wanted)):
+        requested = [one for one in connections if topics.requested(one.topic, one.msgtype)]
+        for chosen in (requested, *([one] for one in connections if one not in requested)):
             for connection, recorded, data in reader.messages(chosen) if chosen else ():
                 definition = Definition(forms.get(connection.msgdef.format, ""), connection.msgdef.data)
                 yield _Message(connection.topic, connection.msgtype, definition, recorded, unpacked(bytes(data)))
-                if chosen is not wanted:
+                if chosen is not requested:
                     break
 
 
