@@ -200,6 +200,27 @@ def test_missing_readings_are_replaced(heavy):
 
 
 @pytest.mark.full
+def test_a_law_whose_integral_one_wrong_number_has_wound_up_starts_again():
+    """One velocity of 9e5 m/s: afterwards the law answers to an error of 0.3 m as one that never saw it."""
+    scenario = {
+        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+        "controller": {"kind": "pid", "frequency": 1},
+        "reference": {"kind": "setpoint", "position": [0, 0, 0, 0, 0, 0]},
+        "loop": {"dt": 0.02, "record": 0.02},
+    }
+    law = ut.Autopilot(scenario)
+    rest, away = (np.zeros(3), np.zeros(6), np.zeros(3)), np.array([0.3, 0, 0, 0, 0, 0])
+    law.start(*rest, target=away)
+    expected = law.step(*rest, target=away)
+    law.start(*rest, target=away)
+    law.step(np.zeros(3), np.array([9e5, 0, 0, 0, 0, 0]), np.zeros(3), target=away)
+    for _ in range(3):
+        answer = law.step(*rest, target=away)
+    assert law.counts["restarted"] == 1
+    np.testing.assert_allclose(answer, expected, rtol=0.05, atol=0.02)
+
+
+@pytest.mark.full
 def test_a_law_that_is_no_number_any_more_starts_again(heavy):
     """An applied input that overflows while the thrusters give all they can; then the vehicle is at its target."""
     at, far = (np.zeros(3), np.zeros(6), np.zeros(3)), np.array([8.0, 1, 1, 0, 0, 0.5])

@@ -29,6 +29,7 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
 from undertow.supervision.conditions import Request, reason_of, state_of
 from undertow.supervision.supervised_controller import SupervisedState, state_in, transfer
+from undertow.supervision.supervisor import largest_estimate
 from undertow.supervision.transition_log import Transition, transitions
 
 _NO_ROTATION = 1e-6  # length of a quaternion that is none
@@ -51,8 +52,9 @@ class Autopilot(Uncopied):
     is repeated. `counts` says how often each happened.
 
     Entries of a measurement that are not finite are replaced by those that the law's model expects. A law whose command
-    is not finite repeats its last output once. Then it starts anew from the next whole measurement, and its output is
-    zero until there is one (`restarted`); a supervisor does that by itself.
+    is not finite, or whose estimate of the uncertainty is beyond ten times what the actuators can give, repeats its last
+    output once. Then it starts anew from the next whole measurement, and its output is zero until there is one
+    (`restarted`); a supervisor does that by itself.
 
     Args:
         scenario: a .yaml file or an earlier run.nc, the same as a mapping, a closed loop made of parts, or what `build`
@@ -109,6 +111,7 @@ class Autopilot(Uncopied):
         self.unit, self.plant = conversion.unit, loop.plant
         with runtime.on_processor(), runtime.in_precision(precision):
             self._compile(Functions(loop, form, conversion))
+            self._largest_estimate = _largest_estimate(loop)
         self._clock = Clock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started, self._broken = (np.zeros((), dtype=bool) for _ in range(3))
@@ -259,9 +262,15 @@ class Autopilot(Uncopied):
             self._start_again_if_broken()
         return self._answered()
 
+    def _is_broken(self) -> bool:
+        """Whether the law has diverged: it would not come back, or only in hours."""
+        answer = self._go_on.outputs
+        estimate = answer.signals.get("estimate", np.zeros(()))
+        return not (np.isfinite(answer.command).all() and (np.abs(estimate) <= self._largest_estimate).all())
+
     def _start_again_if_broken(self) -> None:
-        """From the second command in a row that is not finite on: a law whose state is not finite stays so."""
-        if np.isfinite(self._go_on.outputs.command).all():
+        """From the second step in a row with a broken law on."""
+        if not self._is_broken():
             self._broken[...] = False
         elif not self._broken:
             self._broken[...] = True
@@ -482,3 +491,9 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
     loop = built.closed_loop if placed else built.without_faults().closed_loop
     given = loop if placed else dataclasses.replace(loop, reference=built.reference)
     return given, built.scenario.precision, built.scenario.loop.dt
+
+
+def _largest_estimate(loop: ClosedLoop) -> Any:
+    """Largest plausible estimate of the uncertainty; without limit where the law has no nominal model."""
+    model = getattr(loop.controller, "model", None)
+    return np.inf if model is None else np.asarray(largest_estimate(model, loop.plant))

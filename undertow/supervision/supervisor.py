@@ -120,7 +120,7 @@ def supervisor(
         law = fault_tolerant(law, sampling_time, (low, high))
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
     authority = _authority(law.model, start, (low, high))
-    estimate = _plausible_estimate(authority) if max_estimate is None else max_estimate
+    estimate = largest_estimate(law.model, plant) if max_estimate is None else max_estimate
     least, largest = jnp.maximum(low, -_BEYOND), jnp.minimum(high, _BEYOND)
     return Supervised(
         law=law,
@@ -146,17 +146,22 @@ def limits_of(plant: AbstractPlant, x: PyTree) -> tuple[Inputs, Inputs]:
     return low, high
 
 
+def largest_estimate(model: Model, plant: AbstractPlant) -> Outputs:
+    """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2.
+
+    It is ten times the acceleration that the actuators of a plant can give, and 500 where they have no limit.
+    """
+    x = plant.initial_state()
+    authority = _authority(model, plant.output(jnp.zeros(()), x), limits_of(plant, x))
+    known = jnp.isfinite(authority) & (authority > 0)
+    return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
+
+
 def _authority(model: Model, start: Measurement, limits: tuple[Any, Any]) -> Outputs:
     """Largest acceleration of the actuators along each axis of a model, m/s^2 and rad/s^2; infinite without limits."""
     gain = jnp.abs(model.dynamics.gain(start))
     forces = jnp.stack([jnp.abs(force_of(model.actuators, limit)) for limit in limits]).max(0)
     return jnp.where(gain > 0, gain * forces[None, :], 0.0).sum(1)
-
-
-def _plausible_estimate(authority: Outputs) -> Outputs:
-    """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2."""
-    known = jnp.isfinite(authority) & (authority > 0)
-    return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
 
 
 def _reported_input(authority: Outputs) -> ReportedInput:
