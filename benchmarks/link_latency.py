@@ -22,7 +22,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.interop.latency import Latency
-from undertow.interop.mavlink.link import parsed
+from undertow.interop.mavlink.message_codec import parsed
 
 SCENARIO = Path(__file__).parents[1] / "examples/bluerov2_heavy.yaml"
 WARM_UP = 50  # steps that are not counted

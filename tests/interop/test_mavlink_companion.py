@@ -11,7 +11,9 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.interop.mavlink import Companion
 from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD, NEUTRAL_PERIOD
-from undertow.interop.mavlink.link import parsed
+from undertow.interop.mavlink.message_codec import parsed
+from undertow.interop.mavlink.message_requests import MessageRequests
+from undertow.interop.mavlink.odometry_rate import MOST, WINDOW, OdometryRate
 from undertow.interop.mavlink.permission import HEARTBEAT_TIMEOUT, Permission
 from undertow.interop.mavlink.sender_clock import SenderClock
 
@@ -70,8 +72,8 @@ def neutrals(messages):
 
 def copied(state):
     """Attributes of a companion, with copies of those that change inside."""
-    changing = dict | SenderClock | Permission
-    return {name: copy.copy(value) if isinstance(value, changing) else value for name, value in state.items()}
+    changing = dict | SenderClock | Permission | MessageRequests | OdometryRate
+    return {name: copy.deepcopy(value) if isinstance(value, changing) else value for name, value in state.items()}
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +109,8 @@ def test_commands_are_those_of_the_autopilot_by_itself(talk):
 def test_nothing_is_sent_before_the_vehicle_is_armed(talk):
     """And nothing that would arm it, ever."""
     sent = talk.odometry() + talk.heartbeat(armed=False) + talk.odometry() + talk.idle()
-    assert [one.get_type() for one in sent] == ["HEARTBEAT"]
+    assert [one.get_type() for one in sent] == ["HEARTBEAT", "COMMAND_LONG"]
+    assert sent[1].command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     assert talk.companion.state(talk.now) == "disarmed"
     talk.heartbeat(armed=True)
     assert talk.companion.state(talk.now) == "no valid odometry"
@@ -205,6 +208,51 @@ def test_a_clock_that_is_set(talk, jump):
     assert used.index(True) == 50 and all(used[50:])
     assert talk.companion.counts["clock jumps"] == 1 and talk.companion.counts["old"] == 50
     assert talk.companion.counts["starts"] == 2
+
+
+def test_irregular_odometry_stops_the_law(talk):
+    """Half of it is lost: the fifth late one within a second is not answered, until a second has passed without."""
+    talk.heartbeat()
+    talk.odometry()
+    answered = [bool(talk.odometry(after=20_000)) for _ in range(MOST + 3)]
+    assert answered == [True] * (MOST - 1) + [False] * 4
+    assert talk.companion.counts["irregular"] == 1 and talk.companion.state(talk.now) == "irregular odometry"
+    assert [pulses([one]) for one in neutrals(talk.idle())] == [STILL]
+    regular = [bool(talk.odometry()) for _ in range(102)]
+    assert regular.index(True) in (99, 100) and all(regular[-2:]) and WINDOW == 1.0
+    assert talk.companion.counts["starts"] == 2 and talk.companion.running
+
+
+def test_a_few_late_steps_go_on(talk):
+    """Four in a second, second after second."""
+    talk.heartbeat()
+    talk.odometry()
+    for k in range(1, 300):
+        if k % 100 == 0:
+            talk.heartbeat()
+        assert pulses(talk.odometry(after=20_000 if k % 26 == 0 else 10_000))
+    assert talk.companion.counts["irregular"] == 0 and talk.companion.steps_counted["late"] > MOST
+
+
+def test_a_target_relative_to_where_control_begins(driven, talk):
+    """North and east count from there, and depth does not; also where the law begins again, or the estimator jumps."""
+    relative = Companion(driven, blend=0.0, timeout=TIMEOUT, relative=True)
+    moved, still = Talk(relative), talk
+    for one in (moved, still):
+        one.heartbeat()
+    place = np.array([13.0, -8.0, 0.0])
+    way = np.linspace([0, 0, 0.25], [0.125, -0.25, 0.5], 5)
+    for at in way:
+        assert pulses(moved.odometry(at + place)) == pulses(still.odometry(at))
+    for one in (moved, still):  # nothing comes for a while: the law begins again, and the target stays
+        one.idle(2 * TIMEOUT)
+    assert pulses(moved.odometry(way[4] + place)) == pulses(still.odometry(way[4]))
+    jumped = place + [4.0, 4.0, 0.0]
+    assert pulses(moved.odometry(way[4] + jumped, resets=1)) == pulses(still.odometry(way[4], resets=1))
+    for one in (moved, still):  # armed again: it counts from the new place
+        one.heartbeat(armed=False)
+        one.heartbeat()
+    assert pulses(moved.odometry(way[4] + jumped, resets=1)) == pulses(still.odometry([0, 0, 0.5], resets=1))
 
 
 def test_steps_that_are_late(talk):
@@ -316,10 +364,10 @@ def test_anything_may_arrive(talk):
     ]
     sent = accepted = 0
     for k in range(3000):
-        talk.now += 0.001
+        talk.now += 0.00003  # so often that odometry is regular although most is lost
         message = messages[k % len(messages)]
         if message.get_type() == "ODOMETRY":
-            message.time_usec += int(chance.integers(-5_000, 50_000)) if message.time_usec > 5_000 else 5_000
+            message.time_usec += int(chance.integers(-100, 460)) if message.time_usec > 5_000 else 5_000
             message.x, message.vx = (float(one) for one in chance.choice([0.0, 0.9, -0.1, np.nan, np.inf, 1e30], 2))
         data = bytearray(message.pack(talk.wire))
         if chance.integers(2):

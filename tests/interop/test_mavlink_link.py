@@ -17,7 +17,7 @@ from mavlink_vehicle import MavlinkVehicle
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink import Companion, UdpLink, accompany
+from undertow.interop.mavlink import Companion, CompanionLoop, UdpLink
 from undertow.interop.mavlink.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
@@ -39,8 +39,7 @@ def accompanied(companion, link, **options):
     """The companion talks in a thread, until the block ends; the clock of its vehicle is a new one."""
     companion._clock = SenderClock(companion.timeout)
     ended = threading.Event()
-    options |= {"until": ended.is_set}
-    thread = threading.Thread(target=accompany, args=(companion, link), kwargs=options)
+    thread = threading.Thread(target=CompanionLoop(companion, link, **options).run, args=(ended.is_set,))
     thread.start()
     try:
         yield
@@ -268,11 +267,11 @@ def test_lines_that_cannot_be_printed_do_not_end_control(driven, vehicle):
         until = time.monotonic() + 2.5
         for k in range(1, 1000):
             peer.heartbeat()
-            peer.odometry(1_000_000 + 50_000 * k, vehicle.state())
+            peer.odometry(1_000_000 + 10_000 * k, vehicle.state())
             assert peer.wait("RC_CHANNELS_OVERRIDE", timeout=5.0) is not None
             if time.monotonic() > until:
                 break
-            time.sleep(0.05)
+            time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 128 + signal.SIGINT
         assert ends_neutral(peer)

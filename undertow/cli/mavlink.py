@@ -2,6 +2,7 @@
 
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from undertow.cli.exit_codes import DONE, report
 from undertow.cli.stages import stage
@@ -10,45 +11,51 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 
 
-def mavlink(
-    scenario: Path,
-    connect: str,
-    output: str,
-    source: str,
-    system: int,
-    target_system: int,
-    target_component: int,
-    frame: str | None,
-    channels: str | None,
-    timeout: float,
-    duration: float | None,
-    allow_code: bool,
-) -> int:
+class Options(NamedTuple):
+    """Options of the command, as given; None where one was not."""
+
+    connect: str
+    output: str
+    source: str
+    system: int
+    target_system: int
+    target_component: int
+    signing_key: Path | None
+    relative: bool
+    frame: str | None
+    channels: str | None
+    timeout: float
+    duration: float | None
+    allow_code: bool
+
+
+def mavlink(scenario: Path, options: Options) -> int:
     """Control the vehicle at the other end of a link until Ctrl-C; return the exit code."""
     try:
-        from undertow.interop.mavlink import Companion, UdpLink, accompany
+        from undertow.interop.mavlink import Companion, CompanionLoop, UdpLink, read_key
     except ModuleNotFoundError as error:
         if error.name != "pymavlink":
             raise
         raise BadInput("", "", str(error)) from None
-    if duration is not None:
-        checks.positive("duration", duration, "s")
-    console = wide_console()
-    with UdpLink(connect, system) as link:
-        with stage(console, "building and compiling"):
+    if options.duration is not None:
+        checks.positive("duration", options.duration, "s")
+    key = None if options.signing_key is None else read_key(options.signing_key)
+    with UdpLink(options.connect, options.system, key=key) as link:
+        with stage(wide_console(), "building and compiling"):
             companion = Companion(
                 scenario,
-                source=source,
-                output=output,
-                target_system=target_system,
-                target_component=target_component,
-                frame=frame,
-                channels=channels,
-                timeout=timeout,
-                allow_code=allow_code,
+                source=options.source,
+                output=options.output,
+                target_system=options.target_system,
+                target_component=options.target_component,
+                frame=options.frame,
+                channels=options.channels,
+                timeout=options.timeout,
+                relative=options.relative,
+                allow_code=options.allow_code,
             )
         link.drain()  # what came while the law was compiled
         report(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
-        end = float("inf") if duration is None else time.monotonic() + duration
-        accompany(companion, link, report, until=lambda: time.monotonic() >= end)
+        end = float("inf") if options.duration is None else time.monotonic() + options.duration
+        CompanionLoop(companion, link, report).run(until=lambda: time.monotonic() >= end)
     return DONE

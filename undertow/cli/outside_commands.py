@@ -116,6 +116,16 @@ def mavlink(
     ] = 255,
     target_system: Annotated[int, typer.Option(metavar="ID", help="System id of the vehicle.")] = 1,
     target_component: Annotated[int, typer.Option(metavar="ID", help="Component id of its autopilot.")] = 1,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Sign messages, and refuse those of others: 32 bytes, or a passphrase as of a ground station.",
+        ),
+    ] = None,
+    relative: Annotated[
+        bool, typer.Option("--relative", help="North and east of the reference count from where control begins.")
+    ] = False,
     frame: Annotated[
         str | None, typer.Option(metavar="NAME", help="Frame of ArduSub: vectored_6dof or vectored; see `ardupilot`.")
     ] = None,
@@ -136,22 +146,13 @@ def mavlink(
     vehicle is armed, which this command never does, and sends neutral commands when it stops. Before you use it on a
     vehicle, read docs/how-to/mavlink.md.
     """
-    from undertow.cli.mavlink import mavlink
+    from undertow.cli import mavlink as command
 
-    return mavlink(
-        scenario,
-        connect,
-        output,
-        source,
-        system,
-        target_system,
-        target_component,
-        frame,
-        channels,
-        timeout,
-        duration,
-        allow_code,
-    )
+    options = command.Options(
+        connect, output, source, system, target_system, target_component, signing_key, relative, frame, channels,
+        timeout, duration, allow_code,
+    )  # fmt: skip
+    return command.mavlink(scenario, options)
 
 
 def run(

@@ -1,7 +1,8 @@
 """The controller of a scenario as a MAVLink companion of an autopilot: odometry in, commands to the thrusters out.
 
 `odometry` reads positions and attitudes, `actuator_commands` writes what the thrusters get, `companion` has the rules
-of when the law runs, and `link` the UDP socket. docs/how-to/mavlink.md explains them.
+of when the law runs, `link` the UDP socket, `signing` the signatures, and `companion_loop` lets the companion talk.
+docs/how-to/mavlink.md explains them.
 """
 
 import importlib.util
@@ -11,5 +12,6 @@ if importlib.util.find_spec("pymavlink") is None:
     raise ModuleNotFoundError(f"pymavlink is not installed. {remedy}", name="pymavlink")
 
 from undertow.interop.mavlink.companion import Companion as Companion
+from undertow.interop.mavlink.companion_loop import CompanionLoop as CompanionLoop
 from undertow.interop.mavlink.link import UdpLink as UdpLink
-from undertow.interop.mavlink.link import accompany as accompany
+from undertow.interop.mavlink.signing import read_key as read_key

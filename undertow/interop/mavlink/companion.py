@@ -3,23 +3,19 @@
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.autopilot.autopilot import Autopilot
-from undertow.autopilot.numbers import step_of
-from undertow.core import checks, runtime
-from undertow.core.contracts import Inputs
+from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_of
+from undertow.interop.mavlink.actuator_commands import Target
+from undertow.interop.mavlink.message_requests import MessageRequests
 from undertow.interop.mavlink.odometry import Odometry, OdometryReader
+from undertow.interop.mavlink.odometry_rate import OdometryRate
 from undertow.interop.mavlink.permission import Permission
 from undertow.interop.mavlink.sender_clock import SenderClock
-from undertow.interop.pulse_driven import pulse_driven
-from undertow.interop.thruster_channels import channels_of_vehicle
-from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.power.esc import ESC, esc
+from undertow.interop.mavlink.thruster_driver import ThrusterDriver
 from undertow.realtime.plausible_motion import SPEED
 
 HEARTBEAT_PERIOD = 1.0  # s
@@ -30,7 +26,9 @@ LEAP = 1.0  # m by which a position may leap beyond what the largest plausible s
 
 _COUNTS: tuple[str, ...] = ("steps", "starts", "rejected commands")
 _COUNTS += ("foreign", "invalid", "superseded", "repeated", "out of order", "old")  # messages that are not used
-_COUNTS += ("clock jumps", "estimator resets", "leaps")
+_COUNTS += ("clock jumps", "estimator resets", "leaps", "irregular")
+
+_HORIZONTAL = np.array([1.0, 1.0, 0.0])
 
 
 class Companion:
@@ -41,10 +39,11 @@ class Companion:
     * HEARTBEAT of the target says that the vehicle is armed, and is no older than 3 s; nothing here arms it;
     * its flight mode is that in which the law first ran since it was armed, and its status is neither emergency nor
       failsafe;
-    * valid odometry is no older than `timeout`;
+    * valid odometry is no older than `timeout`, and regular, see `odometry_rate`;
     * the position has not leapt since it was armed.
 
-    It begins (again) at the pose of the next whole odometry: reference, law and output start there. Of a message:
+    It begins (again) at the pose of the next whole odometry: reference, law and output start there. It asks the
+    autopilot for the messages with the odometry, see `message_requests`. Of a message:
 
     * from another system or component: ignored (`foreign`);
     * odometry in axes other than NED or FRD, of a failed estimator, or without its attitude: ignored (`invalid`);
@@ -66,6 +65,8 @@ class Companion:
         frame, channels: of the thrusters, see `thruster_channels`.
         timeout: s.
         blend: time constant, s, with which the output turns from neutral into the law's at a start; 0 for at once.
+        relative: whether north and east of the reference count from where the law first ran since the vehicle was
+            armed; depth and heading never do.
         allow_code: whether the Python code that an earlier run.nc names may run.
 
     Attributes:
@@ -91,6 +92,7 @@ class Companion:
         channels: str | None = None,
         timeout: float = 0.5,
         blend: float = 1.0,
+        relative: bool = False,
         allow_code: bool = False,
     ):
         for name, number in (("target_system", target_system), ("target_component", target_component)):
@@ -102,12 +104,9 @@ class Companion:
         self._reader, self._target = OdometryReader(source), Target(target_system, target_component)
         smoothly = blend or 1.0  # a start that is given no applied input has no use for it
         self._autopilot = Autopilot(scenario, attitude="quaternion", blend=smoothly, allow_code=allow_code)
-        plant = pulse_driven(self._autopilot.plant, battery_suffices=False)
-        self._esc, self._from_neutral = plant.power.esc or esc(), bool(blend)
-        self.channels = channels_of_vehicle(np.asarray(plant.thruster_matrix), frame, channels)
-        self._commands = commands_of(output, int(self.channels.numbers.max()))
-        with runtime.on_processor(), runtime.in_precision(self._autopilot.precision):
-            self._drive = step_of(driven, (plant, self._esc), (), jnp.zeros(plant.inputs()))
+        self._from_neutral = bool(blend)
+        self._driver = ThrusterDriver(self._autopilot, output, self._target, frame, channels)
+        self.channels = self._driver.channels
         self.counts = dict.fromkeys(_COUNTS, 0)
         self.complaint, self.running = "", False
         self._odometry, self._last = -np.inf, None
@@ -115,6 +114,9 @@ class Companion:
         self._clock = SenderClock(self.timeout)
         self._placed: Odometry | None = None  # the last one with a position
         self._permission = Permission(target_system)
+        self._requests = MessageRequests(source, self._target, self.sampling_time)
+        self._rate = OdometryRate(self.sampling_time)
+        self._relative, self._origin = relative, np.zeros(3)  # m, from which positions of the law count
 
     @property
     def sampling_time(self) -> float:
@@ -141,8 +143,11 @@ class Companion:
             self.counts["foreign"] += 1
             return []
         if message.get_type() == "HEARTBEAT":
+            if not self._permission.is_heard(now):
+                self._requests.begin_again()
             self._permission.note(message, now)
             self._stop_if_lost(now)
+        self._requests.note(message, now)
         if message.get_type() == "COMMAND_ACK":
             self._note_acknowledgement(message)
         try:
@@ -154,13 +159,15 @@ class Companion:
         return [] if odometry is None else self._follow(odometry, now)
 
     def idle(self, now: float) -> list[Any]:
-        """Messages that are due without one having come: our heartbeat, and neutral commands; call it often."""
+        """Messages that are due without one having come: our heartbeat, requests, neutral commands; call it often."""
         self._stop_if_lost(now)
         found: list[Any] = []
         if now - self._sent_heartbeat >= HEARTBEAT_PERIOD:
             self._sent_heartbeat = now
             kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
             found.append(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
+        if self._permission.is_heard(now):
+            found += self._requests.due(now)
         stopped = self.counts["starts"] and not self.running
         if stopped and now - self._sent_neutral >= NEUTRAL_PERIOD:
             self._sent_neutral = now
@@ -169,9 +176,11 @@ class Companion:
 
     def neutral(self) -> list[Any]:
         """Commands that stop all thrusters, if the law ever ran."""
-        if not self.counts["starts"]:
-            return []
-        return self._made(np.full(len(self.channels.numbers), float(self._esc.neutral)), 0)
+        return self._driver.neutral() if self.counts["starts"] else []
+
+    def complaints(self) -> list[str]:
+        """What the operator should know: messages that the vehicle refuses to send, and the last complaint."""
+        return [words for words in (self._requests.complaint(), self.complaint) if words]
 
     @property
     def armed(self) -> bool:
@@ -180,7 +189,8 @@ class Companion:
 
     def state(self, now: float) -> str:
         """In words, what the companion does or waits for."""
-        return self._permission.why_not(now) or ("running" if self.running else "no valid odometry")
+        waiting = "irregular odometry" if self._rate.irregular else "no valid odometry"
+        return self._permission.why_not(now) or ("running" if self.running else waiting)
 
     def _note_acknowledgement(self, message: Any) -> None:
         ours = message.command in (mavlink.MAV_CMD_DO_SET_SERVO, mavlink.MAV_CMD_DO_SET_ACTUATOR)
@@ -190,7 +200,7 @@ class Companion:
             self.complaint = f"command {message.command} was answered {result.name if result else message.result}"
 
     def _stop_if_lost(self, now: float) -> None:
-        lost = now - self._odometry > self.timeout
+        lost = now - self._odometry > self.timeout or self._rate.irregular
         if self.running and (lost or self._permission.why_not(now)):
             self.running, self._sent_neutral = False, -np.inf
 
@@ -203,33 +213,47 @@ class Companion:
             self.counts[objection] += 1
             return []
         before, self._last = self._last, odometry
+        if before is not None:
+            self._rate.note((odometry.time_usec - before.time_usec) / 1e6, now)
+            self.counts["irregular"] = self._rate.counted
+        self._note_jumps(before, odometry, now)
+        if odometry.has_pose:
+            self._odometry, self._placed = now, odometry
+        self._stop_if_lost(now)
+        if self._rate.irregular or self._permission.why_not(now) or not (self.running or odometry.is_whole):
+            return []
+        volts = self._step(before, odometry) if self.running and before is not None else self._start(odometry)
+        self.counts["steps"] += 1
+        return self._driver.commands(volts, odometry.time_usec)
+
+    def _note_jumps(self, before: Odometry | None, odometry: Odometry, now: float) -> None:
+        """Stop where the estimator says that it has jumped, or the position did."""
         if before is not None and odometry.resets != before.resets:
             self.counts["estimator resets"] += 1
             self.running = False
+            if self._relative and self._placed is not None and odometry.has_pose:
+                self._origin = self._origin + _HORIZONTAL * (odometry.position - self._placed.position)
         elif self._has_leapt(odometry):
             self.counts["leaps"] += 1
             self._permission.note_leap()
-            self._stop_if_lost(now)
-        if odometry.has_pose:
-            self._odometry, self._placed = now, odometry
-        if self._permission.why_not(now):
-            return []
-        given = odometry.position, odometry.velocity, odometry.attitude
-        if not self.running:
-            if not odometry.is_whole:
-                return []
-            self.running = True
-            self._permission.begin()
-            self.counts["starts"] += 1
-            still = np.zeros(len(self.channels.numbers)) if self._from_neutral else None
-            volts = self._autopilot.start(*given, applied=still)
-        else:
-            assert before is not None
-            volts = self._autopilot.step(*given, applied=self._drive.outputs[1], dt=self._elapsed(before, odometry))
-        self.counts["steps"] += 1
-        self._drive.inputs[...] = volts
-        self._drive()
-        return self._made(self._drive.outputs[0], odometry.time_usec)
+
+    def _start(self, odometry: Odometry) -> np.ndarray:
+        """The first step of the law."""
+        if self._relative and not self._permission.begun:
+            self._origin = _HORIZONTAL * odometry.position
+        self.running = True
+        self._permission.begin()
+        self.counts["starts"] += 1
+        still = np.zeros(len(self.channels.numbers)) if self._from_neutral else None
+        return self._autopilot.start(*self._motion(odometry), applied=still)
+
+    def _step(self, before: Odometry, odometry: Odometry) -> np.ndarray:
+        elapsed = self._elapsed(before, odometry)
+        return self._autopilot.step(*self._motion(odometry), applied=self._driver.applied, dt=elapsed)
+
+    def _motion(self, odometry: Odometry) -> tuple[Any, Any, Any]:
+        """As the law gets it."""
+        return odometry.position - self._origin, odometry.velocity, odometry.attitude
 
     def _has_leapt(self, odometry: Odometry) -> bool:
         """Whether no vehicle moves so far from its last position in that time; false without one."""
@@ -243,16 +267,3 @@ class Companion:
         """s between two odometries; None, which is the sampling time, where the clock was set."""
         elapsed = (odometry.time_usec - before.time_usec) / 1e6
         return elapsed if 0 < elapsed <= JUMP else None
-
-    def _made(self, pulses: Any, time_usec: int) -> list[Any]:
-        neutral, span = float(self._esc.neutral), float(self._esc.span)
-        by_channel = self.channels.of_outputs(pulses, neutral)
-        return self._commands(self._target, Pulses(by_channel, neutral, span), time_usec)
-
-
-def driven(of: tuple[HybridVehicle, ESC], _, volts: Inputs):
-    """Pulses, us, for the volts of a law, and the volts that these give, which the law gets as applied."""
-    plant, speed_controllers = of
-    bus = jnp.asarray(plant.thruster.supply)
-    pulses = speed_controllers.pulse(jnp.clip(volts, *plant.thruster.limits()), bus)
-    return (), (pulses, speed_controllers.voltage(pulses, bus))

@@ -1,24 +1,15 @@
-"""The UDP socket of a companion, and the loop that serves it."""
+"""The UDP socket of a companion."""
 
 import socket
-import time
-from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.core.errors import BadInput
-from undertow.interop.latency import Latency
-from undertow.interop.mavlink.companion import Companion
-from undertow.interop.mavlink.odometry import ODOMETRIES
-from undertow.interop.mavlink.permission import HEARTBEAT_TIMEOUT
-from undertow.realtime.watchdog import Watchdog
+from undertow.interop.mavlink.message_codec import MessageCodec
 
 _LONGEST = 65535  # bytes of a datagram
-_LOOK = 0.05  # s, longest wait before what is due is sent
 _AT_ONCE = 256  # datagrams that are read at once
-_LAST = 3  # times that neutral commands are sent at the end: any of them may be lost
-_HELD = 0.5  # s between two times that the watchdog gets what to send
 _KINDS = ("udp", "udpin", "udpout")
 
 
@@ -29,9 +20,11 @@ class UdpLink:
         place: `udpin:HOST:PORT` (or `udp:...`) listens there, and answers to where the vehicle's messages come from;
             `udpout:HOST:PORT` sends there.
         system, component: our ids.
+        key: 32 bytes with which messages are signed, and those of the vehicle must be; None for no signatures.
 
     Attributes:
         socket: that it uses.
+        codec: of the messages, which counts what it refuses.
         port: on which it listens.
         peer: address of the vehicle; None before it is known.
         unsent: messages that the network did not take, such as while a cable is unplugged. They are lost.
@@ -40,15 +33,22 @@ class UdpLink:
         BadInput: the place is none, or the port is taken.
     """
 
-    def __init__(self, place: str, system: int = 255, component: int = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER):
+    def __init__(
+        self,
+        place: str,
+        system: int = 255,
+        component: int = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER,
+        key: bytes | None = None,
+    ):
         kind, address = _parsed(place)
         for name, number in (("system", system), ("component", component)):
             if not 1 <= number <= 255:
                 raise BadInput(name, "be from 1 to 255", number)
-        self._packer: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.codec = MessageCodec(system, component, key)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
-        self.unsent, self._fixed = 0, kind == "udpout"
+        self.unsent, self._fixed, self._signed = 0, kind == "udpout", key is not None
+        self._caller: Any = None  # who sent last while the vehicle is unknown
         try:
             if kind == "udpout":
                 self.peer = socket.gethostbyname(address[0]), address[1]
@@ -79,8 +79,9 @@ class UdpLink:
                 data, sender = self.socket.recvfrom(_LONGEST)
             except OSError:  # nothing there, or nobody listens on the other side
                 break
+            self._caller = sender
             if not self._fixed or sender == self.peer:
-                found += [(message, sender) for message in parsed(data)]
+                found += [(message, sender) for message in self.codec.parsed(data)]
         return found
 
     def drain(self) -> None:
@@ -90,113 +91,19 @@ class UdpLink:
                 break
 
     def send(self, messages: list[Any]) -> None:
-        """Send messages to the vehicle, if its address is known."""
-        if self.peer is None:
+        """Send messages to the vehicle, if its address is known.
+
+        With signatures, who sends meanwhile gets them: an autopilot without a clock sets the time of its signatures by
+        those that it receives, and until then they are old.
+        """
+        peer = self._caller if self.peer is None and self._signed else self.peer
+        if peer is None:
             return
-        for data in self.packed(messages):
+        for data in self.codec.packed(messages):
             try:
-                self.socket.sendto(data, self.peer)
+                self.socket.sendto(data, peer)
             except OSError:  # the vehicle notices that commands are missing, and the next one may get through
                 self.unsent += 1
-
-    def packed(self, messages: list[Any]) -> list[bytes]:
-        """Messages as datagrams, numbered on."""
-        found = []
-        for message in messages:
-            found.append(message.pack(self._packer))
-            self._packer.seq = (self._packer.seq + 1) % 256
-        return found
-
-
-def parsed(data: bytes) -> list[Any]:
-    """Messages in the bytes of a datagram; what is none is left out, and so are those of an unknown kind.
-
-    Without knowing the kind, pymavlink cannot check the sum of a message: random bytes pass as one.
-    """
-    parser: Any = mavlink.MAVLink(None)
-    parser.robust_parsing = True
-    found = parser.parse_buffer(data) or []
-    return [one for one in found if not isinstance(one, mavlink.MAVLink_bad_data | mavlink.MAVLink_unknown)]
-
-
-def accompany(
-    companion: Companion,
-    link: UdpLink,
-    report: Callable[[str], None] = lambda line: None,
-    until: Callable[[], bool] = lambda: False,
-    every: float = 1.0,
-    latency: Latency | None = None,
-) -> None:
-    """Let a companion talk through a link until it is to end, or Ctrl-C. What is sent last are neutral commands.
-
-    A `Watchdog` sends them where this process is killed, or stands still for longer than the companion's timeout.
-
-    The vehicle is where the first message of the target comes from. With `udpin`, another sender takes its place after
-    3 s without one. Of odometries that have queued up, the newest counts. After a standstill of this process nothing
-    counts that came meanwhile.
-
-    Args:
-        companion: rules, with the law.
-        link: to the vehicle.
-        report: gets a line about the link.
-        until: whether to end; asked twenty times a second.
-        every: s between these lines.
-        latency: gets the time from each odometry to the commands.
-    """
-    measured = latency or Latency()
-    due, received, steps, held = time.monotonic() + every, -float("inf"), 0, -float("inf")
-    watchdog, looked = Watchdog(link.socket, companion.timeout), time.monotonic()
-    try:
-        while not until():
-            messages = link.receive(max(0.001, min(_LOOK, due - time.monotonic())))
-            begun, now = time.perf_counter(), time.monotonic()
-            if now - looked > _LOOK + companion.timeout:
-                link.drain()
-                messages = []
-            looked = now
-            arrived = []
-            for message, sender in messages:
-                if companion.is_from_target(message):
-                    if link.peer is not None and sender != link.peer and now - received < HEARTBEAT_TIMEOUT:
-                        continue
-                    link.peer, received = sender, now
-                arrived.append(message)
-            for message in _newest(arrived, companion):
-                before = companion.counts["steps"]
-                answer = companion.receive(message, now)
-                if companion.running and link.peer and now - held > _HELD:  # before the first command, too
-                    watchdog.hold(link.peer, link.packed(companion.neutral()))
-                    held = now
-                link.send(answer)
-                if companion.counts["steps"] > before:
-                    measured.add(time.perf_counter() - begun)
-            link.send(companion.idle(time.monotonic()))
-            watchdog.alive()
-            if time.monotonic() >= due:
-                report(status_line(companion, link, measured, (companion.counts["steps"] - steps) / every))
-                steps, due = companion.counts["steps"], time.monotonic() + every
-    finally:
-        for _ in range(_LAST):
-            link.send(companion.neutral())
-        watchdog.done()
-
-
-def _newest(messages: list[Any], companion: Companion) -> list[Any]:
-    """Messages without the odometries of the vehicle after which a newer one has come."""
-    last = {message.get_type(): message for message in messages if companion.is_from_target(message)}
-    old = lambda message: message.get_type() in ODOMETRIES and message is not last[message.get_type()]
-    found = [message for message in messages if not (companion.is_from_target(message) and old(message))]
-    companion.counts["superseded"] += len(messages) - len(found)
-    return found
-
-
-def status_line(companion: Companion, link: UdpLink, latency: Latency, rate: float) -> str:
-    """What is going on, in one line; `rate` is that of the steps, Hz."""
-    timing = companion.steps_counted
-    counts = companion.counts | {"late": timing["late"], "missed": timing["missed"], "unsent": link.unsent}
-    parts = [companion.state(time.monotonic()), f"{rate:.0f} Hz", f"step {latency}"]
-    parts += [f"{name} {number}" for name, number in counts.items() if number and name != "steps"]
-    return "; ".join([*parts, companion.complaint] if companion.complaint else parts)
 
 
 def _parsed(place: str) -> tuple[str, tuple[str, int]]:

@@ -10,7 +10,8 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.realtime.plausible_motion import check_plausible
 
-SOURCES = ("odometry", "local_position")
+# Word of the option -> messages with the odometry.
+MESSAGES = {"odometry": ("ODOMETRY",), "local_position": ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED")}
 ODOMETRIES = ("ODOMETRY", "LOCAL_POSITION_NED")  # messages with a position
 
 # Frames of ODOMETRY that are used as they are: axes north, east, down, or forward, starboard, down of some heading.
@@ -59,7 +60,7 @@ class OdometryReader:
     """
 
     def __init__(self, source: str = "odometry"):
-        checks.choice("input", source, SOURCES)
+        checks.choice("input", source, tuple(MESSAGES))
         self._source, self._attitude = source, None
 
     def read(self, message: Any) -> Odometry | None:

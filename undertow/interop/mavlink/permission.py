@@ -35,6 +35,15 @@ class Permission:
         if not self.armed:
             self._mode, self._leapt = None, False
 
+    @property
+    def begun(self) -> bool:
+        """Whether the law has run since the vehicle was armed."""
+        return self._mode is not None
+
+    def is_heard(self, now: float) -> bool:
+        """Whether the autopilot is there: its last heartbeat is no older than 3 s."""
+        return now - self._heartbeat <= HEARTBEAT_TIMEOUT
+
     def begin(self) -> None:
         """The law runs from now on: the mode is the one that the pilot gives it."""
         self._mode = self._present_mode
@@ -45,7 +54,7 @@ class Permission:
 
     def why_not(self, now: float) -> str:
         """Why the law may not run; "" where it may."""
-        if now - self._heartbeat > HEARTBEAT_TIMEOUT:
+        if not self.is_heard(now):
             return f"no heartbeat of system {self._system}"
         if not self.armed:
             return "disarmed"
