@@ -35,6 +35,12 @@ def ending_signals() -> list[signal.Signals]:
     return [one for one in _ENDING if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN]
 
 
+def forget_interrupts() -> None:
+    """As if no signal had come, where another command begins in the same process."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    _asked.clear()
+
+
 def interrupted_by() -> int:
     """Number of the signal that ends this process; that of Ctrl-C by default."""
     return _asked[0][0] if _asked else signal.SIGINT

@@ -11,6 +11,7 @@ import typer
 
 from undertow.cli import exit_codes
 from undertow.cli.interruptible import interruptible
+from undertow.cli.kept_commands import kept
 from undertow.core.errors import BadInput
 
 _WRITTEN = ("soak.json", "soak.html", "failures")
@@ -20,12 +21,13 @@ _SHOWN = 20  # failures that are printed
 def soak(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PART]...", help="inputs, kills, hours, faults, controls. Default: all."),
+        typer.Argument(metavar="[PART]...", help="inputs, kills, hours, faults, controls, links. Default: all."),
     ] = None,
     inputs: Annotated[int | None, typer.Option(metavar="N", help="Hostile inputs. Default: 2000.")] = None,
     kills: Annotated[int | None, typer.Option(metavar="N", help="Ended processes. Default: 5.")] = None,
     hours: Annotated[float | None, typer.Option(metavar="H", help="Simulated vehicle-hours. Default: 4.")] = None,
     faults: Annotated[int | None, typer.Option(metavar="N", help="Runs with random faults. Default: 500.")] = None,
+    links: Annotated[int | None, typer.Option(metavar="N", help="Runs of each link command. Default: 20.")] = None,
     minutes: Annotated[
         float | None, typer.Option(metavar="M", help="Begin nothing further after this time. Default: no limit.")
     ] = None,
@@ -44,15 +46,16 @@ def soak(
     """Attack undertow itself, and count what must never happen.
 
     The command tries thousands of hostile files and command lines, kills campaigns and resumes them, simulates hours in
-    waves and noise, injects random faults, and checks that an unprotected law fails where it must. It writes soak.json,
-    soak.html, and the files of each failed input. The exit code is 1 if there was a never-event.
+    waves and noise, injects random faults, checks that an unprotected law fails where it must, and attacks the commands
+    that control a vehicle. It writes soak.json, soak.html, and the files of each failed input. The exit code is 1 if
+    there was a never-event.
     """
     from undertow.soak import soak as soaking
 
     if replay is not None:
         return _replayed(replay)
     amounts = soaking.SHORT if short else soaking.Amounts()
-    given = {"inputs": inputs, "kills": kills, "hours": hours, "faults": faults}
+    given = {"inputs": inputs, "kills": kills, "hours": hours, "faults": faults, "links": links}
     amounts = amounts._replace(**{name: _count(name, value) for name, value in given.items() if value is not None})
     asked = [part for part in soaking.check_parts(parts or []) if getattr(amounts, part, 1)]
     if not asked:
@@ -93,7 +96,7 @@ def _soak(parts: Sequence[str], amounts: Any, seed: int, minutes: float, out: Pa
         output_folder(out, Path("runs") / "soak") as folder,
         results_folder(folder, _WRITTEN, "soak.json", overwrite) as draft,
     ):
-        found = interruptible(lambda: soaking.soak(attacked, parts, amounts, seed, minutes, progress))
+        found = interruptible(lambda: soaking.soak(attacked, parts, amounts, seed, minutes, progress, kept))
         (draft.path / "soak.json").write_text(json.dumps(found.summary, indent=1) + "\n", encoding="utf-8")
         (draft.path / "soak.html").write_text(soak_page(found.summary), encoding="utf-8")
         for failure, given in found.attacks:
@@ -133,7 +136,7 @@ def _replayed(what: str) -> int:
     file = Path(what).suffix == ".json"
     failed = False
     for identity in soaking.identities(Path(what)) if file else [what]:
-        failure, words = soaking.replayed(attacked, identity)
+        failure, words = soaking.replayed(attacked, identity, kept)
         verdict = f"{failure.event}, {failure.says}" if failure else "no never-event"
         print(exit_codes.printable(f"{identity}: {verdict}. {words}"))
         failed |= failure is not None

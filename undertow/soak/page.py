@@ -122,7 +122,41 @@ def _controls(found: Mapping[str, Any]) -> Html:
     return section("controls", "Negative controls", tag("p", words), table(head, rows, wide=True))
 
 
-_SECTIONS = {"inputs": _inputs, "kills": _kills, "hours": _hours, "faults": _faults, "controls": _controls}
+def _links(found: Mapping[str, Any]) -> Html:
+    words = (
+        f"{found['number']} runs of link commands were attacked in {_time(found['seconds'])}: signals, standstills, "
+        "full disks, wrong, old, repeated, reordered and damaged messages, and messages of others. Each must end with "
+        "the vehicle stopped in the stated time, and no single message or signal may give full thrust for more than 0.5 s."
+    )
+    head = ("link", "runs", "with a never-event", "V s undisturbed", "V s worst")
+    head += ("full thrust after one message, s", "longest full thrust, s", "furthest, m", "until neutral, s")
+    keys = ("undisturbed_volt_seconds", "worst_volt_seconds", "full_after_one", "full", "furthest", "neutral_after")
+    rows = [
+        (one["link"], str(one["runs"]), str(one["failed"]), *(f"{one[key]:.4g}" for key in keys))
+        for one in found["rows"]
+    ]
+    worst = [
+        (one["identity"], f"{one['volt_seconds']:.4g}", f"{one['full']:.2f}", one["plan"]) for one in found["worst"]
+    ]
+    left_out = [f"{link} was left out: {why}." for link, why in found["left_out"].items()]
+    return section(
+        "links",
+        "Links",
+        tag("p", words),
+        table(head, rows, range(1, len(head)), wide=True),
+        table(("run", "V s", "full thrust, s", "what happened"), worst, (1, 2), wide=True),
+        *([bullets(left_out)] if left_out else []),
+    )
+
+
+_SECTIONS = {
+    "inputs": _inputs,
+    "kills": _kills,
+    "hours": _hours,
+    "faults": _faults,
+    "controls": _controls,
+    "links": _links,
+}
 
 
 def _time(seconds: float) -> str:

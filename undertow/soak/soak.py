@@ -14,30 +14,38 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, did_you_mean
-from undertow.soak import controls, faults_soak, hours_soak, kills
+from undertow.soak import controls, faults_soak, hours_soak, kills, links_soak
 from undertow.soak.input_soak import try_inputs
 from undertow.soak.inputs import KINDS, Attack, attack
 from undertow.soak.material import material
 from undertow.soak.trying import Run, try_in_process
 from undertow.soak.verdict import EVENTS, Failure, judged
 
-PARTS = ("inputs", "kills", "hours", "faults", "controls")
+PARTS = ("inputs", "kills", "hours", "faults", "controls", "links")
 
 Watch = Callable[[str, str], None]  # called with the name of a part and its progress in words
 
 
 class Amounts(NamedTuple):
-    """How much of each part: numbers of inputs, kills and runs with faults; vehicle-hours; fewer controls or all."""
+    """How much of each part.
+
+    Attributes:
+        inputs, kills, faults: numbers of hostile inputs, ended processes, runs with faults.
+        hours: vehicle-hours.
+        short_controls: fewer controls or all.
+        links: runs of each link command.
+    """
 
     inputs: int = 2000
     kills: int = 5
     hours: float = 4.0
     faults: int = 500
     short_controls: bool = False
+    links: int = 20
 
 
 # Under a minute on two cores.
-SHORT = Amounts(inputs=300, kills=0, hours=0.2, faults=0, short_controls=True)
+SHORT = Amounts(inputs=300, kills=0, hours=0.2, faults=0, short_controls=True, links=0)
 
 
 class Soaked(NamedTuple):
@@ -59,6 +67,7 @@ def soak(
     seed: int,
     minutes: float = float("inf"),
     watch: Watch | None = None,
+    run_link: Run | None = None,
 ) -> Soaked:
     """Run parts of a soak.
 
@@ -70,6 +79,7 @@ def soak(
         minutes: after which no further input, campaign, loop or block of runs begins; the parts that are left share
             what is left of it.
         watch: called with the progress.
+        run_link: as `run`, for the commands of links; it may keep what it compiles from call to call. None for `run`.
     """
     began = time.monotonic()
     said = watch or (lambda part, words: None)
@@ -82,7 +92,8 @@ def soak(
             until = time.monotonic() + left / (len(parts) - number)
             folder = Path(name) / part
             folder.mkdir()
-            described, own, hostile = _PARTS[part](run, amounts, seed, folder, until, said)
+            caller = run_link if part == "links" and run_link is not None else run
+            described, own, hostile = _PARTS[part](caller, amounts, seed, folder, until, said)
             found[part] = described
             failures += own
             attacks += hostile
@@ -102,12 +113,12 @@ def soak(
     return Soaked(summary, attacks)
 
 
-def replayed(run: Run, identity: str) -> tuple[Failure | None, str]:
+def replayed(run: Run, identity: str, run_link: Run | None = None) -> tuple[Failure | None, str]:
     """Repeat one input or run by its identity; the never-event if it occurs again, and what happened in words.
 
     Args:
-        run: as of `soak`.
-        identity: such as inputs/scenario/7/123, faults/7/12, hours/0/24/7 or controls/D3.
+        run, run_link: as of `soak`.
+        identity: such as inputs/scenario/7/123, faults/7/12, hours/0/24/7, controls/D3 or links/mavlink-rc/7/12.
 
     Raises:
         BadInput: no such identity, or one of a kill, whose moment cannot be repeated.
@@ -120,6 +131,8 @@ def replayed(run: Run, identity: str) -> tuple[Failure | None, str]:
             one = hours_soak.replay(identity) if part == "hours" else faults_soak.replay(identity)[1]
             found = [Failure(event, identity, says) for event, says in one.events()]
             return (found[0] if found else None), f"{one.status.word} at {one.ended:g} s, digest {one.digest}"
+        if part == "links":
+            return _replayed_link(run_link or run, identity)
         if part == "controls":
             row = controls.judged_control({one.identity: one for one in controls.CONTROLS}[rest[0]])
             return None, f"{row['found']}; beside it: {row['beside']}"
@@ -135,6 +148,13 @@ def _replayed_input(run: Run, kind: str, seed: str, number: str) -> tuple[Failur
         done = try_in_process(run, given, Path(name))
     failure = judged(given.identity, given.arguments, given.files, done)
     return failure, f"undertow {' '.join(given.arguments)}: exit code {done.code}. {done.err.strip()}"
+
+
+def _replayed_link(run: Run, identity: str) -> tuple[Failure | None, str]:
+    with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
+        one = links_soak.replay(run, identity, Path(name))
+    words = f"{one.plan}: exit code {one.code}, {one.volt_seconds:.0f} V s, full thrust for {one.longest_full:.2f} s"
+    return (one.failures[0] if one.failures else None), words
 
 
 def valid_files(run: Run) -> dict[str, bytes]:
@@ -204,12 +224,21 @@ def _controls(run: Run, amounts: Amounts, seed: int, folder: Path, until: float,
     return _plain(found._asdict()), found.failures, []
 
 
+def _links(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+    words = lambda done: ", ".join(f"{link} {count}" for link, count in done.items())
+    shown = _seldom(lambda done, asked: said("links", f"{words(done)} of {asked}"))
+    watch = lambda done: shown(done, amounts.links)
+    found = links_soak.attack_links(run, amounts.links, seed, folder, until=until, watch=watch)
+    return _plain(found._asdict()) | {"asked": amounts.links}, found.failures, []
+
+
 _PARTS: Mapping[str, Callable[..., Described]] = {
     "inputs": _inputs,
     "kills": _kills,
     "hours": _hours,
     "faults": _faults,
     "controls": _controls,
+    "links": _links,
 }
 
 
@@ -217,11 +246,11 @@ def _plain(described: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in described.items() if key != "failures"}
 
 
-def _seldom(watch: Callable[[int, int], None]) -> Callable[[int, int], None]:
+def _seldom(watch: Callable[[Any, int], None]) -> Callable[[Any, int], None]:
     """Call a function once a second at most."""
     last = [0.0]
 
-    def called(done: int, failed: int) -> None:
+    def called(done: Any, failed: int) -> None:
         if time.monotonic() - last[0] > 1.0:
             last[0] = time.monotonic()
             watch(done, failed)

@@ -14,6 +14,8 @@ EVENTS = {
     "N5": "A trial was lost, doubled or altered by an interruption.",
     "N6": "The same inputs gave other bytes.",
     "N7": "A key, a fault or an option was ignored in silence.",
+    "N8": "A vehicle behind a link was not stopped in time, or got full thrust from one message or signal.",
+    "N9": "A log lost more than its last second.",
     "message": "An error is not one line that names a key, a line, a file or an option.",
     "partial": "A command that failed left files behind.",
 }
