@@ -15,11 +15,11 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.soak.links.ardupilot_run import ArdupilotRunner
+from undertow.soak.links.command_process import CommandProcess, end_with_parent
 from undertow.soak.links.driven_vehicle import DrivenVehicle
 from undertow.soak.links.link_run import LinkRun, LinkRunner
 from undertow.soak.links.plan import LINKS, Plan, plan
 from undertow.soak.links.scenario import SCENARIO
-from undertow.soak.links.tested_command import TestedCommand, end_with_parent
 from undertow.soak.links.udp_peer import UdpPeer
 from undertow.soak.trying import Run
 from undertow.soak.verdict import Failure
@@ -27,7 +27,7 @@ from undertow.soak.verdict import Failure
 _PACKAGES = {"mavlink-rc": ("pymavlink",), "mavlink-servo": ("pymavlink",), "ros2": ("cyclonedds", "rosbags")}
 _OUTPUTS = {"mavlink-rc": "rc_override", "mavlink-servo": "servo"}
 _DOMAINS = range(120, 220)  # of ROS 2
-_LATEST = 600.0  # s without a run, after which a process is given up
+_LATEST = 900.0  # s without a run, after which a process is given up
 
 Runner = Callable[[Plan], LinkRun]
 
@@ -118,7 +118,7 @@ def replay(run: Run, identity: str, folder: Path) -> LinkRun:
     _, link, seed, number = identity.split("/")
     if link not in LINKS:
         raise BadInput("--replay", f"be of a link ({', '.join(LINKS)})", link)
-    command = TestedCommand(run, folder)
+    command = CommandProcess(run, folder)
     try:
         return _runner(link, command, folder, int(seed))(plan(link, int(seed), int(number)))
     finally:
@@ -130,7 +130,7 @@ def _attack_link(run: Run, link: str, number: int, seed: int, folder: str, limit
     began = time.monotonic()
     signal.signal(signal.SIGTERM, _leave)
     end_with_parent()
-    command = TestedCommand(run, Path(folder))
+    command = CommandProcess(run, Path(folder))
     try:
         runner = _runner(link, command, Path(folder), seed)
         for k in range(number):
@@ -147,7 +147,7 @@ def _leave(number: int, frame: Any) -> None:
     raise KeyboardInterrupt
 
 
-def _runner(link: str, command: TestedCommand, folder: Path, seed: int) -> Runner:
+def _runner(link: str, command: CommandProcess, folder: Path, seed: int) -> Runner:
     """What runs the plans of a link. Optional packages are imported where they are needed."""
     scenario = folder / "scenario.yaml"
     scenario.write_text(SCENARIO, encoding="utf-8")

@@ -126,7 +126,7 @@ def _links(found: Mapping[str, Any]) -> Html:
     words = (
         f"{found['number']} runs of link commands were attacked in {_time(found['seconds'])}: signals, standstills, "
         "full disks, wrong, old, repeated, reordered and damaged messages, and messages of others. Each must end with "
-        "the vehicle stopped in the stated time, and no single message or signal may give full thrust for more than 0.5 s."
+        "the vehicle stopped in the stated time, and no single message or signal may give full thrust for 0.5 s."
     )
     head = ("link", "runs", "with a never-event", "V s undisturbed", "V s worst")
     head += ("full thrust after one message, s", "longest full thrust, s", "furthest, m", "until neutral, s")

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from undertow.soak.links.command_process import CommandProcess
 from undertow.soak.links.link_run import LinkRun
 from undertow.soak.links.peer import damaged
 from undertow.soak.links.plan import CODES, STATED, Plan, signals_of
 from undertow.soak.links.scenario import PERIOD
-from undertow.soak.links.tested_command import TestedCommand
 from undertow.soak.verdict import Failure
 
 _RATE = round(1 / PERIOD)  # Hz
 _MAGIC = 18458  # of packets with 16 channels
-_BEGINS = 120.0  # s
+_BEGINS = 600.0  # s
 _AGAIN = 0.5  # s after which the packet is sent again
 _LONGEST = 65535  # bytes
 _DAMAGED = ("garbage", "other version", "wild")
@@ -34,7 +34,7 @@ class ArdupilotRunner:
         scenario: file.
     """
 
-    def __init__(self, command: TestedCommand, scenario: Path):
+    def __init__(self, command: CommandProcess, scenario: Path):
         self._command, self._scenario = command, scenario
 
     def run(self, plan: Plan) -> LinkRun:

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from undertow.soak.links.command_process import CommandProcess
 from undertow.soak.links.driven_vehicle import DrivenVehicle
 from undertow.soak.links.peer import AbstractPeer, Measured, altered, measured_of
 from undertow.soak.links.plan import CODES, STATED, Event, Plan, signals_of
 from undertow.soak.links.scenario import MAX_AGE, PERIOD
-from undertow.soak.links.tested_command import TestedCommand
 from undertow.soak.verdict import Failure
 
-_BEGINS = 120.0  # s, longest wait for the first command: the law is compiled before
+_BEGINS = 600.0  # s, longest wait for the first command: the law is compiled before
 _WATCHED = 1.5  # s after the stated time for which the vehicle must stay stopped
 _TRANSIENT = 0.5  # s of full thrust that one message or signal may cause
 _LONGEST = 0.1  # s by which the vehicle moves in a step, should this process stand still itself
@@ -60,7 +60,7 @@ class LinkRunner:
 
     def __init__(
         self,
-        command: TestedCommand,
+        command: CommandProcess,
         peer: AbstractPeer,
         vehicle: DrivenVehicle,
         scenario: Path,

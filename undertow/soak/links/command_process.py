@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import resource
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -16,7 +17,7 @@ from undertow.soak.trying import Run
 _CONTINUES = 10.0  # s, longest wait for the end of a command after its last signal
 
 
-class TestedCommand:
+class CommandProcess:
     """A process that runs `undertow` with arguments, and says how each call ended; a new one where it was killed.
 
     Args:
@@ -103,6 +104,8 @@ def _serve(run: Run, pipe: Connection, printed: str) -> None:
         most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
         resource.setrlimit(resource.RLIMIT_FSIZE, (most if disk is None else disk, most))
         code = run(arguments)
+        with contextlib.suppress(OSError):  # a full disk
+            sys.stdout.flush()
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
         _patiently(lambda code=code: pipe.send(code))
 
