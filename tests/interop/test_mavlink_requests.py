@@ -74,7 +74,12 @@ def test_what_is_refused_is_said_until_it_comes(requests):
     answer(requests, 0.1, DENIED)
     assert requests.complaint() == "the vehicle refuses to send ATTITUDE_QUATERNION (MAV_RESULT_DENIED)"
     assert [asked(requests, float(k)) for k in (1, 2, 3)] == [POSITION] * 3
-    attitude(requests, 3.5)
+    answer(requests, 3.1, ACCEPTED)
+    for k in range(40):
+        position(requests, 4.0 + 0.15 * k)
+    assert asked(requests, 10.0) is None and asked(requests, 10.2) == ATTITUDE  # once more, ten seconds later
+    assert "refuses" in requests.complaint()
+    attitude(requests, 10.5)
     assert requests.complaint() == ""
 
 
