@@ -41,19 +41,19 @@ def measured(supervised: bool, precision: str) -> list[dict[str, Any]]:
 
 def done(folder: str, *command: Any) -> str:
     """What a command prints."""
-    finished = subprocess.run(map(str, command), cwd=folder, capture_output=True, text=True, timeout=600)
+    finished = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, timeout=600)
     if finished.returncode != 0:
         sys.exit(f"{command[0]} failed: {finished.stderr}{finished.stdout}")
     return finished.stdout
 
 
 def main() -> None:
-    rows = [row for supervised in (False, True) for precision in ("float32", "float64")
-            for row in measured(supervised, precision)]  # fmt: skip
     print(f"{'supervisor':<12}{'precision':<11}{'option':<8}{'code':>8}{'state':>8}{'stack':>8}  steps that differ")
-    for row in rows:
-        numbers = f"{row['code']:>8}{row['state']:>8}{row['stack']:>8}  {row['different']} of {row['steps']}"
-        print(f"{row['supervisor']!s:<12}{row['precision']:<11}{row['option']:<8}{numbers}")
+    for supervised in (False, True):
+        for precision in ("float32", "float64"):
+            for row in measured(supervised, precision):
+                numbers = f"{row['code']:>8}{row['state']:>8}{row['stack']:>8}  {row['different']} of {row['steps']}"
+                print(f"{row['supervisor']!s:<12}{row['precision']:<11}{row['option']:<8}{numbers}", flush=True)
 
 
 if __name__ == "__main__":

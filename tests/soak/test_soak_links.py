@@ -139,7 +139,7 @@ class PretendedCommand:
 class PretendedPeer(AbstractPeer):
     """Gives volts by the number of the call; after the end, `last`."""
 
-    arguments = ("run", "SCENARIO")
+    arguments = ["run", "SCENARIO"]  # noqa: RUF012 - nobody changes it
 
     def __init__(self, command, volts, last):
         self._command, self._volts, self._last = command, volts, last
@@ -189,7 +189,8 @@ class PretendedVehicle:
 def judged(volts=1.0, last=0.0, events=(), code=130, log=None, stops_itself=False):
     command = PretendedCommand(code)
     peer = PretendedPeer(command, volts, last)
-    runner = LinkRunner(command, peer, PretendedVehicle(), Path("s.yaml"), log, stops_itself)
+    vehicle = PretendedVehicle()
+    runner = LinkRunner(command, peer, vehicle, Path("s.yaml"), log, stops_itself)  # pyright: ignore[reportArgumentType]
     found = runner.run(Plan("links/run/1/1", events, "INT", 16, None, "seed"))
     return found, peer, command
 

@@ -11,6 +11,7 @@ from undertow.process_setup import prepare
 _COMPILED = (
     ("undertow.cli.run", "build", ""),
     ("undertow.cli.run", "_autopilot", ""),
+    ("undertow.cli.ardupilot", "SteppedVehicle", ""),
     ("undertow.interop.mavlink.companion", "Autopilot", "pymavlink"),
     ("undertow.interop.mavlink.companion", "ThrusterDriver", "pymavlink"),
     ("undertow.interop.ros2.controller_node", "CompiledController", "cyclonedds"),
@@ -48,6 +49,8 @@ def _once(name: str, make: Callable[..., Any]) -> Callable[..., Any]:
     def first_or_again(*arguments: Any, **options: Any) -> Any:
         if name not in _kept:
             _kept[name] = make(*arguments, **options)
+        elif hasattr(_kept[name], "restart"):  # a vehicle; laws are started by their links
+            _kept[name].restart()
         return _kept[name]
 
     return first_or_again

@@ -60,7 +60,7 @@ def attack_links(
     folder: Path,
     links: Sequence[str] = LINKS,
     until: float = float("inf"),
-    watch: Callable[[Mapping[str, int]], None] = lambda done: None,
+    watch: Callable[[Mapping[str, int], Sequence[Failure]], None] = lambda done, failures: None,
 ) -> Links:
     """Run every link command so many times, each time attacked in another way.
 
@@ -71,7 +71,7 @@ def attack_links(
         folder: for scenarios and logs; empty.
         links: some of `plan.LINKS`.
         until: time of `time.monotonic` after which no further run begins.
-        watch: called with the number of runs that are done, by link.
+        watch: called with the number of runs that are done, by link, and the never-events of the last ones.
     """
     began, left_out = time.monotonic(), {}
     runs: dict[str, list[LinkRun]] = {}
@@ -91,16 +91,18 @@ def attack_links(
         pipes[pipe], runs[link] = link, []
     try:
         while pipes:
-            ready = wait(list(pipes), _LATEST)
+            ready: list[Any] = wait(list(pipes), _LATEST)
             if not ready:
                 left_out |= dict.fromkeys(pipes.values(), f"no run within {_LATEST:g} s")
                 break
+            found: list[Failure] = []
             for pipe in ready:
                 try:
                     runs[pipes[pipe]].append(pipe.recv())
+                    found += runs[pipes[pipe]][-1].failures
                 except EOFError:
                     del pipes[pipe]
-            watch({link: len(each) for link, each in runs.items()})
+            watch({link: len(each) for link, each in runs.items()}, found)
     finally:
         for process in processes:
             process.terminate() if pipes else process.join()

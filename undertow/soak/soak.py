@@ -227,7 +227,12 @@ def _controls(run: Run, amounts: Amounts, seed: int, folder: Path, until: float,
 def _links(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
     words = lambda done: ", ".join(f"{link} {count}" for link, count in done.items())
     shown = _seldom(lambda done, asked: said("links", f"{words(done)} of {asked}"))
-    watch = lambda done: shown(done, amounts.links)
+
+    def watch(done: Mapping[str, int], failures: Sequence[Failure]) -> None:
+        shown(done, amounts.links)
+        for one in failures:
+            said("links", f"{one.event} {one.identity}: {one.says}")
+
     found = links_soak.attack_links(run, amounts.links, seed, folder, until=until, watch=watch)
     return _plain(found._asdict()) | {"asked": amounts.links}, found.failures, []
 

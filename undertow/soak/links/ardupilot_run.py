@@ -109,6 +109,8 @@ class ArdupilotRunner:
         return None
 
     def _exchange(self, packet: bytes, longest: float) -> Any:
+        """The newest answer that is there after one has come; None without any within so many seconds."""
+        newest = b""
         self._socket.settimeout(longest)
         try:
             self._socket.sendto(packet, self._address)
@@ -116,10 +118,8 @@ class ArdupilotRunner:
             self._socket.settimeout(0.0)
             while True:
                 newest = self._socket.recv(_LONGEST)
-        except (BlockingIOError, InterruptedError):
-            return json.loads(newest)
-        except OSError:
-            return None
+        except OSError:  # nothing, or nothing more, or nobody listens
+            return json.loads(newest) if newest else None
 
     def _packet(self, step: int) -> bytes:
         pulses = [round(1500 + 40 * np.sin(0.1 * step + k)) for k in range(8)]

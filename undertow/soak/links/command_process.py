@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 from undertow.soak.trying import Run
 
@@ -27,7 +28,7 @@ class CommandProcess:
 
     def __init__(self, run: Run, folder: Path):
         self._run, self._printed = run, folder / "printed.txt"
-        self._process: multiprocessing.process.BaseProcess | None = None
+        self._process: Any = None
 
     def begin(self, arguments: Sequence[str], disk: int | None = None) -> None:
         """Call `undertow`; no file may become larger than `disk` bytes, None for any size."""

@@ -111,11 +111,11 @@ class MavlinkPeer(AbstractPeer):
     def _odometry(self, measured: Measured, time: float, frame: int = mavlink.MAV_FRAME_LOCAL_NED) -> Any:
         with warnings.catch_warnings(), np.errstate(over="ignore"):
             warnings.simplefilter("ignore")
-            numbers = [np.float32(one).tolist() for one in (measured.position, measured.attitude, measured.velocity)]
+            numbers: Any = [np.float32(one).tolist() for one in measured]
         position, attitude, velocity = numbers
         frames = frame, mavlink.MAV_FRAME_BODY_FRD
         stamp = self._origin + round(1e6 * time)
-        made = mavlink.MAVLink_odometry_message
+        made: Any = mavlink.MAVLink_odometry_message
         return made(stamp, *frames, *position, attitude, *velocity, _UNKNOWN, _UNKNOWN, 0, 3, 0)
 
     def _transmit(self, by: socket.socket, data: bytes) -> None:
