@@ -96,8 +96,18 @@ def test_lost_packets_are_counted_and_not_made_up(session):
 
 def test_an_autopilot_that_starts_again_finds_the_vehicle_at_its_start(session):
     first = [session.answer(packet(k, [1700] * 8), SITL, 0.0) for k in range(50)]
+    assert session.answer(packet(0, [1700] * 8), SITL, 0.0) is None  # which it sends again without an answer
     again = [session.answer(packet(k, [1700] * 8), SITL, 0.0) for k in range(10)]
     assert again == first[:10] and session.counts["restarts"] == 1
+    assert session.answer(packet(0, [1700] * 8), SITL, SILENCE) == first[0] and session.counts["restarts"] == 2
+
+
+def test_a_copy_of_the_first_frame_does_not_restart_the_physics(session):
+    """Found by `soak links`: a zero was believed at once."""
+    for count in range(20):
+        session.answer(packet(count), SITL, 0.0)
+    assert session.answer(packet(0), SITL, 0.0) is None and session.answer(packet(20), SITL, 0.0) is not None
+    assert session.counts["late"] == 1 and session.counts["restarts"] == 0 and session.vehicle.time == 0.21
 
 
 def test_a_session_may_begin_at_any_count(session):
@@ -160,6 +170,6 @@ def test_a_vehicle_that_cannot_go_on_ends_the_session(session):
     valid = session.answer(packet(0), SITL, 0.0)
     session.vehicle._advance.state.nu[...] = 1e9
     assert session.answer(packet(1), SITL, 0.0) == valid and session.ended
-    assert session.answer(packet(0), SITL, 10.0) is None  # a late copy
-    session.answer(packet(2), SITL, 0.0)
-    assert session.answer(packet(0), SITL, 0.0) == valid and not session.ended
+    assert session.answer(packet(0), SITL, 1.0) is None  # a late copy
+    session.answer(packet(2), SITL, 1.0)
+    assert session.answer(packet(0), SITL, 1.0 + SILENCE) == valid and not session.ended

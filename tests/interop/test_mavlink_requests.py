@@ -56,7 +56,7 @@ def test_both_are_asked_for_in_turn_until_they_are_granted(requests):
 
 
 def test_what_comes_often_enough_needs_no_answer(requests):
-    """50 Hz is wanted: 4 Hz of some stream are not enough, 40 Hz are."""
+    """50 Hz is asked for: 4 Hz of some stream are not enough, 40 Hz are."""
     assert asked(requests, 0.0) == ATTITUDE
     for k in range(40):
         attitude(requests, 0.025 * k)

@@ -134,7 +134,7 @@ def test_pymavlinks_own_connection_understands_it():
 
 
 def test_an_autopilot_without_a_clock_gets_a_time():
-    """Its signatures are of 2015: they are refused, but it hears ours, and by them sets its time."""
+    """Its signatures are of 2015: they are refused, but it receives ours, and by them sets its time."""
     with UdpLink("udpin:127.0.0.1:0", key=KEY) as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
         peer.link.setup_signing(KEY, initial_timestamp=1)
         peer.heartbeat()

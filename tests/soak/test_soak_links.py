@@ -1,4 +1,4 @@
-"""The attack on link commands: what is drawn, what is judged, and a few runs of the real commands."""
+"""The attack on link commands: what is sampled, what is judged, and a few runs of the real commands."""
 
 import os
 import signal
@@ -14,6 +14,7 @@ from undertow.soak.links.command_process import CommandProcess
 from undertow.soak.links.link_run import LinkRunner
 from undertow.soak.links.peer import AbstractPeer, Measured, altered
 from undertow.soak.links.plan import ENDINGS, LINKS, STREAMS, WILD, Event, Plan, plan, signals_of
+from undertow.soak.links.scenario import PERIOD
 from undertow.soak.links_soak import attack_links
 
 pytestmark = pytest.mark.soak
@@ -21,7 +22,7 @@ pytestmark = pytest.mark.soak
 STILL = State(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(6), np.zeros(3), (), ())
 
 
-def test_plans_are_drawn_from_their_identity():
+def test_plans_are_sampled_from_their_identity():
     """The same seed and number give the same run, and a few hundred have everything."""
     plans = [plan("run", 5, k) for k in range(400)]
     assert plans == [plan("run", 5, k) for k in range(400)] and plans[1] != plan("run", 6, 1)
@@ -198,7 +199,7 @@ def judged(volts=1.0, last=0.0, events=(), code=130, log=None, stops_itself=Fals
 def test_a_run_that_is_as_it_must_be():
     found, peer, _ = judged()
     assert found.failures == [] and found.code == 130 and found.neutral_after < 0.2
-    assert found.volt_seconds == pytest.approx(8 * 16 * 0.05, rel=0.3) and len(peer.sent) > 16
+    assert found.volt_seconds == pytest.approx(8 * 16 * PERIOD, rel=0.3) and len(peer.sent) > 16
 
 
 def test_a_vehicle_that_is_not_stopped():

@@ -28,8 +28,8 @@ class Session:
       first frame of another process of the same machine;
     * the frame count of the last one: the autopilot has missed the reply, which is sent again (`repeated`);
     * a smaller frame count: a copy that comes late, or a flipped bit, since the protocol has no checksum: ignored
-      (`late`), unless it is zero, or the same or the next one follows it. Then the autopilot was restarted, and so is
-      the vehicle (`restarts`);
+      (`late`), unless the same or the next one follows it, or none came for `SILENCE`. Then the autopilot was
+      restarted, and so is the vehicle (`restarts`);
     * a larger frame count than the next: packets were lost on the way (`lost`); the physics advances by one frame, as
       the autopilot takes its time from the reply.
 
@@ -78,8 +78,7 @@ class Session:
         if other and now - self._received < SILENCE and not anew:
             self.counts["strangers"] += 1
             return None
-        smaller = packet.frame_count < self._last and (packet.frame_count > 0 or self._last == 1)
-        if not other and smaller:
+        if not other and packet.frame_count < self._last and now - self._received < SILENCE:
             follows = self._smaller is not None and packet.frame_count - self._smaller in (0, 1)
             self._smaller = packet.frame_count
             if not follows:

@@ -143,7 +143,7 @@ class Companion:
             self.counts["foreign"] += 1
             return []
         if message.get_type() == "HEARTBEAT":
-            if not self._permission.is_heard(now):
+            if not self._permission.is_present(now):
                 self._requests.begin_again()
             self._permission.note(message, now)
             self._stop_if_lost(now)
@@ -166,7 +166,7 @@ class Companion:
             self._sent_heartbeat = now
             kind, none = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
             found.append(mavlink.MAVLink_heartbeat_message(kind, none, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
-        if self._permission.is_heard(now):
+        if self._permission.is_present(now):
             found += self._requests.due(now)
         stopped = self.counts["starts"] and not self.running
         if stopped and now - self._sent_neutral >= NEUTRAL_PERIOD:

@@ -43,7 +43,7 @@ class CompanionLoop:
     ):
         self._companion, self._link = companion, link
         self._report, self._every, self._latency = report, every, latency or Latency()
-        self._received = self._held = -float("inf")  # s, last message of the target; when the watchdog was told
+        self._received = self._held = -float("inf")  # s, last message of the target; last words to the watchdog
         self._looked = self._due = 0.0  # s, when messages were looked for; of the next line
         self._steps = 0  # at the last line
 

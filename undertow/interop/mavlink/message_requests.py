@@ -9,18 +9,18 @@ from undertow.interop.mavlink.odometry import MESSAGES
 
 _AGAIN = 1.0  # s from one request to the next: an acknowledgement does not say to which message it belongs
 _SILENCE = 3.0  # s without a message that was granted, after which it is asked for again
-_PATIENCE = 10.0  # s after a refusal, which may have been meant for somebody else's request
-_ENOUGH = 0.7  # share of the wanted rate, from which on a message counts as coming
+_PATIENCE = 10.0  # s after a rejection, which may have been meant for somebody else's request
+_ENOUGH = 0.7  # share of the required rate, from which on a message counts as coming
 
-_REFUSALS = (mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_FAILED)
+_REJECTIONS = (mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_FAILED)
 
 
 class MessageRequests:
     """Requests for messages at the rate of the law, one after the other, once per second.
 
-    A message is asked for once at least, and then until it is granted, or it comes at 70 % of the wanted rate. One that
-    was granted and is silent for 3 s is asked for again: the autopilot may have been restarted. One that was refused is
-    asked for again after 10 s.
+    A message is asked for once at least, and then until it is granted, or it comes at 70 % of the required rate. One
+    that was granted and is silent for 3 s is asked for again: the autopilot may have been restarted. One that was
+    refused is asked for again after 10 s.
 
     Args:
         source: of the odometry, a key of `odometry.MESSAGES`.
@@ -40,7 +40,7 @@ class MessageRequests:
         self._asked_at = -float("inf")
         self._received = dict.fromkeys(self._names, 0)  # since it was asked for
         self._arrived: dict[str, float] = {}  # last message, or last answer, s
-        self._refusals: dict[str, str] = {}
+        self._rejections: dict[str, str] = {}
 
     def note(self, message: Any, now: float) -> None:
         """A message of the autopilot has come.
@@ -53,7 +53,7 @@ class MessageRequests:
         if name in self._received:
             self._received[name] += 1
             self._arrived[name] = now
-            self._refusals.pop(name, None)  # somebody else has asked for it
+            self._rejections.pop(name, None)  # somebody else has asked for it
         if name == "COMMAND_ACK" and message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             self._note_answer(message.result, now)
 
@@ -75,17 +75,17 @@ class MessageRequests:
 
     def complaint(self) -> str:
         """Which messages the autopilot refuses, in words; "" where it refuses none."""
-        said = ", ".join(f"{name} ({result})" for name, result in self._refusals.items())
+        said = ", ".join(f"{name} ({result})" for name, result in self._rejections.items())
         return f"the vehicle refuses to send {said}" if said else ""
 
     def _note_answer(self, result: int, now: float) -> None:
         name, self._asked = self._asked, None
         if name is None:
             return
-        refused = result in _REFUSALS
-        self._refusals.pop(name, None)
+        refused = result in _REJECTIONS
+        self._rejections.pop(name, None)
         if refused:
-            self._refusals[name] = mavlink.enums["MAV_RESULT"][result].name
+            self._rejections[name] = mavlink.enums["MAV_RESULT"][result].name
         if refused or result == mavlink.MAV_RESULT_ACCEPTED:
             self._open.remove(name)
             self._arrived[name] = now  # its silence begins now
@@ -98,5 +98,5 @@ class MessageRequests:
             self._open.remove(name)
 
     def _is_silent(self, name: str, now: float) -> bool:
-        longest = _PATIENCE if name in self._refusals else _SILENCE
+        longest = _PATIENCE if name in self._rejections else _SILENCE
         return now - self._arrived.get(name, now) > longest

@@ -40,7 +40,7 @@ class Permission:
         """Whether the law has run since the vehicle was armed."""
         return self._mode is not None
 
-    def is_heard(self, now: float) -> bool:
+    def is_present(self, now: float) -> bool:
         """Whether the autopilot is there: its last heartbeat is no older than 3 s."""
         return now - self._heartbeat <= HEARTBEAT_TIMEOUT
 
@@ -54,7 +54,7 @@ class Permission:
 
     def why_not(self, now: float) -> str:
         """Why the law may not run; "" where it may."""
-        if not self.is_heard(now):
+        if not self.is_present(now):
             return f"no heartbeat of system {self._system}"
         if not self.armed:
             return "disarmed"

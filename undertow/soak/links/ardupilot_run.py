@@ -14,7 +14,7 @@ import numpy as np
 from undertow.soak.links.command_process import CommandProcess
 from undertow.soak.links.link_run import LinkRun
 from undertow.soak.links.peer import damaged
-from undertow.soak.links.plan import CODES, STATED, Plan, signals_of
+from undertow.soak.links.plan import CODES, STATED, Plan, free_port, signals_of
 from undertow.soak.links.scenario import PERIOD
 from undertow.soak.verdict import Failure
 
@@ -40,9 +40,8 @@ class ArdupilotRunner:
     def run(self, plan: Plan) -> LinkRun:
         """What happens by a plan."""
         self._chance, self._plan = random.Random(plan.seed), plan
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own, _free_port() as free:
-            port = free.getsockname()[1]
-            free.close()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+            port = free_port()
             self._address, self._socket = ("127.0.0.1", port), own
             self._command.begin(["ardupilot", str(self._scenario), "--port", str(port)], plan.disk)
             failures = self._talk() if self._begins() else [("N3", "the physics did not begin")]
@@ -85,7 +84,7 @@ class ArdupilotRunner:
         send = lambda data: self._socket.sendto(data, self._address)
         if kind == "stall" and first:
             self._command.send(signal.SIGSTOP)
-            time.sleep(PERIOD * self._chance.choice((2, 6, 30)))
+            time.sleep(PERIOD * self._chance.choice((1, 3, 15)))
             self._command.send(signal.SIGCONT)
         elif kind in _DAMAGED:
             for data in damaged(packet, self._chance):
@@ -143,12 +142,6 @@ class ArdupilotRunner:
         if self._code not in right or "Traceback" in printed:
             return [("N2", f"exit code {self._code}: {printed.strip()[-300:]}")]
         return []
-
-
-def _free_port() -> socket.socket:
-    free = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    free.bind(("127.0.0.1", 0))
-    return free
 
 
 def _numbers(answer: Any) -> list[Any]:

@@ -20,8 +20,8 @@ from undertow.soak.verdict import Failure
 _BEGINS = 600.0  # s, longest wait for the first command: the law is compiled before
 _WATCHED = 1.5  # s after the stated time for which the vehicle must stay stopped
 _TRANSIENT = 0.5  # s of full thrust that one message or signal may cause
-_LONGEST = 0.1  # s by which the vehicle moves in a step, should this process stand still itself
-_LOST = 20  # steps that a log may lack, which is a second
+_LONGEST = 0.2  # s by which the vehicle moves in a step, should this process stand still itself
+_LOST = 10  # steps that a log may lack, which is a second
 
 
 class LinkRun(NamedTuple):
@@ -223,10 +223,11 @@ class LinkRunner:
         return found + self._of_log()
 
     def _codes(self) -> tuple[int, ...]:
-        """Exit codes that are right; a loop that stood still or got nothing may have ended by itself before."""
+        """Exit codes that are right: a loop that stood still or got nothing may have ended by itself before."""
+        full = () if self._plan.disk is None else (4,)
         if self._plan.ending in ("KILL", "stop"):
-            return (-int(signal.SIGKILL), 1)
-        return (*CODES[self._plan.ending], 1)
+            return (-int(signal.SIGKILL), 1, *full)
+        return (*CODES[self._plan.ending], 1, *full)
 
     def _of_log(self) -> list[tuple[str, str]]:
         """A log has every step but those of the last second, and can be read as far as the disk took it."""

@@ -12,6 +12,7 @@ from undertow.interop.mavlink.message_codec import parsed
 from undertow.interop.stepped_vehicle import SteppedVehicle
 from undertow.interop.thruster_channels import channels_of_vehicle
 from undertow.soak.links.peer import AbstractPeer, Measured, damaged
+from undertow.soak.links.plan import free_port
 from undertow.soak.links.scenario import SUPPLY
 
 _NEUTRAL, _SPAN = 1500.0, 400.0  # us
@@ -29,9 +30,7 @@ class MavlinkPeer(AbstractPeer):
     """
 
     def __init__(self, vehicle: SteppedVehicle, output: str):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(("127.0.0.1", 0))
-            self._address = free.getsockname()
+        self._address = "127.0.0.1", free_port()
         self.arguments = ["mavlink", "SCENARIO", "--connect", "udpin:{}:{}".format(*self._address), "--output", output]
         self._channels = channels_of_vehicle(np.asarray(vehicle.plant.thruster_matrix))
         self._dead_band = float(vehicle.esc.dead_band)
@@ -39,7 +38,7 @@ class MavlinkPeer(AbstractPeer):
         self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def begin(self, chance: random.Random) -> None:
-        self._chance, self._heard = chance, -np.inf
+        self._chance, self._alive_at = chance, -np.inf
         self._wire = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._camera = mavlink.MAVLink(None, srcSystem=1, srcComponent=_CAMERA)
         self._pulses = np.full(16, _NEUTRAL)
@@ -53,8 +52,8 @@ class MavlinkPeer(AbstractPeer):
 
     def items(self, measured: Measured, time: float) -> list[Any]:
         found = [self._odometry(measured, time).pack(self._wire)]
-        if time - self._heard >= 1.0 or time < self._heard:
-            self._heard = time
+        if time - self._alive_at >= 1.0 or time < self._alive_at:
+            self._alive_at = time
             armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
             found.insert(0, mavlink.MAVLink_heartbeat_message(12, 3, armed, 0, 4, 3).pack(self._wire))
         return found

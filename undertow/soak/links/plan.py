@@ -1,7 +1,9 @@
 """What happens in a run of a link command: a few events, and how it ends."""
 
+import contextlib
 import random
 import signal
+import socket
 from typing import NamedTuple
 
 from undertow.soak.links.scenario import PERIOD
@@ -43,7 +45,7 @@ _ENDING_WEIGHTS = (8, 8, 8, 8, 1, 1, 8, 4)
 STATED = {"KILL": 1.0, "stop": 1.5, "silence": 1.5}  # s from the end to neutral commands; others 1 s
 CODES = {"INT": (130,), "TERM": (143,), "HUP": (129,), "QUIT": (131,), "INT, TERM": (130, 143), "silence": (1, 143)}
 
-_FIRST, _LAST = 20, 60  # steps after which events begin, and the run ends
+_FIRST, _LAST = 10, 30  # steps after which events begin, and the run ends
 
 
 class Event(NamedTuple):
@@ -110,13 +112,22 @@ def plan(link: str, seed: int, number: int) -> Plan:
     """The plan of a run; number 0 is undisturbed."""
     identity = f"links/{link}/{seed}/{number}"
     chance = random.Random(identity)
-    last = chance.randint(_FIRST + 20, _LAST)
+    last = chance.randint(_FIRST + 10, _LAST)
     if number == 0:
         return Plan(identity, (), "INT", _LAST, None, identity)
     events = [_event(chance, last) for _ in range(chance.choice((0, 1, 1, 1, 2, 3)))]
     ending = chance.choices(ENDINGS, _ENDING_WEIGHTS)[0]
     disk = chance.choice((2_000, 20_000, 60_000)) if chance.random() < 0.15 else None
     return Plan(identity, tuple(sorted(events, key=lambda event: event.first)), ending, last, disk, identity)
+
+
+def free_port() -> int:
+    """A UDP port that nobody uses, and that the system gives nobody: below those that it hands out."""
+    while True:
+        port = random.SystemRandom().randrange(10_000, 30_000)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one, contextlib.suppress(OSError):
+            one.bind(("127.0.0.1", port))
+            return port
 
 
 def signals_of(ending: str) -> list[int]:
@@ -127,9 +138,9 @@ def signals_of(ending: str) -> list[int]:
 
 def _event(chance: random.Random, last: int) -> Event:
     kind = chance.choices(("wild", "stall", "stream"), (5, 2, 4))[0]
-    first = chance.randint(_FIRST, last - 5)
+    first = chance.randint(_FIRST, last - 3)
     if kind == "wild":
         return Event("wild", chance.choice(WILD), first, 1)
     if kind == "stall":
-        return Event("stall", "", first, chance.choice((2, 6, 9, 12, 30)))
-    return Event(chance.choice(STREAMS), "", first, chance.choice((1, 4, 8, 15, 30)))
+        return Event("stall", "", first, chance.choice((1, 3, 5, 6, 15)))
+    return Event(chance.choice(STREAMS), "", first, chance.choice((1, 2, 4, 8, 15)))
