@@ -218,7 +218,7 @@ def test_a_full_disk_does_not_stop_the_controller(scenario, tmp_path):
     code += "from undertow.cli.main import run; sys.exit(run(['run', 'axis.yaml', '--fast', '--duration', '10']))"
     environment = os.environ | {"UNDERTOW_CACHE": str(tmp_path / "cache")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
-    assert done.returncode == 4 and "later steps are not logged" in done.stderr
+    assert done.returncode == 4 and "later steps are not recorded" in done.stderr
     assert json.loads((tmp_path / "runs/axis/statistics.json").read_text())["steps"] == 1000
     assert 5 < len(read_log(tmp_path / "runs/axis/run.mcap")["elapsed"].time) < 500
 

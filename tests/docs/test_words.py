@@ -92,7 +92,7 @@ ALLOWED = {
 # Phrases in which a retired word is the field's word, or somebody else's name.
 PHRASES = re.compile(
     r"lanes_of|when the sound left|admin\.tick\.interval|tick_params"
-    r"|canvas\.draw\(|draw_artist|echo.sounder|journal article|charge[ _]drawn|Nonlinear Dynamics|fly[- ]?wheel",
+    r"|canvas\.draw\(|draw_artist|echo.sounder|journal article|-journal\b|charge[ _]drawn|Nonlinear Dynamics|fly[- ]?wheel",
     re.I,
 )
 

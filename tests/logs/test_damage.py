@@ -127,7 +127,7 @@ def test_a_file_that_ends_early(tmp_path):
     whole = (tmp_path / "a.mcap").read_bytes()
     live = LiveLog(tmp_path / "b.mcap", {"input": a_log()["input"]}, {})
     for i in range(2000):
-        live.append(0.01 * i, {"input": np.full(8, i / 7)})
+        live.write((0.01 * i, {"input": np.full(8, i / 7)}))
     half = (tmp_path / "b.mcap").read_bytes()
     (tmp_path / "c.mcap").write_bytes(half[: len(half) - 50])
     log = read_log(tmp_path / "c.mcap")

@@ -1,5 +1,6 @@
 """Vehicle and controller as nodes, in lock step over the loopback interface, give the run of a simulation."""
 
+import contextlib
 import threading
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from undertow.interop.ros2.node import Reporter
 from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
 from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
 from undertow.interop.ros2.write_bag import BagWriter
+from undertow.logs.background_writer import BackgroundWriter
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
@@ -55,7 +57,8 @@ def simulated(scenario):
 def lock_step(controller, vehicle, domain, folder):
     """Run both nodes, and return what the vehicle's side saw; in its own thread the controller answers."""
     quiet, done = Reporter(lambda line: None), threading.Event()
-    with BagWriter(folder) as bag, Link(domain, True) as one, Link(domain, True, bag=bag) as other:
+    bag = BackgroundWriter(BagWriter(folder).open)
+    with contextlib.closing(bag), Link(domain, True) as one, Link(domain, True, bag=bag) as other:
         node = ControllerNode(controller, one, ControllerSettings(use_sim_time=True), quiet)
         running = VehicleNode(vehicle, other, VehicleSettings("lock-step"), quiet)
 

@@ -66,8 +66,8 @@ class Autopilot(Uncopied):
         output: what the vehicle takes: `input`, `newtons`, `pulses` or `wrench`, see `output.Output`.
         esc: speed controllers for `pulses`; None for usual ones.
         blend: time constant, s, with which the output turns from that before the start into that of the law.
-        log: .mcap file for measurement, target, command and signals of every step; None for none. What was written
-            survives the end of the process, however it ends; `close_log` finishes it.
+        log: .mcap file for measurement, target, command and signals of every step; None for none. A thread writes it,
+            so that no step waits for the disk; `close_log` finishes it, and `kill -9` costs the last second.
         log_later: whether a step is written by `log_step` only: its command can be sent before.
         allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
 
@@ -317,8 +317,12 @@ class Autopilot(Uncopied):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Steps after the first one, those that were late, missed or repeated, and new starts of a broken law."""
-        return self._clock.counts | {"restarted": int(self._restarts)}
+        """Steps after the first one, those that were late, missed or repeated, and new starts of a broken law.
+
+        `not recorded` counts the steps that are missing in the log because the disk was too slow.
+        """
+        unlogged = 0 if self._log is None else self._log.dropped
+        return self._clock.counts | {"restarted": int(self._restarts), "not recorded": unlogged}
 
     @property
     def supervised(self) -> bool:

@@ -5,6 +5,7 @@ import warnings
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple
 
 import jax
@@ -14,6 +15,7 @@ from undertow.autopilot.measured_motion import Format, Motion
 from undertow.core.contracts import AbstractController, AbstractPlant, Target
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
+from undertow.logs.background_writer import BackgroundWriter
 from undertow.logs.known_signals import SIGNALS, thruster_columns
 from undertow.logs.log import Series
 from undertow.logs.mcap_writer import LiveLog
@@ -71,9 +73,11 @@ class ReceivedStep(NamedTuple):
 
 
 class StepLog:
-    """A log of steps. The file is whole up to the last full chunk at any time, and ends when its owner does.
+    """A log of steps, written in a thread of its own. It ends when its owner does; `kill -9` costs the last second.
 
-    Where the file cannot be written any more, a warning says so once, and the owner goes on.
+    Where the file cannot be written any more, a warning says so once, and the owner goes on. Where the disk is too slow
+    for the owner, steps are dropped and counted. A step waits for the disk only while the owner is ahead of real time:
+    a loop with a simulated clock loses nothing.
     Where the time of the owner goes back, as after another `start`, that of the log goes on.
 
     Args:
@@ -104,11 +108,18 @@ class StepLog:
         self._period, self._offset, self._last = period, 0.0, -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
+        facts = {"sampling_time": f"{period!r} s"} | dict(facts or {})
         try:
-            self._file = LiveLog(path, signals, {"sampling_time": f"{period!r} s"} | dict(facts or {}))
+            self._writer = BackgroundWriter(lambda: LiveLog(path, signals, facts))
         except OSError as error:
             raise BadInput("log", "be a file that can be written", f"{path}: {error.strerror}") from None
-        self.close = weakref.finalize(owner, _close, self._file, path)
+        self._began: float | None = None  # when time zero of the log was, s by the monotonic clock
+        self.close = weakref.finalize(owner, _close, self._writer, path)
+
+    @property
+    def dropped(self) -> int:
+        """Steps that are missing because the disk was too slow."""
+        return self._writer.dropped
 
     def append(self, time: float, values: Mapping[str, Any]) -> None:
         """Write the values of a step at a time, s; nothing after `close`."""
@@ -117,12 +128,14 @@ class StepLog:
         if time + self._offset <= self._last:
             self._offset = self._last + self._period - time
         self._last = time + self._offset
-        try:
-            self._file.append(self._last, values)
-        except OSError as error:  # a full disk does not stop the controller
-            self.close.detach()
-            self._file.abandon()
-            warnings.warn(f"{self.path}: {error.strerror}; later steps are not logged", stacklevel=2)
+        if self._writer.failure:  # a full disk does not stop the controller
+            self.close()
+            return
+        now = monotonic()
+        if self._began is None:
+            self._began = now - self._last
+        entry = self._last, {name: np.array(value) for name, value in values.items()}  # the next step overwrites them
+        self._writer.put(entry, patience=self._began + self._last - now)
 
 
 def _free(path: Path) -> Path:
@@ -131,12 +144,11 @@ def _free(path: Path) -> Path:
     return next(one for one in numbered if not one.exists()) if path.is_file() else path
 
 
-def _close(file: LiveLog, path: Path) -> None:
-    """Finish a log; a full disk is a warning, as for steps."""
-    try:
-        file.close()
-    except OSError as error:
-        warnings.warn(f"{path}: {error.strerror}; the log has no end, and can be read without it", stacklevel=2)
+def _close(writer: BackgroundWriter, path: Path) -> None:
+    """Finish a log; what is missing in it is a warning."""
+    writer.close()
+    for sentence in writer.missing("steps"):
+        warnings.warn(f"{path}: {sentence}", stacklevel=2)
 
 
 def law_signals(

@@ -3,15 +3,16 @@
 import contextlib
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.cli.exit_codes import DONE, RUN_FAILED, complain, report
+from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain, report
 from undertow.cli.interruptible import interruptible
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.logs.background_writer import BackgroundWriter
 
 ROLES = ("controller", "vehicle")
 
@@ -71,9 +72,27 @@ def _run(scenario: Path, options: Options) -> int:
     reporter.say(f"compiling the {options.role}")
     compiled = _compiled_controller if options.role == "controller" else _compiled_vehicle
     run = compiled(scenario, options, names, frames, reporter)
-    with bag or contextlib.nullcontext(), Link(domain, localhost, options.reliability, bag) as link:
-        link.on_trouble = lambda sentence: reporter.trouble("bag ended", sentence)
-        return run(link)
+    missing: list[str] = []
+    with _recording(bag, missing) as recording, Link(domain, localhost, options.reliability, recording) as link:
+        link.on_trouble = reporter.trouble
+        code = run(link)
+    return max(code, FILES_FAILED if missing else DONE)
+
+
+@contextlib.contextmanager
+def _recording(bag: Any, missing: list[str]) -> Iterator[BackgroundWriter | None]:
+    """The bag, written in a thread; what is missing in it is said at the end, and added to a list."""
+    if bag is None:
+        yield None
+        return
+    recording = BackgroundWriter(bag.open)
+    try:
+        yield recording
+    finally:
+        recording.close()
+        missing += recording.missing("messages")
+        for sentence in missing:
+            complain(f"{bag.folder}: {sentence}")
 
 
 def _compiled_controller(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:

@@ -246,6 +246,8 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
     for name, number in found["link_counts"].items():
         if number:
             table.add_row(f"link: {name}", str(number))
+    if found["autopilot_counts"]["not recorded"]:
+        table.add_row("not recorded: the disk was too slow", str(found["autopilot_counts"]["not recorded"]))
     console.print(table)
     if "transitions" in found:
         several = [Transition(**one | {"state": State[one["state"]]}) for one in found["transitions"]]

@@ -7,6 +7,7 @@ import contextlib
 import heapq
 import itertools
 import json
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -21,8 +22,7 @@ from undertow.logs.motion import at_times, without_jumps
 
 METADATA = "undertow"  # name of the record with the facts of a log
 
-# Bytes of a chunk. A program that is killed loses the one that is not full.
-_CHUNK, _LIVE_CHUNK = 2**20, 2**14
+_CHUNK, _LIVE_CHUNK = 2**20, 2**14  # bytes of a chunk
 
 _LATEST = 2.0**63 * 1e-9  # s, times of a file
 
@@ -49,6 +49,15 @@ class _Writer:
     def write(self, channel: int, time: float, message: bytes) -> None:
         stamp = foxglove.nanoseconds(time)
         self._writer.add_message(channel, stamp, message, stamp)
+
+    def end_chunk(self) -> None:
+        """Write the messages of the chunk that is not full, which `mcap` does at the end only."""
+        self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
+        self._stream.flush()
+
+    def note(self, text: str) -> None:
+        """Write a note about the recording, which readers show."""
+        self._writer.add_metadata(METADATA, {"notes": text})
 
     def finish(self) -> None:
         """Write the index, without which the file can be read too."""
@@ -134,7 +143,7 @@ def _pose_names(signals: Mapping[str, Series]) -> tuple[str, ...] | None:
 
 
 class LiveLog:
-    """A log of a controller that runs, written step by step. What was written survives `kill -9`.
+    """A log of a controller that runs, written step by step; the recorder of a `BackgroundWriter`.
 
     Args:
         path: of the file, which is replaced.
@@ -155,8 +164,9 @@ class LiveLog:
         self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
         self._pose, self._begun = _pose_names(signals), False
 
-    def append(self, time: float, values: Mapping[str, Any]) -> None:
-        """Write the values of one step, all signals by name."""
+    def write(self, entry: tuple[float, Mapping[str, Any]]) -> None:
+        """Write one step: its time, s, and the values of all signals by name."""
+        time, values = entry
         for channel, form, names in self._topics:
             flat = np.concatenate([np.ravel(values[name]).astype(float) for name in names]).tolist()
             self._writer.write(channel, time, form.of_sample(time, flat))
@@ -164,7 +174,11 @@ class LiveLog:
             outputs = np.concatenate([np.ravel(values[name]) for name in self._pose])
             if np.isfinite(outputs).all():
                 self._view(time, outputs)
-        self._stream.flush()  # a full chunk, where there is one
+
+    def flush(self) -> None:
+        """Bring all steps to the disk: they survive `kill -9` and a power cut."""
+        self._writer.end_chunk()
+        os.fsync(self._stream.fileno())
 
     def _view(self, time: float, pose: np.ndarray) -> None:
         if not self._begun:
@@ -174,15 +188,21 @@ class LiveLog:
         for when, message in foxglove.transforms(np.array([time]), {foxglove.VEHICLE: pose[None]}):
             self._writer.write(self._tf, when, message)
 
-    def close(self) -> None:
-        """Write the end of the file; nothing may be appended afterwards.
+    def close(self, dropped: int = 0) -> None:
+        """Write the end of the file; nothing may be written afterwards.
+
+        Args:
+            dropped: steps that are missing.
 
         Raises:
             OSError: it cannot be written; the file is closed all the same.
         """
         if not self._stream.closed:
             try:
+                if dropped:
+                    self._writer.note(f"{dropped} steps are missing: the disk was too slow")
                 self._writer.finish()
+                os.fsync(self._stream.fileno())
             finally:
                 self.abandon()
 

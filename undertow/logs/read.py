@@ -19,6 +19,7 @@ from undertow.logs.px4 import read_px4
 from undertow.logs.recording import Recording, Table
 from undertow.logs.ros2_bag import read_ros2_bag
 from undertow.logs.run_log import read_run
+from undertow.logs.unfinished_bag import STORAGE_FILES
 
 _SHOWN_TOPICS, _SHOWN_COLUMNS = 4, 6  # in an error
 
@@ -102,8 +103,9 @@ def _columns(table: Table) -> str:
 
 def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Recording]:
     if path.is_dir():
-        if not (path / "metadata.yaml").is_file():
-            raise BadInput("log", "be a file, or the folder of a bag of ROS 2", f"{path}, without metadata.yaml")
+        files = " ".join(file.name for file in path.iterdir())
+        if not any(name in files for name in ("metadata.yaml", *STORAGE_FILES)):
+            raise BadInput("log", "be a file, or the folder of a bag of ROS 2", f"{path}, without .mcap or .db3 files")
         return functools.partial(read_ros2_bag, names=names)
     suffix = path.suffix.lower()
     if suffix == ".mcap":

@@ -14,6 +14,7 @@ from undertow.logs.mcap_reader import records
 from undertow.logs.message_fields import MessageFields
 from undertow.logs.recording import Recording
 from undertow.logs.ros2_types import Decoder, Definition
+from undertow.logs.unfinished_bag import whole_files
 from undertow.logs.unpacking import unpacked, unpacked_file
 
 _LONGEST = 64  # numbers of an array that become columns; images and point clouds have more
@@ -143,7 +144,7 @@ def _number(file: Path) -> tuple[int, str]:
 
 
 def _messages(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Message]:
-    yield from _of_mcap(file, notes) if file.suffix == ".mcap" else _of_sqlite(file, topics)
+    yield from _of_mcap(file, notes) if file.suffix == ".mcap" else _of_sqlite(file, topics, notes)
 
 
 def _of_mcap(file: Path, notes: list[str]) -> Iterator[_Message]:
@@ -162,13 +163,13 @@ def _of_mcap(file: Path, notes: list[str]) -> Iterator[_Message]:
                 yield _Message(*channels[record.channel_id], record.log_time, unpacked(record.data))
 
 
-def _of_sqlite(file: Path, topics: _Topics) -> Iterator[_Message]:
+def _of_sqlite(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Message]:
     """Messages in CDR of a .db3 file; of topics that are not requested the first one."""
     from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.rosbag2 import Reader
 
     forms = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
-    with Reader(file) as reader:
+    with whole_files(file, notes) as (whole,), Reader(whole) as reader:
         connections = [one for one in reader.connections if getattr(one.ext, "serialization_format", "") == "cdr"]
         requested = [one for one in connections if topics.requested(one.topic, one.msgtype)]
         for chosen in (requested, *([one] for one in connections if one not in requested)):

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator
 
 from undertow.core.errors import BadInput
@@ -11,6 +12,9 @@ from undertow.core.errors import BadInput
 def scheduled(priority: int | None, processor: int | None) -> Iterator[None]:
     """Run the calling thread before others, or on one processor, and give both back at the end.
 
+    Python's other threads, such as that which writes a log, follow at the next lower priority: one that holds Python's
+    lock and gets no processor would hold up the caller.
+
     Args:
         priority: of SCHED_FIFO, 1 to 99; None to leave it.
         processor: number; None for any.
@@ -19,15 +23,18 @@ def scheduled(priority: int | None, processor: int | None) -> Iterator[None]:
         BadInput: the system has no such thing, or does not permit it.
     """
     scheduler, processors = _scheduler(priority), _processors(processor)
+    followers = {one.native_id for one in threading.enumerate() if one.native_id} - {threading.get_native_id()}
     try:
-        _prioritize(priority)
+        _prioritize(priority, followers)
         if processor is not None:
             os.sched_setaffinity(0, {processor})
         yield
     finally:
+        if scheduler is not None:
+            for thread in (0, *followers):
+                with contextlib.suppress(OSError):  # it may have ended
+                    os.sched_setscheduler(thread, *scheduler)
         with contextlib.suppress(OSError):
-            if scheduler is not None:
-                os.sched_setscheduler(0, *scheduler)
             if processors is not None:
                 os.sched_setaffinity(0, processors)
 
@@ -55,7 +62,7 @@ def _processors(processor: int | None) -> set[int] | None:
     return found
 
 
-def _prioritize(priority: int | None) -> None:
+def _prioritize(priority: int | None, followers: set[int]) -> None:
     if priority is None:
         return
     try:
@@ -63,3 +70,6 @@ def _prioritize(priority: int | None) -> None:
     except PermissionError:
         hint = "Permit it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or the capability CAP_SYS_NICE"
         raise BadInput("--priority", "be permitted by the system", f"{priority}, which is not", hint=hint) from None
+    for thread in followers:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(max(priority - 1, 1)))

@@ -7,7 +7,6 @@ waits on a WaitSet; polling would cost milliseconds.
 import contextlib
 import functools
 import re
-import sqlite3
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, Generic
@@ -24,7 +23,7 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.interop.ros2.from_messages import SECOND
 from undertow.interop.ros2.messages import Message, ros_type, type_hash
-from undertow.interop.ros2.write_bag import BagWriter
+from undertow.logs.background_writer import BackgroundWriter
 
 RELIABILITIES = ("reliable", "best-effort")
 
@@ -109,24 +108,28 @@ class Link:
         domain: ROS_DOMAIN_ID.
         localhost: whether only this machine is reached, without multicast; otherwise CYCLONEDDS_URI decides.
         reliability: `reliable` or `best-effort`, of publishers and subscribers alike.
-        bag: in which everything sent and received is recorded; None for none.
+        bag: writes everything sent and received; None for none.
 
     Attributes:
         now: time (ns) that the bag gets; the system's unless set.
-        on_trouble: gets a sentence where the bag cannot be written.
+        on_trouble: gets an event and a sentence where a message is not recorded.
 
     Raises:
         BadInput: something given cannot be used, or the participant cannot be made.
     """
 
     def __init__(
-        self, domain: int = 0, localhost: bool = False, reliability: str = "reliable", bag: BagWriter | None = None
+        self,
+        domain: int = 0,
+        localhost: bool = False,
+        reliability: str = "reliable",
+        bag: BackgroundWriter | None = None,
     ):
         if not 0 <= domain <= _LARGEST_DOMAIN:
             raise BadInput("domain", f"be 0 to {_LARGEST_DOMAIN}", domain)
         checks.choice("reliability", reliability, RELIABILITIES)
         self.now: Callable[[], int] = time.time_ns
-        self.on_trouble: Callable[[str], None] = lambda sentence: None
+        self.on_trouble: Callable[[str, str], None] = lambda event, sentence: None
         self._bag, self._qos = bag, _quality(reliability)
         try:
             if localhost:
@@ -204,13 +207,17 @@ class Link:
         }
 
     def record(self, topic: str, message: Any) -> None:
-        """Write a message into the bag, where there is one. A disk that takes no more ends the bag, not the node."""
-        if self._bag is not None:
-            try:
-                self._bag.write(topic, message, self.now())
-            except (OSError, sqlite3.Error) as error:
-                self._bag = None
-                self.on_trouble(f"the bag cannot be written any more: {error}")
+        """Let a message be written into the bag, where there is one. What the disk does holds up nobody."""
+        bag = self._bag
+        if bag is None:
+            return
+        dropped = bag.dropped
+        bag.put((topic, message, self.now()))
+        if bag.failure:
+            self._bag = None
+            self.on_trouble("bag ended", f"the bag cannot be written any more: {bag.failure}")
+        elif bag.dropped > dropped:
+            self.on_trouble("not recorded", "the disk is too slow: messages are missing in the bag")
 
     def _topic(self, topic: str, kind: type[Message]) -> Topic:
         if not _NAME.fullmatch(topic):

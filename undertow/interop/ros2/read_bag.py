@@ -1,6 +1,5 @@
 """Poses, velocities, wrenches and thruster commands of a rosbag2, in this package's axes."""
 
-import contextlib
 import functools
 import warnings
 from collections.abc import Callable, Iterable
@@ -15,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from undertow.core.errors import BadInput
 from undertow.interop.ros2.frames import between_attitudes, between_frd_and_flu
 from undertow.interop.ros2.from_messages import SECOND, Frames, motion_of, target_of, wrench_from
+from undertow.logs.unfinished_bag import whole_files
 
 # Frames whose axes are east, north, up by REP 105 or by habit.
 _ANY_WORLD = Frames(("odom", "map", "world", "earth"))
@@ -63,13 +63,13 @@ def read_rosbag2(
 
 def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
     """Topic, type, time (ns) and bytes of the messages of known types."""
+    notes: list[str] = []
     try:
-        with contextlib.closing(_open(path)) as reader:
-            chosen = [
-                one for one in reader.connections if one.msgtype in _READERS and (only is None or one.topic in only)
-            ]
-            for one, nanoseconds, data in reader.messages(chosen) if chosen else ():
-                yield one.topic, one.msgtype, nanoseconds, bytes(data)
+        with whole_files(path, notes) as files:
+            if notes:
+                warnings.warn(f"{path}: {'; '.join(notes)}", stacklevel=3)
+            for file in files:
+                yield from _messages_of(file, only)
     except (BadInput, OSError):
         raise
     except Exception as error:  # whatever rosbags, SQLite, YAML or zstd say of damaged bytes
@@ -78,12 +78,11 @@ def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int
         ) from None
 
 
-def _open(path: Path) -> Reader:
-    if not (path / "metadata.yaml").is_file():
-        raise BadInput(str(path), "be the folder of a rosbag2", "without metadata.yaml")
-    reader = Reader(path)
-    reader.open()
-    return reader
+def _messages_of(file: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
+    with Reader(file) as reader:
+        chosen = [one for one in reader.connections if one.msgtype in _READERS and (only is None or one.topic in only)]
+        for one, nanoseconds, data in reader.messages(chosen) if chosen else ():
+            yield one.topic, one.msgtype, nanoseconds, bytes(data)
 
 
 def _series(name: str, rows: list[tuple[float, NDArray]]) -> Series:
