@@ -244,28 +244,24 @@ for k in range(10**6):
 
 
 @pytest.mark.parametrize("storage", STORAGES)
-@pytest.mark.parametrize("seconds", [0.3, 1.3, 2.9])
-def test_a_killed_recording_is_whole_up_to_the_last_second(tmp_path, storage, seconds):
+def test_a_killed_recording_is_whole_up_to_the_last_second(tmp_path, storage):
     """rosbags reads it as it is, and so does undertow; without metadata.yaml and cut off, undertow does."""
     command = [sys.executable, "-c", RECORDED, str(tmp_path / "bag"), storage]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         begun = float(process.stdout.readline())
         for line in process.stdout:
-            if (ended := float(line)) - begun > seconds:
+            if (ended := float(line)) - begun > 1.7:
                 process.kill()
         ended = float(line)
     with Reader(tmp_path / "bag") as reader:
         found = [store_of_all().deserialize_cdr(data, one.msgtype).data for one, _, data in reader.messages()]
     assert [row[0] for row in found] == list(range(len(found)))
-    last = max((row[1] for row in found), default=begun)
-    assert ended - last < 1.0
+    assert ended - found[-1][1] < 1.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        series = read_rosbag2(tmp_path / "bag") if found else {}
+        series = read_rosbag2(tmp_path / "bag")
     assert sum(len(values) for _, values in series.values()) == len(found)
-    if seconds < 1:
-        return
     assert len(read_log(tmp_path / "bag", MAPPING)["depth"].time) > 0
     (tmp_path / "bag" / "metadata.yaml").unlink()
     file = next((tmp_path / "bag").glob("*.mcap"), None)
