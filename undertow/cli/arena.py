@@ -28,6 +28,7 @@ from undertow.comparison.candidates import Candidate, laws
 from undertow.comparison.equal_budgets import check_budget
 from undertow.comparison.step_time import step_time
 from undertow.core import checks
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.report.arena_page import PAGE, SCORE, write_board
 from undertow.scenario.finished_run import to_json
@@ -152,7 +153,7 @@ def _run(console: Console, law: Candidate, folder: Path, asked: _Asked) -> None:
     if not (folder / STEP).exists():
         with stage(console, "time of a step"):
             found = interruptible(lambda: step_time(prepared.first))
-            (folder / STEP).write_text(to_json(found._asdict()) + "\n", encoding="utf-8")
+            write_whole(folder / STEP, to_json(found._asdict()) + "\n")
     if asked.robustness:
         with stage(console, "building robustness"):
             harder = interruptible(lambda: prepare_robustness(law, max(2, asked.trials // 4), gains))
@@ -177,7 +178,7 @@ def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains:
     for cell in cells:
         for name, keys in with_law(cell, law, gains).items():
             said = f"# {law.name} in task {cell[0]} on {cell[1]}: {TASKS[cell[0]].question}.\n"
-            (folder / f"{name.replace(' ', '-')}.yaml").write_text(said + dump(keys), encoding="utf-8")
+            write_whole(folder / f"{name.replace(' ', '-')}.yaml", said + dump(keys))
 
 
 def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
@@ -186,9 +187,9 @@ def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
         board = board_of(folder)
         page, failures = write_board(board, folder, pdf)
         rows = leader_rows(board)
-        (folder / "leaderboard.json").write_text(to_json(board.data(), indent=1) + "\n", encoding="utf-8")
-        (folder / "leaderboard.csv").write_text(as_csv(board), encoding="utf-8")
-        (folder / "leaderboard.md").write_text(as_markdown(rows), encoding="utf-8")
+        write_whole(folder / "leaderboard.json", to_json(board.data(), indent=1) + "\n")
+        write_whole(folder / "leaderboard.csv", as_csv(board))
+        write_whole(folder / "leaderboard.md", as_markdown(rows))
     warn_of(failures)
     shown = titled("Leader board", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:

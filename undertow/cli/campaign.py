@@ -1,6 +1,5 @@
 """`undertow campaign`: run a Monte Carlo study or a parameter sweep, and summarise it."""
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -21,6 +20,7 @@ from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
+from undertow.core.disk import replacing_folder, write_whole
 from undertow.core.errors import BadInput
 from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.finished_run import to_json
@@ -62,7 +62,7 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | Non
     worst = {f"trial {trial}": build_trial(prepared.trials, part_cache, trial) for trial in shown}
     replays, missing = run_again(console, worst)
     with stage(console, "page"):
-        (folder / "summary.json").write_text(to_json(found, indent=1) + "\n", encoding="utf-8")
+        write_whole(folder / "summary.json", to_json(found, indent=1) + "\n")
         _write_worst(prepared, found["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
         page, failures = write_campaign(title, results, found, folder, pdf, replays)
@@ -98,12 +98,11 @@ def status(folder: Path, options: Sequence[str]) -> int:
 
 
 def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
     part_cache = PartCache()
-    for trial in trials:
-        text = trial_text(build_trial(prepared.trials, part_cache, trial), f"Trial {trial} of the campaign.")
-        (folder / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
+    with replacing_folder(folder) as new:
+        for trial in trials:
+            text = trial_text(build_trial(prepared.trials, part_cache, trial), f"Trial {trial} of the campaign.")
+            (new / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 
 
 _REPLAYED = 3  # trials in the replay

@@ -2,7 +2,6 @@
 
 import contextlib
 import shlex
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from undertow.comparison.sentences import sentences
 from undertow.comparison.step_time import HOW_LONG, step_times
 from undertow.comparison.tables import NOTE, medians
 from undertow.core import checks
+from undertow.core.disk import replacing_folder, write_whole
 from undertow.core.status import Status
 from undertow.report.comparison_page import write_comparison
 from undertow.scenario.finished_run import to_json
@@ -116,11 +116,11 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
         found = comparison.findings
         files = _write_scenarios(ready, comparison, folder / "scenarios")
         for style, name in _TABLES.items():
-            (folder / name).write_text(comparison.table(style), encoding="utf-8")
+            write_whole(folder / name, comparison.table(style))
         tuned = {} if ready.budgets is None else {"budgets": ready.budgets.data()}
-        (folder / "comparison.json").write_text(to_json(found.data() | tuned, indent=1) + "\n", encoding="utf-8")
+        write_whole(folder / "comparison.json", to_json(found.data() | tuned, indent=1) + "\n")
         written = {name: one._asdict() for name, one in times.items()}  # apart: they differ from run to run
-        (folder / _TIMES).write_text(to_json(written, indent=1) + "\n", encoding="utf-8")
+        write_whole(folder / _TIMES, to_json(written, indent=1) + "\n")
         page, failures = write_comparison(
             comparison, results, ready.subject, folder, pdf, replays, times, ready.budgets
         )
@@ -148,19 +148,16 @@ def _write_scenarios(ready: PreparedComparison, comparison: Comparison, folder: 
 
     `undertow simulate` repeats such a trial; `undertow tune` tunes its controller.
     """
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
-    files, part_cache = {}, PartCache()
+    files, texts, part_cache = {}, {}, PartCache()
     for i, (name, first) in enumerate(zip(ready.names, ready.built, strict=True)):
-        file = folder / f"{file_stem(i, name)}.yaml"
-        files[name] = file
-        file.write_text(
-            trial_text(first, f"{name}, in one trial: {comparison.findings.tuning[name]}."), encoding="utf-8"
-        )
+        stem = file_stem(i, name)
+        files[name] = folder / f"{stem}.yaml"
+        texts[f"{stem}.yaml"] = trial_text(first, f"{name}, in one trial: {comparison.findings.tuning[name]}.")
         rows = comparison.dataset.isel({ready.dimension: i})
         for trial in rows["trial"].values[rows["status"].values > int(Status.OK)][:1].tolist():
-            text = trial_text(
-                build_trial(ready.prepared.trials, part_cache, trial), f"{name}, trial {trial}: it failed."
-            )
-            file.with_stem(f"{file.stem}-failed").write_text(text, encoding="utf-8")
+            built = build_trial(ready.prepared.trials, part_cache, trial)
+            texts[f"{stem}-failed.yaml"] = trial_text(built, f"{name}, trial {trial}: it failed.")
+    with replacing_folder(folder) as new:
+        for file, text in texts.items():
+            (new / file).write_text(text, encoding="utf-8")
     return files

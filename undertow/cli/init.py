@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from undertow.core import catalogue
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.json_schema import scenario_schema
 
@@ -135,9 +136,8 @@ def _write(folder: Path, contents: Mapping[str, str]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in contents.items():
-            with (folder / name).open("x", encoding="utf-8") as file:
-                written.append(folder / name)
-                file.write(text)
+            written.append(folder / name)
+            write_whole(folder / name, text)
     except BaseException:
         for path in written:
             path.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 from undertow.logs.log import Log
 from undertow.scenario.log_file import read_log
@@ -107,7 +108,7 @@ def _layout(out: Path, overwrite: bool) -> int:
     from undertow.logs.foxglove_layout import layout
 
     _check_new(out, (".json",), overwrite)
-    out.write_text(layout(), encoding="utf-8")
+    write_whole(out, layout())
     wide_console().print(f"Layout for Foxglove: {out}", highlight=False, soft_wrap=True)
     return DONE
 

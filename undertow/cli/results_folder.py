@@ -181,7 +181,7 @@ def _stage(folder: Path) -> Path:
 
 
 def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> None:
-    """Move all files, the marker last. With a marker, remove the rest of an earlier result before."""
+    """Move all files, the marker last. After a marker, remove what is left of an earlier result."""
     settle(staging)
     if folder.exists():
         new = [path.name for path in staging.iterdir()]
@@ -189,10 +189,10 @@ def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> 
             if name != marker:
                 _move(staging / name, folder / name)
         if marker in new:
+            _move(staging / marker, folder / marker)
             for name in names:
                 if name not in new:
                     remove(folder / name)
-            _move(staging / marker, folder / marker)
     else:
         os.replace(staging, folder)
         staging.mkdir()

@@ -24,6 +24,7 @@ from undertow.cli.interruptible import ending_signals, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
+from undertow.core.disk import sync, write_whole
 from undertow.core.errors import BadInput
 from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
 from undertow.realtime.link import AbstractLink
@@ -139,8 +140,8 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
                 reason = loop.run(periods=steps)
         if loop.statistics.steps:
             found = _data(loop.statistics, link, autopilot, reason, options)
-            (folder / "statistics.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-            (folder / "scenario.yaml").write_text(dump(built.resolved), encoding="utf-8")
+            write_whole(folder / "scenario.yaml", dump(built.resolved))
+            write_whole(folder / "statistics.json", json.dumps(found, indent=2) + "\n")
             _print(found, folder, options.json)
         else:
             remove(folder / _BEFORE)
@@ -190,10 +191,10 @@ def _logging(built: Built, link: AbstractLink, folder: Path, troubles: list[str]
 
 def _begin_log(folder: Path) -> None:
     """The vehicle has answered: the log takes the place of an earlier result, which stays where no vehicle does."""
-    for name in _WRITTEN:
-        remove(folder / name)
     os.replace(folder / _BEFORE / "run.mcap", folder / "run.mcap")
-    (folder / _BEFORE).rmdir()
+    sync(folder)
+    for name in (*_WRITTEN[1:], _BEFORE):
+        remove(folder / name)
 
 
 def _autopilot(built: Built, form: Format) -> Autopilot:

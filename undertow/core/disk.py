@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +32,8 @@ def alone(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        lock.unlink(missing_ok=True)  # while it is held: a waiting process sees that its file was replaced
+        with contextlib.suppress(OSError):  # one that stays is not locked, and harms nobody
+            lock.unlink()  # while it is held: a waiting process sees that its file was replaced
         os.close(handle)
 
 
@@ -63,10 +65,37 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file whole or not at all; text as UTF-8."""
     with replacing(path) as file:
-        file.write_text(text, encoding="utf-8")
+        file.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextlib.contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """A new folder to fill, which takes the place of a path where the block ends well.
+
+    What was there stays until the new folder is whole; the end of the process between two renamings leaves it under a
+    hidden name.
+    """
+    number = secrets.token_hex(4)
+    new, old = (path.with_name(f".{path.name}.{number}.{which}") for which in ("new", "old"))
+    new.mkdir()
+    try:
+        yield new
+        settle(new)
+        if path.exists():
+            os.replace(path, old)
+        try:
+            os.replace(new, path)
+        except BaseException:
+            if old.exists():
+                os.replace(old, path)
+            raise
+        sync(path.parent)
+    finally:
+        for left in (new, old):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def settle(path: Path) -> None:

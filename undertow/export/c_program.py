@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 from undertow.loop.simd_batch import Unsupported, unavailable
 from undertow.loop.stepped import Step, put
@@ -86,7 +87,7 @@ class Exported(NamedTuple):
             raise BadInput(option, must, got, hint="Use --overwrite")
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self.files.items():
-            (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+            write_whole(folder / name, content)
 
 
 class Program:

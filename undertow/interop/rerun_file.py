@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
 from undertow.logs.frames import quaternions
 from undertow.logs.log import Log
@@ -53,7 +54,15 @@ def write_rerun(log: Log, path: Path, size: Any = None) -> None:
     import rerun
 
     recording = rerun.RecordingStream("undertow")
-    recording.save(path)
+    memory = recording.memory_recording()  # where the disk is full, Rerun's own file ends without an error
+    _write_signals(rerun, recording, log)
+    _write_view(rerun, recording, log, size)
+    recording.flush()
+    write_whole(path, memory.drain_as_bytes())
+    recording.disconnect()
+
+
+def _write_signals(rerun: Any, recording: Any, log: Log) -> None:
     for name, series in log.signals.items():
         if not len(series.time):
             continue
@@ -65,9 +74,6 @@ def write_rerun(log: Log, path: Path, size: Any = None) -> None:
         columns = rerun.Scalars.columns(scalars=series.flat().astype(float).ravel())
         parts = columns.partition(np.full(len(series.time), len(titles)))
         rerun.send_columns(entity, [index], parts, recording=recording)
-    _write_view(rerun, recording, log, size)
-    recording.flush()
-    recording.disconnect()
 
 
 def _write_view(rerun: Any, recording: Any, log: Log, size: Any) -> None:

@@ -18,6 +18,7 @@ from undertow.arena.robustness import VEHICLE
 from undertow.arena.tasks import TASKS, VERSION, tolerances
 from undertow.comparison.step_time import HOW_LONG
 from undertow.comparison.tables import Rows
+from undertow.core.disk import write_whole
 from undertow.report.figures.arena import arena_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
@@ -70,7 +71,8 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
     )
     margins, failed, ratios = margin_rows(board), failures(board), ratio_rows(board)
     path = folder / PAGE
-    path.write_text(
+    write_whole(
+        path,
         document(
             title,
             tag("h1", prose(title)),
@@ -86,7 +88,6 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
             section("gains", "Gains", _gains(board)),
             section("definition", "Tasks and tolerances", _definition(board)),
         ),
-        encoding="utf-8",
     )
     return path, saved.failures
 

@@ -12,6 +12,7 @@ from undertow.campaign.campaign_schema import Distribution
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
+from undertow.core.disk import write_whole
 from undertow.core.status import Status
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all
@@ -72,7 +73,7 @@ def write_campaign(
         looks=replay_looks() if replays else "",
     )
     path = folder / "campaign.html"
-    path.write_text(page, encoding="utf-8")
+    write_whole(path, page)
     return path, saved.failures
 
 

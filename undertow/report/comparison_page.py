@@ -14,6 +14,7 @@ from undertow.comparison.findings import Findings
 from undertow.comparison.sentences import HOW, sentences
 from undertow.comparison.step_time import HOW_LONG, StepTime
 from undertow.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
+from undertow.core.disk import write_whole
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import alike, comparison_plots
 from undertow.report.figures.writing import save_all
@@ -101,7 +102,7 @@ def write_comparison(
         looks=replay_looks() if replays else "",
     )
     path = folder / "comparison.html"
-    path.write_text(page, encoding="utf-8")
+    write_whole(path, page)
     return path, saved.failures
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from undertow.analysis.success import Success
+from undertow.core.disk import write_whole
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.recorded import input_names
 from undertow.report.formats import number, prose
@@ -85,7 +86,7 @@ def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping
         OSError: the file cannot be written.
     """
     replay = Html("") if shown.replay is None else replay_section([shown.replay])
-    path.write_text(_page(run, shown.figures, replay, predicted), encoding="utf-8")
+    write_whole(path, _page(run, shown.figures, replay, predicted))
 
 
 def _page(

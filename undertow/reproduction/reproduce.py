@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+from undertow.core.disk import write_whole
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.robust_variant import chapter
 from undertow.reproduction.running import begin_all, begin_batches, write_all
@@ -65,5 +66,5 @@ def reproduce(folder: Path, quick: bool, progress: Callable[[str, float], None],
         "claims": claims.audit(runs, long),
     }
     results["robust_variant"], more = of_chapter()
-    (folder / "results.json").write_text(to_json(results, indent=1) + "\n", encoding="utf-8")
+    write_whole(folder / "results.json", to_json(results, indent=1) + "\n")
     return Reproduction(results, runs | more, thruster_response())

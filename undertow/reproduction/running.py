@@ -11,6 +11,7 @@ import numpy as np
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.campaign.batch_runner import leaves, planned, run_of
 from undertow.campaign.campaign_schema import Series
+from undertow.core.disk import write_whole
 from undertow.core.runtime import double_outside_runs, on_processor
 from undertow.core.status import Status
 from undertow.loop import continuous
@@ -66,7 +67,7 @@ def write_all(scenarios: Scenarios, folder: Path) -> None:
     """Write `scenarios/<name>.yaml`, so that each can be run again."""
     (folder / "scenarios").mkdir(parents=True, exist_ok=True)
     for name, scenario in scenarios.items():
-        (folder / "scenarios" / f"{name}.yaml").write_text(dump(scenario), encoding="utf-8")
+        write_whole(folder / "scenarios" / f"{name}.yaml", dump(scenario))
 
 
 class BatchResult(NamedTuple):

@@ -1,5 +1,6 @@
 """Run a scenario: outcome, metrics and a dataset from which the run can be repeated."""
 
+import errno
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -162,4 +163,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
         OSError: the folder cannot be written.
     """
     with replacing(path) as file:
-        dataset.to_netcdf(file, engine="netcdf4")
+        try:
+            dataset.to_netcdf(file, engine="netcdf4")
+        except RuntimeError as error:  # NetCDF: HDF error, for whatever the disk says
+            raise OSError(errno.EIO, f"it could not be written whole; is the disk full? ({error})", str(path)) from None

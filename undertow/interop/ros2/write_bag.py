@@ -1,9 +1,13 @@
 """rosbag2: what a node sees is recorded, and a finished run is written."""
 
 import contextlib
+import errno
 import io
 import json
 import os
+import sqlite3
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +20,7 @@ from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from undertow.core import checks
-from undertow.core.disk import write_whole
+from undertow.core.disk import settle, sync, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
 from undertow.interop.ros2 import messages as ros
@@ -119,6 +123,22 @@ class BagWriter:
         self._ended = False
 
 
+@contextlib.contextmanager
+def new_bag(folder: Path, storage: str) -> Iterator[BagWriter]:
+    """A bag that appears whole or not at all; its files have the name of its folder."""
+    BagWriter(folder, storage)  # refuses a folder that is there, before anything is written
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".") as hidden:
+        inner = Path(hidden) / folder.name
+        try:
+            with BagWriter(inner, storage) as bag:
+                yield bag
+        except sqlite3.Error as error:
+            raise OSError(errno.EIO, str(error), str(folder)) from None
+        settle(inner)
+        os.replace(inner, folder)
+    sync(folder.parent)
+
+
 def write_rosbag2(run: Any, folder: str | Path, storage: str = "mcap") -> None:
     """Write a run of a vehicle as a rosbag2, with the records of the run as messages.
 
@@ -143,7 +163,7 @@ def write_rosbag2(run: Any, folder: str | Path, storage: str = "mcap") -> None:
     names = ("measured_position", "measured_velocity", "position", "velocity", "input", "reference")
     columns = [dataset[name].values.astype(float) for name in names]
     frames, label = Frames(), thruster_label(dataset["input"].attrs["units"])
-    with BagWriter(Path(folder), storage) as bag:
+    with new_bag(Path(folder), storage) as bag:
         for time, *row in zip(dataset["time"].values, *columns, strict=True):
             now = round(float(time) * SECOND)
             stamp = stamp_of(now)

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from undertow.core.disk import write_whole
 from undertow.core.user_code import python_says
 from undertow.report.figures.one_column import one_column
 
@@ -85,7 +86,7 @@ def save(figure: Figure, folder: Path, name: str, width: str | None = None) -> t
     """
     folder.mkdir(parents=True, exist_ok=True)
     for file, data in files_of(figure, name, width).items():
-        (folder / file).write_bytes(data)
+        write_whole(folder / file, data)
     return folder / f"{name}.svg", folder / f"{name}.png"
 
 

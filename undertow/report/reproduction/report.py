@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from undertow.core.disk import write_whole
 from undertow.report.figures import paper_figures, sweep_figure
 from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.fidelity import fidelity_figure, robust_fidelity_figure
@@ -59,10 +60,10 @@ def write_report(
         alternative = _alternative(one, name)
         shown[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
     page, overview = folder / "report.html", shown.pop("ablations", Html(""))
-    page.write_text(document(_TITLE, *_content(results, shown)), encoding="utf-8")
+    write_whole(page, document(_TITLE, *_content(results, shown)))
     if robust := results.get("robust_variant"):
         second = ablations_page.ablations_page(robust, overview, page.name)
-        (folder / ablations_page.NAME).write_text(second, encoding="utf-8")
+        write_whole(folder / ablations_page.NAME, second)
     return page
 
 

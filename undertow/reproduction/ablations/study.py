@@ -13,6 +13,7 @@ from undertow.campaign.campaign_schema import read_campaign, whole
 from undertow.campaign.campaign_summary import median_interval, quantiles
 from undertow.campaign.labels import words
 from undertow.campaign.trials import trials
+from undertow.core.disk import write_whole
 from undertow.core.status import Status
 from undertow.reproduction import all_outputs
 from undertow.reproduction.ablations.verdicts import Ablation
@@ -79,7 +80,7 @@ def variants(
     asked = whole(campaign, several.scenario.data)
     if folder is not None:
         (folder / "campaigns").mkdir(parents=True, exist_ok=True)
-        (folder / "campaigns" / path.name).write_text(asked, encoding="utf-8")
+        write_whole(folder / "campaigns" / path.name, asked)
     columns = task.run_trials(asked, str(several.scenario.folder), range(several.number))
     if (columns["status"] == task.INVALID).any():
         build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
