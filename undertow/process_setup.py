@@ -5,9 +5,12 @@ import contextlib
 import gc
 import hashlib
 import importlib.metadata
+import json
 import os
 import platform
+import random
 import stat
+import time
 from pathlib import Path
 
 # XLA compiles the body of a small `while` loop into one plain function instead of a list of kernels to be
@@ -21,6 +24,9 @@ _OPTIMIZATION = 1
 # With the fusion emitters of XLA in JAX 0.10 a program of eight references put the way-points metres away
 # (tests/numerics/test_xla_flags.py). Without them it compiles in half the time as well. Later versions have no others.
 _WRONG_EMITTERS = "0.10."
+
+# Names of the entries of the cache of XLA, and of the file with their checksums; s that comparing them may take.
+_ENTRY, _CHECKSUMS, _LONGEST_CHECK = "-cache", "checksums.json", 0.05
 
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
@@ -58,15 +64,64 @@ def _keep_xla_code() -> None:
     """Let XLA keep its code, unless a folder is already set.
 
     The code is for one kind of processor: machines that share a home folder have a folder each. It is run as the
-    user, and XLA asks nobody whose it is: where others may write there, nothing is kept.
+    user, and XLA asks nobody whose it is: where others may write there, nothing is kept. Nor does it notice damage.
     """
     try:
         folder = _private_folder(f"xla-{_processor()}")
+        remove_damaged(folder)
     except OSError:
         return
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "0")
+
+
+def remove_damaged(folder: Path, limit: float = _LONGEST_CHECK) -> None:
+    """Remove entries of the cache of XLA whose bytes are not those that an earlier process found there.
+
+    XLA runs a damaged entry, which may crash, and JAX lets nobody look at what it reads. So the checksum of an entry is
+    noted when a process begins and finds it for the first time, and compared whenever a later one begins.
+
+    Args:
+        folder: of the cache.
+        limit: s, after which further entries are left as they are; which ones changes from time to time.
+
+    Raises:
+        OSError: nothing can be read or written there.
+    """
+    known, end = _noted(folder / _CHECKSUMS), time.monotonic() + limit
+    entries = [entry.path for entry in os.scandir(folder) if entry.name.endswith(_ENTRY)]
+    random.shuffle(entries)
+    found = dict(known)
+    for path in entries:
+        if time.monotonic() > end:
+            break
+        name = os.path.basename(path)
+        with contextlib.suppress(FileNotFoundError):  # another process has removed it
+            digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+            if known.get(name, digest) != digest:
+                os.unlink(path)
+                del found[name]
+            else:
+                found[name] = digest
+    if found != known:
+        _note(found, folder / _CHECKSUMS)
+
+
+def _noted(path: Path) -> dict[str, str]:
+    """Checksums of entries by their names; none where the file is missing or damaged."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _note(checksums: dict[str, str], path: Path) -> None:
+    """A loss of the file costs nothing but one comparison: it need not survive a power cut."""
+    new = path.with_name(f"{path.name}.{os.getpid()}")
+    new.write_text(json.dumps(checksums), encoding="utf-8")
+    os.replace(new, path)
 
 
 def cache_folder() -> Path:
