@@ -64,6 +64,7 @@ def test_calls_of_a_command(shim, tmp_path, name):
 IN_PLACE = {
     "undertow/core/disk.py": "the one writer",
     "undertow/bench/waiting.py": "a temporary folder",
+    "undertow/process_setup.py": "its own file, which takes another's place, before JAX is imported",
     "undertow/export/fmu.py": "a temporary folder for the compiler",
     "undertow/logs/csv_file.py": "`Log.save` gives it a new file",
     "undertow/logs/mcap_writer.py": "`Log.save` gives it a new file; a log that is being written has a new name",
