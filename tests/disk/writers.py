@@ -143,6 +143,11 @@ def writers(inputs: Path) -> dict[str, Writer]:
         "c.fmu": bytes([version]) * 99,
     }
     out = ("--out", "{folder}/out", "--overwrite")
+
+    def study(folder: Path, version: int) -> None:
+        resume = ["--resume"] if version else []
+        words("campaign", f"{inputs}/study{{version}}.yaml", "--out", "{folder}/out", *resume)(folder, version)
+
     return {
         "run.nc": Writer(lambda folder, version: save(a_dive(version), folder / "run.nc")),
         "knowledge": Writer(lambda folder, version: save_knowledge(folder / "a.npz", knowledge(version))),
@@ -158,9 +163,7 @@ def writers(inputs: Path) -> dict[str, Writer]:
         "simulate": Writer(words("simulate", scenario, *out), marker="out/run.nc", alike=0.05),
         "run": Writer(words("run", scenario, "--fast", *out), of_a_log, "out/run.mcap", 0.2),
         "analyze": Writer(words("analyze", scenario, *out), marker="out/prediction.json", alike=0.05),
-        "campaign": Writer(
-            words("campaign", f"{inputs}/study{{version}}.yaml", "--out", "{folder}/out", "--resume"), in_store
-        ),
+        "campaign": Writer(study, in_store),
     }
 
 
