@@ -26,7 +26,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.stepped import Uncopied, put
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
-from undertow.scenario.reading import from_data, read
+from undertow.scenario.reading import Text, from_data, read
 from undertow.supervision.conditions import Request, reason_of, state_of
 from undertow.supervision.supervised_controller import SupervisedState, state_in, transfer
 from undertow.supervision.supervisor import largest_estimate
@@ -52,13 +52,13 @@ class Autopilot(Uncopied):
     is repeated. `counts` says how often each happened.
 
     Entries of a measurement that are not finite are replaced by those that the law's model expects. A law whose command
-    is not finite, or whose estimate of the uncertainty is beyond ten times what the actuators can give, repeats its last
-    output once. Then it starts anew from the next whole measurement, and its output is zero until there is one
+    is not finite, or whose estimate of the uncertainty is beyond ten times what the actuators can give, repeats its
+    last output once. Then it starts anew from the next whole measurement, and its output is zero until there is one
     (`restarted`); a supervisor does that by itself.
 
     Args:
-        scenario: a .yaml file or an earlier run.nc, the same as a mapping, a closed loop made of parts, or what `build`
-            made of a scenario, whose reference begins where the scenario's plant does.
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping or as read, a closed loop made of parts, or
+            what `build` made of a scenario, whose reference begins where the scenario's plant does.
         sampling_time: s; None for that of the scenario. A closed loop needs one.
         attitude: format of measured attitudes, `euler` (roll, pitch, yaw), `quaternion` (w, x, y, z, body -> world) or
             `both`.
@@ -86,7 +86,7 @@ class Autopilot(Uncopied):
 
     def __init__(
         self,
-        scenario: str | Path | Mapping[str, Any] | ClosedLoop | Built,
+        scenario: str | Path | Mapping[str, Any] | Text | ClosedLoop | Built,
         *,
         sampling_time: float | None = None,
         attitude: str = "euler",
@@ -357,6 +357,14 @@ class Autopilot(Uncopied):
         z = self._supervised("state")
         return state_of(int(z.state)).name, reason_of(int(z.reason))
 
+    @property
+    def supervision(self) -> str:
+        """State and reason of the supervisor in words, such as `DEGRADED (place_held)`; "" where there is none."""
+        if not (self._started and self.supervised):
+            return ""
+        state, reason = self.state
+        return f"{state} ({reason})" if reason else state
+
     def transitions(self) -> Sequence[Transition]:
         """The last transitions of the supervisor, oldest first.
 
@@ -488,7 +496,9 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
         return scenario, "float64", None
     built, placed = scenario, isinstance(scenario, Built)
     if not isinstance(built, Built):
-        text = from_data(built) if isinstance(built, Mapping) else read(Path(built), allow_code=allow_code)
+        if isinstance(built, Mapping):
+            built = from_data(built)
+        text = built if isinstance(built, Text) else read(Path(built), allow_code=allow_code)
         built = build(text)
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)

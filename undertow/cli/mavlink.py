@@ -26,6 +26,7 @@ class Options(NamedTuple):
     channels: str | None
     timeout: float
     duration: float | None
+    unsupervised: bool
     allow_code: bool
 
 
@@ -52,6 +53,7 @@ def mavlink(scenario: Path, options: Options) -> int:
                 channels=options.channels,
                 timeout=options.timeout,
                 relative=options.relative,
+                unsupervised=options.unsupervised,
                 allow_code=options.allow_code,
             )
         link.drain()  # what came while the law was compiled

@@ -11,6 +11,14 @@ AllowCode = Annotated[
     ),
 ]
 
+Unsupervised = Annotated[
+    bool,
+    typer.Option(
+        "--unsupervised",
+        help="No supervisor, unless the scenario has one: one wrong message can then end control at full thrust.",
+    ),
+]
+
 Pdf = Annotated[
     str | None,
     typer.Option(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from undertow.cli.options import AllowCode
+from undertow.cli.options import AllowCode, Unsupervised
 
 
 def export(
@@ -138,6 +138,7 @@ def mavlink(
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="End after this time, s. Default: at Ctrl-C.")
     ] = None,
+    unsupervised: Unsupervised = False,
     allow_code: AllowCode = False,
 ) -> int:
     """Control a vehicle over MAVLink, as a companion of its autopilot.
@@ -150,7 +151,7 @@ def mavlink(
 
     options = command.Options(
         connect, output, source, system, target_system, target_component, signing_key, relative, frame, channels,
-        timeout, duration, allow_code,
+        timeout, duration, unsupervised, allow_code,
     )  # fmt: skip
     return command.mavlink(scenario, options)
 
@@ -200,6 +201,7 @@ def run(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
+    unsupervised: Unsupervised = False,
     allow_code: AllowCode = False,
 ) -> int:
     """Run the controller of a scenario in real time, with a link to its vehicle.
@@ -223,6 +225,7 @@ def run(
         out,
         overwrite,
         as_json,
+        unsupervised,
         allow_code,
     )
     return command.run(scenario, options)
@@ -291,6 +294,7 @@ def ros2(
         Path | None, typer.Option(metavar="DIR", help="Record all messages that the node sends and receives.")
     ] = None,
     storage: Annotated[str, typer.Option(metavar="WORD", help="Of the bag: mcap or sqlite3.")] = "mcap",
+    unsupervised: Unsupervised = False,
     allow_code: AllowCode = False,
 ) -> int:
     """Run the controller of a scenario, or its simulated vehicle, as a ROS 2 node. No ROS installation is needed.
@@ -303,7 +307,7 @@ def ros2(
 
     options = command.Options(
         role, output, pace, use_sim_time, remap or [], rate, duration, max_age, domain, localhost, reliability,
-        world_frame or [], body_frame, bag, storage, allow_code,
+        world_frame or [], body_frame, bag, storage, unsupervised, allow_code,
     )  # fmt: skip
     return command.ros2(scenario, options)
 

@@ -37,6 +37,7 @@ class Options(NamedTuple):
     body_frame: str
     bag: Path | None
     storage: str
+    unsupervised: bool
     allow_code: bool
 
 
@@ -47,6 +48,7 @@ def ros2(scenario: Path, options: Options) -> int:
         ("--pace", "vehicle", options.pace),
         ("--output", "controller", options.output),
         ("--use-sim-time", "controller", options.use_sim_time or None),
+        ("--unsupervised", "controller", options.unsupervised or None),
     ):
         if value is not None and role != options.role:
             raise BadInput(name, f"be left out with --as {options.role}", value)
@@ -100,8 +102,9 @@ def _compiled_controller(scenario: Path, options: Options, names: Any, frames: A
 
     duration = math.inf if options.duration is None else options.duration
     checks.positive("--duration", duration, "s", finite=False)
-    output, rate, allow_code = options.output or "input", options.rate, options.allow_code
-    controller = interruptible(lambda: CompiledController(scenario, output, rate, allow_code))
+    options_of_law = {"unsupervised": options.unsupervised, "allow_code": options.allow_code}
+    made = lambda: CompiledController(scenario, options.output or "input", options.rate, **options_of_law)
+    controller = interruptible(made)
     settings = ControllerSettings(options.max_age, options.use_sim_time, names, frames)
 
     def run(link: Any) -> int:

@@ -36,7 +36,8 @@ from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.realtime.vehicle_link import VehicleLink
 from undertow.report.run_tables import transition_rows
 from undertow.scenario.build import Built, build
-from undertow.scenario.reading import dump, read
+from undertow.scenario.link_scenario import read_for_link
+from undertow.scenario.reading import dump
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
@@ -60,6 +61,7 @@ class Options(NamedTuple):
     out: Path | None
     overwrite: bool
     json: bool
+    unsupervised: bool
     allow_code: bool
 
 
@@ -92,7 +94,8 @@ class _Stop:
 def run(scenario: Path, options: Options) -> int:
     """Run until the end of the scenario, of the link, or Ctrl-C; return the exit code."""
     _check(options)
-    built = interruptible(lambda: build(read(scenario, allow_code=options.allow_code)))
+    made = lambda: read_for_link(scenario, allow_code=options.allow_code, unsupervised=options.unsupervised)
+    built = interruptible(lambda: build(made()))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for `undertow run`", built.scenario.loop.kind)
     if options.serve is not None:

@@ -17,6 +17,7 @@ from undertow.interop.mavlink.permission import Permission
 from undertow.interop.mavlink.sender_clock import SenderClock
 from undertow.interop.mavlink.thruster_driver import ThrusterDriver
 from undertow.realtime.plausible_motion import SPEED
+from undertow.scenario.link_scenario import read_for_link
 
 HEARTBEAT_PERIOD = 1.0  # s
 NEUTRAL_PERIOD = 0.1  # s between neutral commands while the law is stopped
@@ -67,6 +68,7 @@ class Companion:
         blend: time constant, s, with which the output turns from neutral into the law's at a start; 0 for at once.
         relative: whether north and east of the reference count from where the law first ran since the vehicle was
             armed; depth and heading never do.
+        unsupervised: whether there is no supervisor where the scenario has none.
         allow_code: whether the Python code that an earlier run.nc names may run.
 
     Attributes:
@@ -93,6 +95,7 @@ class Companion:
         timeout: float = 0.5,
         blend: float = 1.0,
         relative: bool = False,
+        unsupervised: bool = False,
         allow_code: bool = False,
     ):
         for name, number in (("target_system", target_system), ("target_component", target_component)):
@@ -103,7 +106,8 @@ class Companion:
         checks.not_negative("blend", blend, "s")
         self._reader, self._target = OdometryReader(source), Target(target_system, target_component)
         smoothly = blend or 1.0  # a start that is given no applied input has no use for it
-        self._autopilot = Autopilot(scenario, attitude="quaternion", blend=smoothly, allow_code=allow_code)
+        text = read_for_link(Path(scenario), allow_code=allow_code, unsupervised=unsupervised)
+        self._autopilot = Autopilot(text, attitude="quaternion", blend=smoothly)
         self._from_neutral = bool(blend)
         self._driver = ThrusterDriver(self._autopilot, output, self._target, frame, channels)
         self.channels = self._driver.channels
@@ -190,7 +194,9 @@ class Companion:
     def state(self, now: float) -> str:
         """In words, what the companion does or waits for."""
         waiting = "irregular odometry" if self._rate.irregular else "no valid odometry"
-        return self._permission.why_not(now) or ("running" if self.running else waiting)
+        supervision = self._autopilot.supervision if self.running else ""
+        running = f"running, {supervision}" if supervision else "running"
+        return self._permission.why_not(now) or (running if self.running else waiting)
 
     def _note_acknowledgement(self, message: Any) -> None:
         ours = message.command in (mavlink.MAV_CMD_DO_SET_SERVO, mavlink.MAV_CMD_DO_SET_ACTUATOR)

@@ -40,7 +40,7 @@ from undertow.interop.ros2.simulated_vehicle import check_vehicle
 from undertow.interop.ros2.to_messages import stamp_of, thrusters_of, wrench_of
 from undertow.loop.stepped import put
 from undertow.scenario.build import build
-from undertow.scenario.reading import read
+from undertow.scenario.link_scenario import read_for_link
 
 RESTART = 0.1  # s, by which a clock must go back to be one that was set back
 
@@ -73,6 +73,7 @@ class CompiledController:
         scenario: a .yaml file or an earlier run.nc, of a vehicle.
         output: `input`, `newtons` or `pulses` (one number per thruster), or `wrench`.
         rate: control steps per second; None for the scenario's.
+        unsupervised: whether there is no supervisor where the scenario has none.
         allow_code: whether the Python code that an earlier run.nc names may run.
 
     Attributes:
@@ -85,18 +86,23 @@ class CompiledController:
         BadInput: something given cannot be used.
     """
 
-    def __init__(self, scenario: Path, output: str = "input", rate: float | None = None, allow_code: bool = False):
+    def __init__(
+        self,
+        scenario: Path,
+        output: str = "input",
+        rate: float | None = None,
+        *,
+        unsupervised: bool = False,
+        allow_code: bool = False,
+    ):
         if rate is not None:
             checks.positive("rate", rate, "Hz")
-        built = build(read(scenario, allow_code=allow_code))
+        text = read_for_link(scenario, allow_code=allow_code, unsupervised=unsupervised)
+        built = build(text)
         check_vehicle(built)
         plant, law = built.closed_loop.plant, built.closed_loop.controller
         self.autopilot = Autopilot(
-            scenario,
-            sampling_time=None if rate is None else 1 / rate,
-            attitude="quaternion",
-            velocity="body",
-            allow_code=allow_code,
+            text, sampling_time=None if rate is None else 1 / rate, attitude="quaternion", velocity="body"
         )
         self.output, self.thrusters = output, plant.inputs()
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
@@ -193,7 +199,9 @@ class ControllerNode:
         late = "".join(f", {number} steps {name}" for name, number in of_clock.items())
         malformed = f", {self._odometry.malformed} malformed" if self._odometry.malformed else ""
         received = f"{self._odometry.received} odometry, {self._targets.received} targets"
-        return f"{received}, {self._commands.sent} commands{late}{malformed}{self._reporter.events()}"
+        supervision = "" if self._last is None else self._autopilot.supervision
+        supervised = f", {supervision}" if supervision else ""
+        return f"{received}, {self._commands.sent} commands{supervised}{late}{malformed}{self._reporter.events()}"
 
     def _now(self) -> int:
         """Time, ns: of /clock where that is used and there is one."""
