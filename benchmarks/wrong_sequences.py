@@ -3,7 +3,7 @@
     python benchmarks/wrong_sequences.py [named] [random] [--runs N] [--first SEED] [--duration S]
 
 A BlueROV2 Heavy holds its place in a current of 0.2 m/s, with preset robust at 50 Hz and exact readings, stepped as a
-link steps it. From 5 s on something that is told to the controller is wrong; the vehicle moves on as it does.
+link steps it. From 5 s on something that the controller is given is wrong; the vehicle moves on as it does.
 
 named: the worst sequences that an attack had found.
 random: sequences of the same kinds, one or two at a time, each from a seed of its own.
@@ -38,12 +38,12 @@ QUANTITIES = ("position", "attitude", "velocity", "rate", "applied")
 FORMS = ("constant", "alternating", "ramp", "random", "sine", "frozen")
 # Largest size, by quantity: m, rad, m/s, rad/s, V.
 LARGEST = {"position": 100.0, "attitude": np.pi, "velocity": 20.0, "rate": 20.0, "applied": SUPPLY}
-LEAST = 0.05  # share of the usual limits of jumps, from which on a sequence is drawn
+LEAST = 0.05  # share of the usual limits of jumps, from which on a sequence is sampled
 UNIT = {"position": 1.0, "attitude": 0.5, "velocity": 1.0, "rate": 1.0, "applied": SUPPLY}
 
 
 class Wrong(NamedTuple):
-    """Something told wrongly from the onset on.
+    """Something that is wrong from the onset on.
 
     Attributes:
         quantity: of `QUANTITIES`; an attitude is turned, an applied input replaced, the others get an offset.
@@ -67,12 +67,12 @@ class Wrong(NamedTuple):
         """Offset at a step after the onset; that of a ramp stays at its end."""
         count = min(step + 1, round(self.length / DT)) if self.form == "ramp" else step + 1
         ended = self.form != "ramp" and step * DT >= self.length
-        draw = np.random.default_rng([self.seed, step]) if self.form == "random" else None
+        chance = np.random.default_rng([self.seed, step]) if self.form == "random" else None
         share = {
             "constant": 1.0,
             "alternating": (-1.0) ** step,
             "ramp": float(count),
-            "random": 0.0 if draw is None else draw.uniform(-1, 1),
+            "random": 0.0 if chance is None else chance.uniform(-1, 1),
             "sine": np.sin(2 * np.pi * step * DT / self.period),
             "frozen": 0.0,
         }[self.form]
@@ -111,31 +111,31 @@ NAMED = {
 }
 
 
-def drawn(seed: int) -> tuple[Wrong, ...]:
+def sampled(seed: int) -> tuple[Wrong, ...]:
     """One or two wrong quantities of a random sequence."""
-    draw = np.random.default_rng(seed)
-    return tuple(_one(draw) for _ in range(1 + (draw.random() < 0.3)))
+    generator = np.random.default_rng(seed)
+    return tuple(_one(generator) for _ in range(1 + (generator.random() < 0.3)))
 
 
-def _one(draw: np.random.Generator) -> Wrong:
-    quantity, form = str(draw.choice(QUANTITIES)), str(draw.choice(FORMS))
+def _one(generator: np.random.Generator) -> Wrong:
+    quantity, form = str(generator.choice(QUANTITIES)), str(generator.choice(FORMS))
     of_actuators = quantity == "applied"
     if of_actuators:
-        direction = np.where(draw.random(8) < 0.5, draw.uniform(-1, 1, 8), draw.choice([-1.0, 1.0]))
+        direction = np.where(generator.random(8) < 0.5, generator.uniform(-1, 1, 8), generator.choice([-1.0, 1.0]))
     else:
-        direction = draw.normal(size=3)
-        direction = np.eye(3)[draw.integers(3)] if draw.random() < 0.5 else direction / np.linalg.norm(direction)
-    size = np.exp(draw.uniform(np.log(LEAST * UNIT[quantity]), np.log(LARGEST[quantity])))
+        direction = generator.normal(size=3)
+        direction = np.eye(3)[generator.integers(3)] if generator.random() < 0.5 else direction / np.linalg.norm(direction)
+    size = np.exp(generator.uniform(np.log(LEAST * UNIT[quantity]), np.log(LARGEST[quantity])))
     if form == "ramp":  # by the limit of a jump in each step at most
-        size = np.exp(draw.uniform(np.log(1e-3), 0.0)) * UNIT[quantity]
+        size = np.exp(generator.uniform(np.log(1e-3), 0.0)) * UNIT[quantity]
     return Wrong(
         quantity=quantity,
         form=form,
         size=float(size),
         direction=tuple(direction.tolist()),
-        length=float(np.exp(draw.uniform(np.log(DT), np.log(20.0)))) if draw.random() < 0.5 else ALWAYS,
-        period=float(np.exp(draw.uniform(np.log(2 * DT), np.log(20.0)))),
-        seed=int(draw.integers(2**31)),
+        length=float(np.exp(generator.uniform(np.log(DT), np.log(20.0)))) if generator.random() < 0.5 else ALWAYS,
+        period=float(np.exp(generator.uniform(np.log(2 * DT), np.log(20.0)))),
+        seed=int(generator.integers(2**31)),
     )
 
 
@@ -156,7 +156,7 @@ class Attacked:
         way, applied, volts = 0.0, None, None
         for step in range(onset + round(duration / DT)):
             state = vehicle.state()
-            told = {
+            given = {
                 "position": state.position,
                 "attitude": state.attitude,
                 "velocity": state.body_velocity[:3],
@@ -164,9 +164,9 @@ class Attacked:
                 "applied": vehicle.input,
             }
             for one in wrong if step >= onset else ():
-                told[one.quantity] = _wrong(one, step - onset, told[one.quantity], frozen)
-            motion = told["position"], np.concatenate([told["velocity"], told["rate"]]), told["attitude"]
-            volts = law.step(*motion, applied=told["applied"]) if step else law.start(*motion)
+                given[one.quantity] = _wrong(one, step - onset, given[one.quantity], frozen)
+            motion = given["position"], np.concatenate([given["velocity"], given["rate"]]), given["attitude"]
+            volts = law.step(*motion, applied=given["applied"]) if step else law.start(*motion)
             applied = np.clip(volts, -SUPPLY, SUPPLY)
             if step >= onset:
                 history.append(np.abs(applied))
@@ -179,7 +179,7 @@ class Attacked:
 
 
 def _wrong(one: Wrong, step: int, true: np.ndarray, frozen: dict[str, np.ndarray]) -> np.ndarray:
-    """What is told in place of a reading."""
+    """What is given in place of a reading."""
     ended = step * DT >= one.length and one.form != "ramp"
     if one.form == "frozen":
         return true if ended else frozen.setdefault(one.quantity, true)
@@ -212,8 +212,8 @@ def random(duration: float, runs: int, first: int) -> None:
     """Random sequences with a supervisor: how bad the worst are."""
     without, supervised = Attacked(), Attacked(supervisor=True)
     seeds = range(first, first + runs)
-    bare = [without.run(drawn(seed), duration) for seed in seeds]
-    found = [supervised.run(drawn(seed), duration) for seed in seeds]
+    bare = [without.run(sampled(seed), duration) for seed in seeds]
+    found = [supervised.run(sampled(seed), duration) for seed in seeds]
     for name, results in (("without", bare), ("with", found)):
         full, volts, way = (np.array([getattr(one, key) for one in results]) for key in ("full", "volt_seconds", "way"))
         parts = [
@@ -223,7 +223,7 @@ def random(duration: float, runs: int, first: int) -> None:
         print(f"{name:8} {runs} runs of {duration:g} s: {'; '.join(parts)}; more than 0.5 s full: {(full > 0.5).sum()}")
     print(f"supervisor at the end: {dict(Counter(one.state for one in found))}")
     for place in sorted(range(runs), key=lambda k: -found[k].full)[:25]:
-        print(f"{seeds[place]:6} {found[place]}  {'; '.join(map(str, drawn(seeds[place])))}")
+        print(f"{seeds[place]:6} {found[place]}  {'; '.join(map(str, sampled(seeds[place])))}")
 
 
 def main() -> None:
@@ -233,11 +233,11 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--duration", type=float, default=20.0)
-    given = parser.parse_args()
-    if "named" in given.parts:
-        named(given.duration)
-    if "random" in given.parts:
-        random(given.duration, given.runs, given.first)
+    options = parser.parse_args()
+    if "named" in options.parts:
+        named(options.duration)
+    if "random" in options.parts:
+        random(options.duration, options.runs, options.first)
 
 
 if __name__ == "__main__":
