@@ -23,6 +23,7 @@ _MAGIC = 18458  # of packets with 16 channels
 _BEGINS = 600.0  # s
 _AGAIN = 0.5  # s after which the packet is sent again
 _LONGEST = 65535  # bytes
+_OLD, _OLD_KINDS = "old", ("replayed", "reordered", "old only", "late")
 _DAMAGED = ("garbage", "other version", "wild")
 
 
@@ -64,8 +65,8 @@ class ArdupilotRunner:
         for step in range(1, self._plan.last):
             begun, packet = time.monotonic(), self._packet(step)
             now = [event for event in self._plan.events if event.covers(step)]
-            for event in now:
-                self._disturb(event.kind, event.first == step, packet, sent)
+            for kind in {_OLD if event.kind in _OLD_KINDS else event.kind: event for event in now}:
+                self._disturb(kind, any(event.first == step for event in now), packet, sent)
             answer = self._patiently(packet, step)
             if answer is None:
                 return found if self._command.code() is not None else [*found, ("N3", f"no answer to frame {step}")]
@@ -90,7 +91,7 @@ class ArdupilotRunner:
             for data in damaged(packet, self._chance):
                 if data[:2] != packet[:2] or len(data) != len(packet):  # the protocol has no checksum
                     send(data)
-        elif kind in ("replayed", "reordered", "old only", "late"):
+        elif kind == _OLD:  # one at a time: two old ones in a row are a restart, as the protocol has no session
             send(self._chance.choice(sent))
         elif kind == "another sender":
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
