@@ -65,7 +65,7 @@ class ArdupilotRunner:
         for step in range(1, self._plan.last):
             begun, packet = time.monotonic(), self._packet(step)
             now = [event for event in self._plan.events if event.covers(step)]
-            for kind in {_OLD if event.kind in _OLD_KINDS else event.kind: event for event in now}:
+            for kind in sorted({_OLD if event.kind in _OLD_KINDS else event.kind for event in now}):
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
             answer = self._patiently(packet, step)
             if answer is None:
