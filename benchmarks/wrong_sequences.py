@@ -124,7 +124,9 @@ def _one(generator: np.random.Generator) -> Wrong:
         direction = np.where(generator.random(8) < 0.5, generator.uniform(-1, 1, 8), generator.choice([-1.0, 1.0]))
     else:
         direction = generator.normal(size=3)
-        direction = np.eye(3)[generator.integers(3)] if generator.random() < 0.5 else direction / np.linalg.norm(direction)
+        direction = (
+            np.eye(3)[generator.integers(3)] if generator.random() < 0.5 else direction / np.linalg.norm(direction)
+        )
     size = np.exp(generator.uniform(np.log(LEAST * UNIT[quantity]), np.log(LARGEST[quantity])))
     if form == "ramp":  # by the limit of a jump in each step at most
         size = np.exp(generator.uniform(np.log(1e-3), 0.0)) * UNIT[quantity]
