@@ -70,6 +70,13 @@ class Water(NamedTuple):
     acceleration: Float[Array, "3"]  # m/s^2
 
 
+class FreeSurface(NamedTuple):
+    """The surface of the water above the position of the body."""
+
+    depth: Float[Array, ""]  # of the world's origin below the surface at rest, m
+    elevation: Float[Array, ""]  # of the surface above that, m
+
+
 class ModelScaling(NamedTuple):
     """Factors of the true body relative to the nominal model; 1 for no mismatch."""
 
@@ -95,6 +102,7 @@ class Load(NamedTuple):
     water: Water | None = None
     scaling: ModelScaling | None = None
     payloads: tuple[Payload, ...] = ()
+    surface: FreeSurface | None = None  # None where the water has no end
 
 
 class Effort(NamedTuple):

@@ -61,12 +61,12 @@ def param(
         meaning: a few words.
         symbol: letter in the literature.
         source: where the default comes from; a part's own `sources` takes precedence.
-        default: value when none is given.
+        default: value when none is given; None for a parameter that may be left out, and is then not listed.
         range: bounds between which `undertow tune` searches, on a logarithmic scale; None if it is not tuned.
     """
     metadata = {"unit": unit, "meaning": meaning, "symbol": symbol, "source": source, "range": range}
     extra = {} if default is dataclasses.MISSING else {"default": default}
-    return eqx.field(converter=as_array, metadata=metadata, **extra)
+    return eqx.field(converter=as_array if default is not None else _as_array_or_none, metadata=metadata, **extra)
 
 
 def sources_field() -> Any:
@@ -83,6 +83,8 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
             value = "required" if field.default is dataclasses.MISSING else field.default
         else:
             value = getattr(part, field.name)
+        if value is None:
+            continue
         if "unit" in field.metadata:
             meta = field.metadata
             own = sources.get(field.name, sources.get("*", "")) or meta["source"]
@@ -101,6 +103,10 @@ def tuning_ranges(part: eqx.Module) -> dict[str, tuple[float, float]]:
     """Bounds of the parameters of a part that are declared with a `range`, by name."""
     declared = {field.name: field.metadata.get("range") for field in dataclasses.fields(part)}
     return {name: bounds for name, bounds in declared.items() if bounds is not None}
+
+
+def _as_array_or_none(value: Any) -> Any:
+    return None if value is None else as_array(value)
 
 
 def _freeze(sources: Mapping[str, str] | tuple) -> tuple:

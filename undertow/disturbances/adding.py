@@ -6,11 +6,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling, Payload, Pose, Water
+from undertow.core.contracts import AbstractDisturbance, FreeSurface, Load, ModelScaling, Payload, Pose, Water
 from undertow.core.errors import BadInput, within
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import cross
 
+Scalar = Float[Array, ""]
 Vector3 = Float[Array, "3"]
 
 
@@ -59,6 +60,20 @@ def with_water(load: Load, pose: Pose | None, velocity: Vector3, acceleration: V
     body_of(pose)
     before = load.water or Water(jnp.zeros(3), jnp.zeros(3))
     return load._replace(water=Water(before.velocity + velocity, before.acceleration + acceleration))
+
+
+def with_surface(load: Load, pose: Pose | None, depth: Scalar, elevation: Scalar) -> Load:
+    """Load under a surface of the water; elevations add, and the depth is that which was stated first.
+
+    Args:
+        load: so far.
+        pose: of the body.
+        depth: of the world's origin below the surface at rest, m.
+        elevation: of the surface above the body, m.
+    """
+    body_of(pose)
+    before = load.surface or FreeSurface(depth, jnp.zeros(()))
+    return load._replace(surface=FreeSurface(before.depth, before.elevation + elevation))
 
 
 def with_force(load: Load, pose: Pose | None, force: Vector3, point: Vector3) -> Load:

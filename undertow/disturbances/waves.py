@@ -12,7 +12,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.disturbances.adding import body_of, with_water
+from undertow.disturbances.adding import body_of, with_surface, with_water
 from undertow.numerics.number import Number
 from undertow.numerics.random_keys import keys_for
 
@@ -59,7 +59,7 @@ class Waves(AbstractDisturbance):
     """Linear (Airy) waves in deep water, as a sum of components that carry equal shares of the energy.
 
     Orbital velocity and acceleration decay as e^(-k depth). The water is assumed uniform over the vehicle, which is
-    valid for waves much longer than the vehicle.
+    valid for waves much longer than the vehicle. Above it the surface has the elevation of these waves.
 
     Raises:
         BadInput: height or period not positive, peakedness below 1, spreading negative.
@@ -104,6 +104,7 @@ class Waves(AbstractDisturbance):
         velocity = jnp.stack([(along * cosine).sum(), (along * sine).sum(), -up.sum()])
         gain_along, gain_up = realization.frequency * up, -realization.frequency * along
         acceleration = jnp.stack([(gain_along * cosine).sum(), (gain_along * sine).sum(), -gain_up.sum()])
+        load = with_surface(load, pose, self.depth, (amplitude * jnp.cos(angle)).sum())
         return with_water(load, pose, velocity, acceleration)
 
     def jumps(self, duration: float) -> tuple[float, ...]:

@@ -30,6 +30,7 @@ from undertow.thrusters.inflow import advance_speed, with_inflow
 from undertow.thrusters.thruster import AbstractThruster
 from undertow.vehicles.alteration import altered
 from undertow.vehicles.body import Body, seen_from_water
+from undertow.vehicles.submersion import Hull, hull_of
 from undertow.vehicles.vehicle import Vehicle
 
 _ENVELOPE = 1e3  # m, m/s, rad/s; far above the values of any vehicle
@@ -58,6 +59,7 @@ class HybridVehicle(AbstractPlant):
     thruster: AbstractThruster
     power: HybridPower
     body: Body
+    hull: Hull
     thruster_matrix: Float[Array, "6 N"]
     inflow_loss: Float[Array, ""] | None  # lambda of `with_inflow`, N^(1/2) s/m; None for none
     outputs: tuple[str, ...] = eqx.field(static=True)
@@ -81,6 +83,7 @@ class HybridVehicle(AbstractPlant):
             checks.positive("inflow_loss", inflow_loss, "N^(1/2) s/m")
         self.inflow_loss = None if inflow_loss is None else as_array(inflow_loss)
         self.body, self.thruster_matrix = vehicle.body(), vehicle.thruster_matrix()
+        self.hull = hull_of(vehicle)
         self.outputs = BODY_OUTPUTS
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
         self.input_unit = thruster.input_unit
@@ -123,6 +126,10 @@ class HybridVehicle(AbstractPlant):
                 raise BadInput("thrusters", f"be {thrust.size}, as the vehicle has", d.scaling.thrust.size)
             thrust = d.scaling.thrust * thrust
         wrench = matvec(self.thruster_matrix, thrust) - d.wrench
+        if d.surface is not None:
+            cut = self.hull.cut(d.surface, x.position, kinematics.rotation[2], body, d.scaling)
+            wrench = wrench + matvec(self.thruster_matrix, cut.lost_thrust(thrust)) + cut.wrench(seen)
+            body = cut.body()
         prescribed = d.acceleration
         if self.thruster.has_prescribed_acceleration:
             prescribed = prescribed - kinematics.rate_term(x.nu)

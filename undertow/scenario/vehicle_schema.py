@@ -301,6 +301,7 @@ def parse(contents: Mapping[str, Any]) -> VehicleData:
         r_b=vectors["r_b"],
         inertia_about_origin=about == "origin",
         notes=notes,
+        size=vectors.get("size"),
         **matrices,
     )
     return VehicleData(

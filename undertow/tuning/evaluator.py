@@ -17,6 +17,7 @@ from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
     AbstractPlant,
+    FreeSurface,
     Load,
     ModelScaling,
     Payload,
@@ -42,13 +43,14 @@ class Scaled(AbstractDisturbance):
 
     def at(self, realization, t, pose, load: Load) -> Load:
         whole, size = self.inner.at(realization, t, pose, load), self.size
-        water, factors = whole.water, whole.scaling
+        water, factors, surface = whole.water, whole.scaling, whole.surface
         return Load(
             acceleration=load.acceleration + size * (whole.acceleration - load.acceleration),
             wrench=load.wrench + size * (whole.wrench - load.wrench),
             water=water and Water(size * water.velocity, size * water.acceleration),
             scaling=factors and ModelScaling(*(factor**size for factor in factors)),
             payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
+            surface=surface and FreeSurface(surface.depth, size * surface.elevation),
         )
 
     def jumps(self, duration: float) -> tuple[float, ...]:

@@ -34,10 +34,8 @@ class Body(eqx.Module):
     gravity: Float[Param, ""] = param("m/s^2", "gravity, weight per dry mass", symbol="g", default=9.81)
 
     def coriolis(self, nu: Vector6) -> Vector6:
-        """C(nu) nu, N and N m, which does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, expanded."""
-        momentum = matvec(self.mass_matrix, nu)
-        linear, angular = momentum[:3], momentum[3:]
-        return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
+        """C(nu) nu, N and N m."""
+        return coriolis_force(self.mass_matrix, nu)
 
     def damping(self, nu: Vector6) -> Vector6:
         """D(nu) nu = D_l nu + D_q (|nu| nu), N and N m."""
@@ -60,6 +58,13 @@ class Body(eqx.Module):
     def accelerate(self, wrench: Vector6) -> Vector6:
         """M^-1 wrench, m/s^2 and rad/s^2."""
         return matvec(self.inverse_mass_matrix, wrench)
+
+
+def coriolis_force(mass_matrix: Matrix6, nu: Vector6) -> Vector6:
+    """C(nu) nu, N and N m, which does no work: nu . C(nu) nu = 0. Fossen (2021), theorem 3.2, expanded."""
+    momentum = matvec(mass_matrix, nu)
+    linear, angular = momentum[:3], momentum[3:]
+    return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
 
 
 @jax.jit

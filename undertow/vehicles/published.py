@@ -30,6 +30,7 @@ class Hull(NamedTuple):
     quadratic_damping: ArrayLike  # N s^2/m^2, N s^2, N m s^2
     inertia_about_origin: bool = False  # printed about the body origin instead
     notes: Mapping[str, str] | None = None  # sources of single parameters
+    size: ArrayLike | None = None  # m; length, width, height
 
 
 class Layout(NamedTuple):
@@ -73,6 +74,7 @@ def assemble(name: str, hull: Hull, layout: Layout) -> Vehicle:
         thruster_directions=np.asarray(layout.directions, dtype=float),
         sources=sources | dict(hull.notes or {}),
         own_thruster_names=layout.names,
+        size=None if hull.size is None else np.asarray(hull.size, dtype=float),
     )
 
 

@@ -40,6 +40,7 @@ class Vehicle(eqx.Module):
     thruster_positions: Float[Param, "N 3"] = param("m", "position of each thruster", symbol="r_j")
     thruster_directions: Float[Param, "N 3"] = param("", "unit vector of positive thrust", symbol="e_j")
     sources: Sources = sources_field()
+    size: Float[Param, "3"] | None = param("m", "length, width, height", default=None)
     own_thruster_names: tuple[str, ...] = eqx.field(static=True, default=())  # () for none; "" for a thruster without
 
     @double_outside_runs
@@ -47,6 +48,9 @@ class Vehicle(eqx.Module):
         for name in ("r_g", "r_b"):
             checks.length(name, getattr(self, name), 3, "forward, starboard, down")
             checks.finite(name, getattr(self, name), "m")
+        if self.size is not None:
+            checks.length("size", self.size, 3, "length, width, height")
+            checks.positive("size", self.size, "m")
         checks.positive("mass", self.mass, "kg")
         checks.positive("weight", self.weight, "N")
         checks.positive("buoyancy", self.buoyancy, "N")

@@ -1,0 +1,42 @@
+"""The surface of still water, above which a vehicle has no buoyancy."""
+
+from jaxtyping import Float
+
+from undertow.core import checks
+from undertow.core.contracts import AbstractDisturbance, Load
+from undertow.core.param import Param, param
+from undertow.disturbances.adding import AbstractSmoothDisturbance, Together, with_surface
+from undertow.disturbances.waves import Waves
+
+
+class StillSurface(AbstractSmoothDisturbance):
+    """A level surface at a depth above the world's origin.
+
+    Raises:
+        BadInput: depth not finite.
+    """
+
+    depth: Float[Param, ""] = param("m", "depth of the world's origin")
+
+    def __check_init__(self):
+        checks.finite("depth", self.depth, "m")
+
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return with_surface(load, pose, self.depth, 0.0 * self.depth)
+
+
+def surface(depth: float = 0.0) -> StillSurface:
+    """Surface of still water. Waves have their own; without either, the water has no end.
+
+    Near the surface, buoyancy, added mass, damping and thrust fade with the share of the hull that is out of the water.
+
+    Args:
+        depth: of the world's origin below the surface, m.
+    """
+    return StillSurface(depth)
+
+
+def stated_depths(disturbance: AbstractDisturbance) -> list[float]:
+    """Depths of the world's origin below the surface that a disturbance states, m; the first one counts."""
+    members = disturbance.members if isinstance(disturbance, Together) else (disturbance,)
+    return [float(one.depth) for one in members if isinstance(one, Waves | StillSurface)]
