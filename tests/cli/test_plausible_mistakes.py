@@ -173,6 +173,8 @@ ADVICE = {
     "pitch in degrees": ("s.yaml", "0, 0.5]", "5, 0]", ["pitch", "5 rad (286.5 degrees)", "in radians"]),
     "height for depth": ("s.yaml", "[2, 0, 1,", "[2, 0, -5,", ["down = -5 m", "5 m above the start", "positive downward"]),
     "above the surface": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 0.5}\ninitial: {position: [0, 0, -2, 0, 0, 0]}", ["down = -2 m", "down = -0.5 m", "positive downward"]),
+    "out of the water": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: surface, depth: 0}", ["`initial.position`", "into the water with 44 % of its hull, but it floats with 100 %", "falls into the water"]),
+    "two surfaces": ("s.yaml", "[0.3, 0, 0]}", "[0.3, 0, 0]}\n  - {kind: waves, depth: 3}\n  - {kind: surface, depth: 2}", ["`disturbance`", "as 3 m and as 2 m", "same `depth`"]),
     "current": ("s.yaml", "[0.3, 0, 0]", "[4, 3, 0]", ["current is 5 m/s", "(s.yaml, line 6)", "at most 1.32", "drifts away"]),
     "too far": ("s.yaml", "[2, 0, 1,", "[300, 0, 1,", ["300 m from the start", "(s.yaml, line 5)", "at most 1.32", "`loop.duration` more than 20 s"]),
     "beyond all squares": ("s.yaml", "[2, 0, 1,", "[1e200, 0, 1,", ["1e+200 m from the start", "at most 1.32", "`loop.duration` more than 20 s"]),

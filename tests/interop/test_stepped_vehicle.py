@@ -58,6 +58,26 @@ def test_waves_are_those_of_the_simulation(written):
     np.testing.assert_array_equal(found, recorded(run))
 
 
+def test_a_buoyant_vehicle_stays_in_the_water(written):
+    """75 s without thrust from 3 m below the surface, as behind ArduSub; it rose 12.95 m into the air."""
+    buoyant = {"vehicle": {"kind": "bluerov2_heavy", "parameters": "wu2018"}, "thruster": {"kind": "t200", "supply": 16}}
+    scenario = written(DRIVEN | {"plant": buoyant, "disturbance": "none", "initial": {}})
+    vehicle = SteppedVehicle(scenario, otherwise=3.0)
+    for _ in range(75 * 20):
+        assert vehicle.step(STILL, 0.05)
+    assert vehicle.depth == 3.0
+    x = 2 * np.sin(np.arcsin(2 * 112.8 / 114.8 - 1) / 3)  # where it floats, of the radius of its hull
+    assert vehicle.state().position[2] + 3.0 == pytest.approx(x * float(vehicle.plant.hull.half_size[0]), abs=2e-3)
+
+
+def test_the_depth_is_that_of_the_scenario(written):
+    """Waves have one already; another one is a contradiction."""
+    scenario = written(DRIVEN | {"disturbance": {"kind": "waves", "depth": 2.0}})
+    assert SteppedVehicle(scenario, otherwise=0.0).depth == 2.0
+    with pytest.raises(BadInput, match=r"`depth` must be that of the scenario's disturbance, 2 m, but is 3 m"):
+        SteppedVehicle(scenario, depth=3.0)
+
+
 def test_specific_force_is_acceleration_without_gravity(vehicle):
     """Against differences of the velocity over a tenth of a millisecond, in a turning, accelerating vehicle."""
     chance = np.random.default_rng(5)

@@ -21,19 +21,20 @@ def ardupilot(
     port: int,
     frame: str | None,
     channels: str | None,
-    depth: float,
+    depth: float | None,
     duration: float | None,
     allow_code: bool,
 ) -> int:
     """Answer ArduPilot's packets until Ctrl-C; return the exit code."""
     console = wide_console()
-    checks.finite("depth", depth, "m")
+    if depth is not None:
+        checks.finite("depth", depth, "m")
     if duration is not None:
         checks.positive("duration", duration, "s")
     with stage(console, "building and compiling"):
-        vehicle = SteppedVehicle(scenario, allow_code)
+        vehicle = SteppedVehicle(scenario, allow_code, depth, otherwise=0.0)
     driven = channels_of_vehicle(np.asarray(vehicle.plant.thruster_matrix), frame, channels)
-    session = Session(vehicle, driven, depth)
+    session = Session(vehicle, driven)
     with listen(address, port) as link:
         typer.echo(f"Listening on UDP {address}:{link.getsockname()[1]}. Channels of the thrusters: {driven}")
         serve(session, link, typer.echo, float("inf") if duration is None else duration)

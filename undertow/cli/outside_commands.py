@@ -80,8 +80,13 @@ def ardupilot(
         ),
     ] = None,
     depth: Annotated[
-        float, typer.Option(metavar="M", help="Depth of the scenario's origin below the surface, m.")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="Depth of the scenario's origin below the surface, m. Default: that of the scenario's waves or "
+            "surface; 0 without either.",
+        ),
+    ] = None,
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="End after this time of the physics, s. Default: at Ctrl-C.")
     ] = None,

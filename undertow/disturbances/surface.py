@@ -25,6 +25,22 @@ class StillSurface(AbstractSmoothDisturbance):
         return with_surface(load, pose, self.depth, 0.0 * self.depth)
 
 
+class UnderSurface(AbstractDisturbance):
+    """A disturbance, with the same draws, under the surface of still water."""
+
+    inner: AbstractDisturbance
+    surface: StillSurface
+
+    def realize(self, key):
+        return self.inner.realize(key)
+
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return self.surface.at((), t, pose, self.inner.at(realization, t, pose, load))
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return self.inner.jumps(duration)
+
+
 def surface(depth: float = 0.0) -> StillSurface:
     """Surface of still water. Waves have their own; without either, the water has no end.
 
@@ -38,5 +54,7 @@ def surface(depth: float = 0.0) -> StillSurface:
 
 def stated_depths(disturbance: AbstractDisturbance) -> list[float]:
     """Depths of the world's origin below the surface that a disturbance states, m; the first one counts."""
+    if isinstance(disturbance, UnderSurface):
+        return [*stated_depths(disturbance.inner), float(disturbance.surface.depth)]
     members = disturbance.members if isinstance(disturbance, Together) else (disturbance,)
     return [float(one.depth) for one in members if isinstance(one, Waves | StillSurface)]

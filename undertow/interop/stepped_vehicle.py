@@ -1,5 +1,6 @@
 """The vehicle of a scenario by itself, stepped by other people's software: pulses in, motion out."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,8 +12,10 @@ from undertow.autopilot.numbers import numbers, step_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Inputs
+from undertow.core.errors import BadInput
 from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
+from undertow.disturbances.surface import UnderSurface, stated_depths, surface
 from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.stepped import Uncopied, put, realized
@@ -60,6 +63,8 @@ class SteppedVehicle(Uncopied):
     Args:
         scenario: a .yaml file or an earlier run.nc.
         allow_code: whether the Python code that an earlier run.nc names may run.
+        depth: of the scenario's origin below the surface, m; None for the one that the scenario states (waves do).
+        otherwise: the depth, m, where neither states one; None for water without a surface.
 
     Attributes:
         plant: of the scenario.
@@ -67,12 +72,14 @@ class SteppedVehicle(Uncopied):
         esc: speed controllers; usual ones where the scenario has none.
         sampling_time: of the scenario, s.
         time: s since the start.
+        depth: of the scenario's origin below the surface, m; None without a surface.
 
     Raises:
-        BadInput: the scenario is invalid, or its plant is no vehicle with thrusters in volts and a supply.
+        BadInput: the scenario is invalid, its plant is no vehicle with thrusters in volts and a supply, or it states
+            another depth.
     """
 
-    def __init__(self, scenario: str | Path, allow_code: bool = False):
+    def __init__(self, scenario: str | Path, allow_code: bool = False, depth: float | None = None, otherwise: float | None = None):
         built = build(read(Path(scenario), allow_code=allow_code))
         settings, plant = built.scenario.loop, pulse_driven(built.closed_loop.plant, battery_suffices=True)
         self.plant, self.esc = plant, plant.power.esc or esc()
@@ -80,7 +87,8 @@ class SteppedVehicle(Uncopied):
         self._longest = self.sampling_time / settings.substeps
         integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
-            loop, key = built.closed_loop, key_of_seed(built.scenario.seed)
+            loop, key = _under_surface(built.closed_loop, depth, otherwise), key_of_seed(built.scenario.seed)
+            self.depth = next(iter(stated_depths(loop.disturbance)), None)
             start = loop.outputs_at_start(*map(_numbers, built.scenario.initial))
             realization, x = _begun(loop, key, start)
             self._compile(realization, x, integrate)
@@ -166,6 +174,18 @@ class SteppedVehicle(Uncopied):
         put(self._look.inputs, (self.time, self._advance.state, self._input))
         self._look()
         return jax.tree.map(np.array, self._look.outputs)
+
+
+def _under_surface(loop: ClosedLoop, depth: float | None, otherwise: float | None) -> ClosedLoop:
+    """The loop with the surface where `SteppedVehicle` says."""
+    stated = stated_depths(loop.disturbance)
+    if depth is not None and stated and stated[0] != depth:
+        hint = "Leave one of them out: the surface of waves is `depth` of the waves above the world's origin"
+        raise BadInput("depth", f"be that of the scenario's disturbance, {stated[0]:g} m", f"{depth:g} m", hint=hint)
+    wanted = otherwise if depth is None else depth
+    if stated or wanted is None:
+        return loop
+    return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(wanted)))
 
 
 def _begun(loop: ClosedLoop, key: Any, start: Any) -> tuple[Realization, VehicleState]:

@@ -13,12 +13,12 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.analysis.thrust_reserve import reference_reserve
-from undertow.core.contracts import AbstractReference
+from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
 from undertow.disturbances.adding import Together
 from undertow.disturbances.current import Current
 from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
-from undertow.disturbances.waves import Waves
+from undertow.disturbances.surface import stated_depths
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
@@ -28,6 +28,8 @@ _LONG = 1e6  # s, by when a reference that ends has ended
 _FULL_TURN = 2 * np.pi
 _RISES = 0.2  # m above the start; less is no mistake of sign
 _SPARE = 1.05  # a speed is too large from this multiple of the top speed on
+_HIGHER = 0.02  # of the hull above where it floats; less is a ripple
+_SURFACE = "The surface is `depth` of the disturbance above the world's origin, and down is positive downward"
 _JUMP = 1.0  # m from the vehicle; a path that begins farther away begins with an error of this size
 _FAR = 10.0  # s at top speed; a longer step saturates the thrusters for long
 _DIRECTIONS = 2000
@@ -188,18 +190,39 @@ def _above(loop: ClosedLoop, desired: Motion):
     """Positions above the surface, or above the start where a depth was meant."""
     down, start = desired.position[:, 2], float(desired.start[2])
     highest = float(down.min())
-    for waves in _members(loop, Waves):
-        surface = -float(waves.depth)
+    depths = stated_depths(loop.disturbance)
+    if depths:
+        surface = -depths[0]
         for name, value in (("reference", highest), ("initial.position", start)):
             if value < surface:
                 says = f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m"
-                hint = "The surface is `depth` of the waves above the world's origin, and down is positive downward"
-                yield advice(name, says, hint)
+                yield advice(name, says, _SURFACE)
+        if start >= surface:
+            yield from _out_of_water(loop, desired.start, depths[0])
+        if len(set(depths)) > 1:
+            says = f"`disturbance` states the depth of the world's origin as {depths[0]:g} m and as {depths[-1]:g} m"
+            yield advice("disturbance", says, "Give all of them the same `depth`: the first one is where the surface is")
         return
     if highest < -_RISES and down.max() <= 0 <= start:
         says = f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
         hint = f"Down is positive downward: a depth of {-highest:.4g} m is {-highest:.4g}"
         yield advice("reference", f"{says}{start:.4g} m", hint)
+
+
+def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float):
+    """A vehicle that starts higher in the water than it floats."""
+    plant = loop.plant
+    assert isinstance(plant, HybridVehicle)
+    x = plant.initial_state(jnp.asarray(start))
+    surface = FreeSurface(jnp.asarray(depth), jnp.zeros(()))
+    wet = 1 - float(plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry)
+    floats = min(1.0, float(plant.body.weight) / float(plant.body.buoyancy))
+    if wet < floats - _HIGHER:
+        says = (
+            f"`initial.position` puts the vehicle into the water with {100 * wet:.0f} % of its hull, but it floats with "
+            f"{100 * floats:.0f} %: it falls into the water"
+        )
+        yield advice("initial.position", says, _SURFACE)
 
 
 def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):

@@ -127,10 +127,3 @@ def hull_of(vehicle: Vehicle) -> Hull:
     """The hull of a vehicle."""
     return Hull(half_size(vehicle), vehicle.added_mass, vehicle.thruster_positions)
 
-
-def floating_draught(vehicle: Vehicle) -> float:
-    """x at which a level vehicle floats at rest: s(x) = weight / buoyancy; 1 where it does not float."""
-    share = float(vehicle.weight) / float(vehicle.buoyancy)
-    if share >= 1:
-        return 1.0
-    return float(2 * np.sin(np.arcsin(2 * share - 1) / 3))

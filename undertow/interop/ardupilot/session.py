@@ -36,9 +36,8 @@ class Session:
     A thruster whose channel has no signal (a pulse outside 800 to 2200 us) is off.
 
     Args:
-        vehicle: that is driven.
+        vehicle: that is driven; its `depth` is where the surface is, zero where it has none.
         channels: of its thrusters.
-        depth: of the scenario's origin below the surface, m.
 
     Attributes:
         counts: what happened to the datagrams so far.
@@ -49,8 +48,8 @@ class Session:
         undriven: thrusters without a signal in the last frame.
     """
 
-    def __init__(self, vehicle: SteppedVehicle, channels: Channels, depth: float = 0.0):
-        self.vehicle, self._channels, self._depth = vehicle, channels, depth
+    def __init__(self, vehicle: SteppedVehicle, channels: Channels):
+        self.vehicle, self._channels, self._depth = vehicle, channels, vehicle.depth or 0.0
         self._neutral = float(vehicle.esc.neutral)
         self.counts = dict.fromkeys(_COUNTS, 0)
         self.complaint, self.ended, self.frame_rate, self.undriven = "", False, 0, 0
