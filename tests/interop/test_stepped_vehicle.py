@@ -60,7 +60,10 @@ def test_waves_are_those_of_the_simulation(written):
 
 def test_a_buoyant_vehicle_stays_in_the_water(written):
     """75 s without thrust from 3 m below the surface, as behind ArduSub; it rose 12.95 m into the air."""
-    buoyant = {"vehicle": {"kind": "bluerov2_heavy", "parameters": "wu2018"}, "thruster": {"kind": "t200", "supply": 16}}
+    buoyant = {
+        "vehicle": {"kind": "bluerov2_heavy", "parameters": "wu2018"},
+        "thruster": {"kind": "t200", "supply": 16},
+    }
     scenario = written(DRIVEN | {"plant": buoyant, "disturbance": "none", "initial": {}})
     vehicle = SteppedVehicle(scenario, otherwise=3.0)
     for _ in range(75 * 20):

@@ -187,7 +187,7 @@ def test_it_rides_on_long_waves():
 
 
 def test_depths_that_are_stated():
-    """The first counts, elevations add, and a disturbance under a surface keeps its draws."""
+    """The first counts, elevations add, and a disturbance under a surface stays what it is."""
     sea = waves(depth=3.0)
     assert stated_depths(Together((sea, surface(2.0)))) == [3.0, 2.0]
     assert stated_depths(UnderSurface(Together(()), surface(1.0))) == [1.0]

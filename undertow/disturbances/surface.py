@@ -26,7 +26,7 @@ class StillSurface(AbstractSmoothDisturbance):
 
 
 class UnderSurface(AbstractDisturbance):
-    """A disturbance, with the same draws, under the surface of still water."""
+    """A disturbance, with the same realization as without, under the surface of still water."""
 
     inner: AbstractDisturbance
     surface: StillSurface

@@ -79,7 +79,9 @@ class SteppedVehicle(Uncopied):
             another depth.
     """
 
-    def __init__(self, scenario: str | Path, allow_code: bool = False, depth: float | None = None, otherwise: float | None = None):
+    def __init__(
+        self, scenario: str | Path, allow_code: bool = False, depth: float | None = None, otherwise: float | None = None
+    ):
         built = build(read(Path(scenario), allow_code=allow_code))
         settings, plant = built.scenario.loop, pulse_driven(built.closed_loop.plant, battery_suffices=True)
         self.plant, self.esc = plant, plant.power.esc or esc()
@@ -182,10 +184,10 @@ def _under_surface(loop: ClosedLoop, depth: float | None, otherwise: float | Non
     if depth is not None and stated and stated[0] != depth:
         hint = "Leave one of them out: the surface of waves is `depth` of the waves above the world's origin"
         raise BadInput("depth", f"be that of the scenario's disturbance, {stated[0]:g} m", f"{depth:g} m", hint=hint)
-    wanted = otherwise if depth is None else depth
-    if stated or wanted is None:
+    chosen = otherwise if depth is None else depth
+    if stated or chosen is None:
         return loop
-    return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(wanted)))
+    return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(chosen)))
 
 
 def _begun(loop: ClosedLoop, key: Any, start: Any) -> tuple[Realization, VehicleState]:

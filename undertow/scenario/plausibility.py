@@ -201,7 +201,9 @@ def _above(loop: ClosedLoop, desired: Motion):
             yield from _out_of_water(loop, desired.start, depths[0])
         if len(set(depths)) > 1:
             says = f"`disturbance` states the depth of the world's origin as {depths[0]:g} m and as {depths[-1]:g} m"
-            yield advice("disturbance", says, "Give all of them the same `depth`: the first one is where the surface is")
+            yield advice(
+                "disturbance", says, "Give all of them the same `depth`: the first one is where the surface is"
+            )
         return
     if highest < -_RISES and down.max() <= 0 <= start:
         says = f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
@@ -215,11 +217,11 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
     assert isinstance(plant, HybridVehicle)
     x = plant.initial_state(jnp.asarray(start))
     surface = FreeSurface(jnp.asarray(depth), jnp.zeros(()))
-    wet = 1 - float(plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry)
+    submerged = 1 - float(plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry)
     floats = min(1.0, float(plant.body.weight) / float(plant.body.buoyancy))
-    if wet < floats - _HIGHER:
+    if submerged < floats - _HIGHER:
         says = (
-            f"`initial.position` puts the vehicle into the water with {100 * wet:.0f} % of its hull, but it floats with "
+            f"`initial.position` puts the vehicle into the water with {100 * submerged:.0f} % of its hull, but it floats with "
             f"{100 * floats:.0f} %: it falls into the water"
         )
         yield advice("initial.position", says, _SURFACE)

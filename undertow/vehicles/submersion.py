@@ -126,4 +126,3 @@ class Hull(eqx.Module):
 def hull_of(vehicle: Vehicle) -> Hull:
     """The hull of a vehicle."""
     return Hull(half_size(vehicle), vehicle.added_mass, vehicle.thruster_positions)
-
