@@ -221,8 +221,8 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
     floats = min(1.0, float(plant.body.weight) / float(plant.body.buoyancy))
     if submerged < floats - _HIGHER:
         says = (
-            f"`initial.position` puts the vehicle into the water with {100 * submerged:.0f} % of its hull, but it floats with "
-            f"{100 * floats:.0f} %: it falls into the water"
+            f"`initial.position` puts the vehicle into the water with {100 * submerged:.0f} % of its hull, but it "
+            f"floats with {100 * floats:.0f} %: it falls into the water"
         )
         yield advice("initial.position", says, _SURFACE)
 

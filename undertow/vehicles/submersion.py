@@ -9,8 +9,8 @@ to -1 and 1, the share
 is under water: a smooth function that is 1 from x = 1 on. Buoyancy, damping and added mass are s times those of the
 submerged body. Buoyancy acts at the centre of the submerged part, so that it is conservative; added mass that changes
 with depth exerts the force that conserves kinetic energy (Lagrange). The thrust of a thruster fades with the depth of
-its own place over the same height; its motor does not feel that. Slopes of waves, spray, and air that propellers draw
-in are left out.
+its own place over the same height; its motor does not feel that. Slopes of waves, spray, and air in the stream of a
+propeller are left out.
 """
 
 from typing import NamedTuple

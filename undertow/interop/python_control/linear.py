@@ -2,8 +2,13 @@
 
 The derivatives are those of automatic differentiation, at the equilibrium that `undertow analyze` uses. Limits, dead
 zones and measurement errors are left out, as there: signals are deviations from the equilibrium, inside the limits.
+
+So are states from which no output follows (counters, the energy ledger), and an attitude is three angles in place of a
+quaternion, whose length nothing can change: both are poles at the border of stability, with which Riccati equations and
+steady gains have no answer.
 """
 
+import dataclasses
 from typing import Any
 
 import control as ct
@@ -14,12 +19,16 @@ import numpy as np
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.core.errors import BadInput
 from undertow.interop.python_control.signals import signals_of, state_names, target_of, vector_of, vector_of_measurement
+from undertow.interop.python_control.states import LinearSystem, seen, with_angles
 from undertow.interop.python_control.systems import Scenario, built_of, computing, measurement_of, sampled_of
+from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.prediction.operating_point import operating_point
 from undertow.scenario.build import Built
 
 
-def linear_plant(scenario: Scenario, *, sampled: bool = False, position: Any = None, load: Any = None) -> ct.StateSpace:
+def linear_plant(
+    scenario: Scenario, *, sampled: bool = False, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
     """The plant of a scenario, linearised at an equilibrium.
 
     Args:
@@ -28,33 +37,38 @@ def linear_plant(scenario: Scenario, *, sampled: bool = False, position: Any = N
         position: reference at which the loop rests, m and rad; None for that of `undertow analyze`.
         load: constant acceleration of the outputs, m/s^2 and rad/s^2; None for zero, or for the mean one of
             `undertow analyze` where there is no position either.
+        all_states: whether the states are those of `plant`, one by one.
 
     Raises:
         BadInput: the scenario cannot be used, or its loop has no equilibrium there.
     """
-    built = built_of(scenario)
-    return _plant(built, _equilibrium(built, position, load), sampled)
+    built = _without_ledger(built_of(scenario), all_states)
+    return _plant(built, _equilibrium(built, position, load), sampled, all_states)
 
 
-def linear_controller(scenario: Scenario, *, position: Any = None, load: Any = None) -> ct.StateSpace:
+def linear_controller(
+    scenario: Scenario, *, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
     """The controller of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
 
     Raises:
         BadInput: as of `linear_plant`, or the loop is continuous.
     """
-    built = sampled_of(scenario, "controller")
-    return _controller(built, _equilibrium(built, position, load))
+    built = _without_ledger(sampled_of(scenario, "controller"), all_states)
+    return _controller(built, _equilibrium(built, position, load), all_states)
 
 
-def linear_closed_loop(scenario: Scenario, *, position: Any = None, load: Any = None) -> ct.StateSpace:
+def linear_closed_loop(
+    scenario: Scenario, *, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
     """The closed loop of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
 
     Raises:
         BadInput: as of `linear_controller`.
     """
-    built = sampled_of(scenario, "closed loop")
-    at = _equilibrium(built, position, load)
-    plant, law, of = _plant(built, at, sampled=True), _controller(built, at), signals_of(built.closed_loop.plant)
+    built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
+    at, of = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
+    plant, law = _plant(built, at, True, all_states), _controller(built, at, all_states)
     ends = np.cumsum([len(of.measured), len(of.desired)])
     (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
     u_x, shown = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
@@ -64,6 +78,17 @@ def linear_closed_loop(scenario: Scenario, *, position: Any = None, load: Any = 
     outputs, states = of.measured | of.command, plant.state_labels + law.state_labels
     system = ct.ss(a, b, c, d, built.scenario.loop.dt)
     return _named(system, "closed_loop", of.desired | outputs, list(of.desired), list(outputs), states)
+
+
+def _without_ledger(built: Built, all_states: bool) -> Built:
+    """The scenario with a plant that keeps no account of its energy, unless all states are asked for."""
+    plant = built.closed_loop.plant
+    if all_states or not isinstance(plant, HybridVehicle) or not plant.power.ledger:
+        return built
+    power = plant.power
+    with computing(built):
+        plain = HybridVehicle(plant.vehicle, plant.thruster, power.battery, power.esc, False, plant.inflow_loss)
+    return built._replace(closed_loop=dataclasses.replace(built.closed_loop, plant=plain))
 
 
 def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
@@ -88,7 +113,7 @@ def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
     return at
 
 
-def _plant(built: Built, at: Equilibrium, sampled: bool) -> ct.StateSpace:
+def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
     loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
     plant, zero = loop.plant, jnp.zeros(())
 
@@ -105,13 +130,15 @@ def _plant(built: Built, at: Equilibrium, sampled: bool) -> ct.StateSpace:
         a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
         c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
         names = state_names(at.parts.plant_state(state), "plant")
-    system = ct.ss(a, b, c, np.zeros((len(c), b.shape[1])))
+        found = LinearSystem(a, b, c, names)
+        found = found if all_states else seen(with_angles(found, np.asarray(state)))
+    system = ct.ss(found.a, found.b, found.c, np.zeros((len(c), b.shape[1])))
     if sampled:
         system = ct.sample_system(system, built.scenario.loop.dt, "zoh")
-    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), names)
+    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), found.names)
 
 
-def _controller(built: Built, at: Equilibrium) -> ct.StateSpace:
+def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpace:
     loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
     law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
     sizes = np.cumsum([len(of.measured), len(of.desired)])
@@ -125,11 +152,13 @@ def _controller(built: Built, at: Equilibrium) -> ct.StateSpace:
         x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
         state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
         given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
-        (a, b), (c, d) = jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given)
+        (a, b), (c, d) = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given))
         names = state_names(at.parts.law_state(state), "law")
+    found = LinearSystem(a, b, c, names)
+    found = found if all_states else seen(found)
     inputs = of.measured | of.desired | of.applied
-    system = ct.ss(*map(np.asarray, (a, b, c, d)), built.scenario.loop.dt)
-    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), names)
+    system = ct.ss(found.a, found.b, found.c, d, built.scenario.loop.dt)
+    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), found.names)
 
 
 def _named(
