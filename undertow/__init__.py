@@ -28,7 +28,11 @@ if TYPE_CHECKING:
     from undertow.comparison.comparison import compare as compare
     from undertow.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
+    from undertow.logs.frames import attitudes_of_quaternions as attitudes_of_quaternions
+    from undertow.logs.frames import body_vectors as body_vectors
+    from undertow.logs.frames import world_vectors as world_vectors
     from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
+    from undertow.process_setup import prepare as prepare
     from undertow.run import Run as Run
     from undertow.run import simulate as simulate
     from undertow.run import simulate_scenario as simulate_scenario
@@ -45,12 +49,16 @@ _HOMES = {
     "HybridVehicle": "undertow.plants.hybrid_vehicle",
     "NavigationFilter": "undertow.autopilot.navigation_filter",
     "Run": "undertow.run",
+    "attitudes_of_quaternions": "undertow.logs.frames",
+    "body_vectors": "undertow.logs.frames",
     "compare": "undertow.comparison.comparison",
+    "prepare": "undertow.process_setup",
     "rcaf": "undertow.controllers.rcaf",
     "read_log": "undertow.scenario.log_file",
     "read_samples": "undertow.scenario.csv_table",
     "simulate": "undertow.run",
     "simulate_scenario": "undertow.run",
+    "world_vectors": "undertow.logs.frames",
 }
 _PACKAGES = (
     "controllers",

@@ -10,6 +10,7 @@ import os
 import platform
 import random
 import stat
+import sys
 import time
 from pathlib import Path
 
@@ -35,13 +36,18 @@ _YOUNG, _MIDDLE, _OLD = 1_000_000, 20, 100
 
 
 def prepare() -> None:
-    """Set the environment variables of JAX and XLA, and look for garbage seldom; before JAX is imported.
+    """Set this process up as the commands do: double precision, quick compilation, compiled code that is kept.
 
-    Whoever calls this decides about the whole process, so nothing calls it at import. A caller's own settings stay.
+    It sets the environment variables of JAX, XLA and OpenBLAS, and looks for garbage seldom. Call it at the top of a
+    script, before anything else imports JAX or SciPy: later, only the precision changes. Whoever calls this decides
+    about the whole process, so nothing calls it at import. A caller's own settings stay.
     """
     # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    stated = "JAX_ENABLE_X64" in os.environ
     os.environ.setdefault("JAX_ENABLE_X64", "1")
+    if "jax" in sys.modules and not stated:
+        sys.modules["jax"].config.update("jax_enable_x64", True)
     # Matrices here have at most some hundred rows; threads that wait for each other made them ten times as slow.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _set_xla_flags()

@@ -114,7 +114,8 @@ def test_derivatives_are_those_of_finite_differences(linear):
     built, where, at, _ = linear
     u, position, still = at.at["u"], where["position"], built_still(built, where["load"])
     plant, controller = upc.plant(still), upc.controller(still)
-    linear_plant, linear_controller = upc.linear_plant(built, **where), upc.linear_controller(built, **where)
+    linear_plant = upc.linear_plant(built, **where, all_states=True)
+    linear_controller = upc.linear_controller(built, **where, all_states=True)
     assert linear_plant.state_labels == plant.state_labels
     assert linear_controller.input_labels == controller.input_labels
     with jax.enable_x64(True):
@@ -131,6 +132,35 @@ def test_derivatives_are_those_of_finite_differences(linear):
         for name, differences in zip("ABCD", (a, b, c, d), strict=True):
             scale = max(1.0, np.abs(differences).max())
             np.testing.assert_allclose(getattr(exact, name), differences, rtol=1e-4, atol=2e-6 * scale, err_msg=name)
+
+
+def test_states_that_only_observe_are_left_out(linear):
+    """No pole stays at the border of stability, and the answer to every input is that of all states."""
+    built, where, _, _ = linear
+    plant, law = upc.linear_plant(built, **where), upc.linear_controller(built, **where)
+    for fewer, every, point in (
+        (plant, upc.linear_plant(built, **where, all_states=True), 0.3 + 2j),
+        (law, upc.linear_controller(built, **where, all_states=True), 0.9 + 0.3j),
+    ):
+        assert fewer.nstates < every.nstates or built.closed_loop.plant.outputs == ("angle",)
+        expected = every(point)
+        np.testing.assert_allclose(fewer(point), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    loop = upc.linear_closed_loop(built, **where)
+    n = len(built.closed_loop.plant.outputs)
+    assert np.abs(loop.poles() - 1).min() > 1e-6
+    np.testing.assert_allclose(np.diag(ct.dcgain(loop)[:n, :n]) if n > 1 else ct.dcgain(loop)[0][0], 1, atol=1e-3)
+    assert np.isfinite(ct.step_info(loop[0, 0])["SettlingTime"])
+
+
+def test_lqr_of_a_vehicle(linear):
+    """12 states of the body and 8 of the thrusters, without quaternion and energy ledger; the loop with it is stable."""
+    built, where, _, _ = linear
+    plant = upc.linear_plant(built, **where)
+    gain = ct.lqr(plant, np.eye(plant.nstates), np.eye(plant.ninputs))[0]
+    assert np.linalg.eigvals(plant.A - plant.B @ gain).real.max() < 0
+    if plant.ninputs == 8:
+        assert plant.nstates == 20
+        assert plant.state_labels[3:6] == ["plant_roll", "plant_pitch", "plant_yaw"]
 
 
 def built_still(built, load):

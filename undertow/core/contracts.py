@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
-from undertow.core.runtime import double_outside_runs
+from undertow.core.runtime import double_outside_runs, says_single
 from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.numerics.integrators import METHODS
@@ -310,6 +310,11 @@ class AbstractController(eqx.Module):
     """A control law. `command` comes before `advance`, so that adaptation uses the input that was applied."""
 
     model: eqx.AbstractVar[Model]
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "init" in vars(cls):
+            cls.init = says_single(cls.init)
 
     @abc.abstractmethod
     def init(self, y: Measurement, r: Target) -> PyTree:

@@ -6,6 +6,7 @@ Importing undertow changes no setting of JAX. A part that is made outside of a r
 
 import functools
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -16,6 +17,11 @@ import jax
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
+
+_SINGLE = (
+    "a part that is used by itself computes in single precision here, in which fits stop early. "
+    "Call `undertow.prepare()` first, or set JAX_ENABLE_X64=1"
+)
 
 # Precision of the run that this thread computes; None outside of a run.
 _stated: ContextVar[str | None] = ContextVar("undertow_precision", default=None)
@@ -43,6 +49,19 @@ def double_outside_runs(function: Callable[Arguments, Result]) -> Callable[Argum
             return function(*arguments, **options)
 
     return made
+
+
+def says_single(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Wrap a function with which somebody begins to compute with a part: warns of single precision outside of a run."""
+
+    @functools.wraps(function)
+    def called(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
+        if _stated.get() is None and not double:
+            warnings.warn(_SINGLE, stacklevel=2)
+        return function(*arguments, **options)
+
+    return called
 
 
 def workers(count: int) -> ThreadPoolExecutor:

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel, DirectActuator
 from undertow.core.param import Param
+from undertow.core.runtime import says_single
 
 PerThruster = Float[Array, " N"] | Float[Array, ""]  # one entry per thruster, or one that holds for each
 
@@ -43,6 +44,11 @@ class AbstractThruster(eqx.Module):
     input_unit = "V"  # unit of the command; where this is not V, every voltage below has that unit
     # Whether J_dot nu counts as part of the prescribed uncertainty: the paper's setting, for thrust without dynamics.
     has_prescribed_acceleration = False
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        if "initial_state" in vars(cls):
+            cls.initial_state = says_single(cls.initial_state)
 
     def __check_init__(self):
         checks.not_negative("dead_zone", self.dead_zone, self.input_unit)

@@ -19,6 +19,7 @@ import gymnasium
 from undertow.interop.gymnasium.env import Env as Env
 from undertow.interop.gymnasium.env import make as make
 from undertow.interop.gymnasium.episodes import Cost as Cost
+from undertow.interop.gymnasium.stable_baselines import for_stable_baselines as for_stable_baselines
 from undertow.interop.gymnasium.vector_env import VectorEnv as VectorEnv
 from undertow.interop.gymnasium.vector_env import make_vec as make_vec
 

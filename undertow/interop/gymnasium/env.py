@@ -6,13 +6,12 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
-from undertow.controllers.policy_interface import PolicyInterface
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.gymnasium.episodes import Cost, Episodes, Seen
+from undertow.interop.gymnasium.shown import shown
 from undertow.interop.gymnasium.variants import Vary
 from undertow.loop.stepped import Uncopied
 
@@ -27,7 +26,8 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
     of the scenario. `reset(seed=n)` begins the run that the scenario has with `seed: n`; without a seed the next one
     follows from the one before.
 
-    Arguments are those of `Episodes`, without `count`.
+    Arguments are those of `Episodes`, without `count`, and how numbers are shown (see `Shown`): `float32` whatever the
+    precision of the scenario, `normalised` observations, and the `reward`.
     """
 
     _instead = "Make another one, `reset` it with the same seed, and give it the same actions"
@@ -43,6 +43,9 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         vary: Vary | None = None,
         variants: int = 64,
         allow_code: bool = False,
+        float32: bool = False,
+        normalised: bool = False,
+        reward: str = "negative_cost",
         render_mode: None = None,
     ):
         if render_mode is not None:
@@ -50,7 +53,8 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
             raise BadInput("render_mode", "be None", render_mode, hint=hint)
         self._episodes = Episodes(scenario, 1, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt = self._episodes.interface, self._episodes.dt
-        self.observation_space, self.action_space = spaces_of(self.interface, self._episodes.dtype)
+        self._shown = shown(self.interface, self._episodes.dtype, float32, normalised, reward)
+        self.observation_space, self.action_space = self._shown.spaces()
         self._step, self._over = 0, True
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
@@ -59,7 +63,7 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         run = int(self.np_random.integers(_SEEDS)) if seed is None else seed % _SEEDS
         seen = self._episodes.start(np.array([run]), np.array([0]))
         self._step, self._over = 0, False
-        return seen.observation[0], info_of(seen, 0) | {"seed": run}
+        return self._shown.observation(seen.observation[0]), info_of(seen, 0) | {"seed": run}
 
     def step(self, action: NDArray[Any]):
         """Hold an action for one sampling time."""
@@ -71,21 +75,13 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         terminated = bool(seen.status[0] != Status.OK)
         truncated = not terminated and self._step >= self._episodes.steps
         self._over = terminated or truncated
-        return seen.observation[0], float(seen.reward[0]), terminated, truncated, info_of(seen, 0)
+        observation, reward = self._shown.observation(seen.observation[0]), float(self._shown.rewards(seen.reward[0]))
+        return observation, reward, terminated, truncated, info_of(seen, 0)
 
 
 def make(scenario: str | Path | Mapping[str, Any], **options: Any) -> Env:
     """An environment of a scenario; `options` are those of `Env`."""
     return Env(scenario, **options)
-
-
-def spaces_of(interface: PolicyInterface, dtype: Any) -> tuple[Any, Any]:
-    """Spaces of observations and of actions."""
-    low, high = interface.action_bounds()
-    bounds = interface.bounds()
-    seen = np.concatenate([-bounds, low]), np.concatenate([bounds, high])
-    box = lambda low, high: spaces.Box(low.astype(dtype), high.astype(dtype), dtype=dtype)
-    return box(*seen), box(low, high)
 
 
 def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.interop.gymnasium.env import actions_of, spaces_of
+from undertow.interop.gymnasium.env import actions_of
 from undertow.interop.gymnasium.episodes import Cost, Episodes, Seen
+from undertow.interop.gymnasium.shown import shown
 from undertow.interop.gymnasium.variants import Vary
 from undertow.loop.stepped import Uncopied
 
@@ -45,6 +46,9 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         vary: Vary | None = None,
         variants: int = 64,
         allow_code: bool = False,
+        float32: bool = False,
+        normalised: bool = False,
+        reward: str = "negative_cost",
         render_mode: None = None,
     ):
         if render_mode is not None:
@@ -53,7 +57,8 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
             raise BadInput("num_envs", "be a positive integer", num_envs)
         self._episodes = Episodes(scenario, num_envs, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt, self.num_envs = self._episodes.interface, self._episodes.dt, num_envs
-        self.single_observation_space, self.single_action_space = spaces_of(self.interface, self._episodes.dtype)
+        self._shown = shown(self.interface, self._episodes.dtype, float32, normalised, reward)
+        self.single_observation_space, self.single_action_space = self._shown.spaces()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators = [seeding.np_random(None)[0] for _ in range(num_envs)]
@@ -67,9 +72,9 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         super().reset(seed=int(seed) if isinstance(seed, Integral) else None)
         runs = np.array([self._run(number, seeds[number]) for number in which.tolist()], dtype=np.uint32)
         if not self._started:
-            self._observation = np.zeros(self.observation_space.shape or (), self._episodes.dtype)
+            self._observation = np.zeros(self.observation_space.shape or (), self._shown.dtype)
         seen = self._episodes.start(runs, which)
-        self._observation[which] = seen.observation
+        self._observation[which] = self._shown.observation(seen.observation)
         self._steps[which], self._over[which], self._started = 0, False, True
         return self._observation.copy(), self._info(seen, which) | self._of("seed", runs, which)
 
@@ -88,9 +93,11 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
             self._steps[renewed] = 0
         terminated = seen.status != Status.OK
         truncated = ~terminated & (self._steps >= self._episodes.steps)
-        self._over, self._observation = terminated | truncated, seen.observation
+        self._over, self._observation = terminated | truncated, self._shown.observation(seen.observation)
+        rewards = self._shown.rewards(seen.reward)
+        rewards[renewed] = 0.0
         every = np.arange(self.num_envs)
-        return self._observation.copy(), seen.reward, terminated, truncated, self._info(seen, every)
+        return self._observation.copy(), rewards, terminated, truncated, self._info(seen, every)
 
     def _chosen(self, options: dict[str, Any] | None) -> NDArray[Any]:
         mask = (options or {}).get("reset_mask")
