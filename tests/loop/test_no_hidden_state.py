@@ -1,5 +1,6 @@
 """Importing undertow changes nothing in the process; precision belongs to a run, and the caller's settings stay."""
 
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -173,3 +174,36 @@ def test_parts_and_scenario_agree(alone):
 def test_a_precision_that_is_none():
     with pytest.raises(BadInput, match="`precision` must be one of float64, float32"):
         by_parts("float16")
+
+
+BY_ITSELF = """
+import sys, warnings
+import numpy as np
+import undertow as ut
+
+if sys.argv[1] == "prepared":
+    ut.prepare()
+with warnings.catch_warnings(record=True) as said:
+    warnings.simplefilter("always")
+    made = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.t200())  # making parts computes in double, and says nothing
+    made.model()
+    assert not said, said
+    thruster = ut.thrusters.t200()
+    state = thruster.initial_state(2)
+if sys.argv[1] == "late":
+    ut.prepare()
+rate = thruster.dynamics(thruster.initial_state(2), np.full(2, 8.0))
+print(len(said), "undertow.prepare" in str(said[:1]), rate.speed.dtype)
+"""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("when", "printed"), [("never", "1 True float32"), ("prepared", "0 False float64"), ("late", "1 True float64")]
+)
+def test_a_part_by_itself_says_that_it_is_in_single_precision(when, printed):
+    """A fit stopped early in single precision, without a word; `prepare` makes it double, also once JAX is there."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("JAX_", "XLA_"))}
+    command = [sys.executable, "-W", "ignore", "-c", BY_ITSELF, when]
+    found = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    assert found.stdout.strip() == printed
