@@ -193,7 +193,7 @@ with warnings.catch_warnings(record=True) as said:
 if sys.argv[1] == "late":
     ut.prepare()
 rate = thruster.dynamics(thruster.initial_state(2), np.full(2, 8.0))
-print(len(said), "undertow.prepare" in str(said[:1]), rate.speed.dtype)
+print(len(said), any("undertow.prepare" in str(one.message) for one in said), rate.speed.dtype)
 """
 
 

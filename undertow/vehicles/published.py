@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
+from undertow.core.arrays import as_array
 from undertow.vehicles.vehicle import Vehicle
 
 Variant = TypeVar("Variant")
@@ -74,7 +75,7 @@ def assemble(name: str, hull: Hull, layout: Layout) -> Vehicle:
         thruster_directions=np.asarray(layout.directions, dtype=float),
         sources=sources | dict(hull.notes or {}),
         own_thruster_names=layout.names,
-        size=None if hull.size is None else np.asarray(hull.size, dtype=float),
+        size=None if hull.size is None else as_array(hull.size),
     )
 
 
