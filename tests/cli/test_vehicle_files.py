@@ -1,9 +1,10 @@
 """A vehicle from a YAML file: in a scenario, in its result file, described; and every mistake in one is one line."""
 
-from pathlib import Path
+from pathlib import dataclasses
 
 import jax
 import numpy as np
+import Path
 import pytest
 import xarray as xr
 from good_scenario import SCENARIO, SMALL
@@ -47,7 +48,8 @@ def equal(one, other, rtol=1e-12):
 def test_file_is_the_catalogue_vehicle(rov):
     """The example has the numbers of bluerov2_heavy(), and 0.0134 m^3 of water instead of its rounded buoyancy."""
     vehicle = read_vehicle(rov()).vehicle()
-    equal(vehicle, bluerov2_heavy())
+    equal(dataclasses.replace(vehicle, size=None), bluerov2_heavy())
+    np.testing.assert_array_equal(vehicle.size, [0.457, 0.575, 0.254])  # which the catalogue does not have
     assert vehicle.name == "my_rov"
     sources = dict(vehicle.sources)
     assert sources["*"].startswith("von Benzon et al. 2022") and sources["weight"].startswith(
