@@ -1,10 +1,10 @@
 """A vehicle from a YAML file: in a scenario, in its result file, described; and every mistake in one is one line."""
 
-from pathlib import dataclasses
+import dataclasses
+from pathlib import Path
 
 import jax
 import numpy as np
-import Path
 import pytest
 import xarray as xr
 from good_scenario import SCENARIO, SMALL
