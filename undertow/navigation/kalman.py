@@ -5,76 +5,56 @@ axes; Y. Bar-Shalom, Update with out-of-sequence measurements, IEEE Trans. Aeros
 readings (its algorithm without process noise over the delay).
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.contracts import Measurement
 from undertow.core.measurement import body_of, measurement_of_outputs, measurement_of_pose
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.navigation.consistency import InnovationMonitor, innovation_monitor
+from undertow.navigation.consistency import innovation_monitor
+from undertow.navigation.disagreement import doubted, no_disagreement
 from undertow.navigation.from_sensors import AbstractCovarianceFilter, Received, SensorNavigation, check_sensors
-from undertow.navigation.motion_history import MotionHistory, resting, spacing_for
+from undertow.navigation.inertial_covariance import (
+    ATTITUDE,
+    FORCE_BIAS,
+    GYRO_BIAS,
+    MOTION_STATES,
+    POSITION,
+    VELOCITY,
+    product,
+    spread,
+)
+from undertow.navigation.inertial_gate import InertialGate, inertial_deviation, inertial_gate
+from undertow.navigation.kalman_state import KalmanState, expected_reading
+from undertow.navigation.motion_history import resting, spacing_for
 from undertow.navigation.observability import Sensed, drift_sentences
 from undertow.navigation.sensor_errors import Covariance, all_errors, error_states, faded, packing
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.number import Number
 from undertow.numerics.rotations import (
     Kinematics,
-    Matrix3,
     Quaternion,
     Vector3,
     conjugate,
-    cross,
-    euler_from_rotation,
     quaternion_of_turn,
     quaternion_product,
     rotation_from_quaternion,
-    skew,
 )
-from undertow.sensors.gauss_markov import CorrelatedErrors, ErrorValues
+from undertow.sensors.gauss_markov import CorrelatedErrors
 from undertow.sensors.imu import IMU
-from undertow.sensors.motion import Motion, gravity, motion_of
+from undertow.sensors.motion import gravity, motion_of
 from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sensor import AbstractSensor, error_slopes
+from undertow.sensors.sensor import AbstractSensor
 
-# Errors of the state, in world axes but for the biases; slices of the covariance. That of the velocity is the error of
-# the velocity in body axes, turned: the truth is exp(attitude error) (velocity + error). So what a DVL reads does not
-# depend on the heading, and noise in the estimated velocity tells the filter nothing about the heading. (With the error
-# of the velocity in world axes it does, and a filter without a compass believes in a heading that nothing measured.)
-ATTITUDE, GYRO_BIAS, VELOCITY, FORCE_BIAS, POSITION = (slice(3 * i, 3 * i + 3) for i in range(5))
-_SIZE = 15  # correlated errors of the sensors follow
-
-_MOST_TOLERATED = 2.0**20  # a lasting jump of 1000 gates is believed, nothing beyond
-_FASTEST, _STRONGEST = 35.0, 160.0  # rad/s, m/s^2: full scale of MEMS devices; what is larger was not measured
 _USUAL_DELAY = 0.5  # s
 _LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
-
-
-class KalmanState(NamedTuple):
-    """State of the filter."""
-
-    position: Vector3  # m, world
-    attitude: Quaternion  # body -> world
-    velocity: Vector3  # m/s, world
-    gyro_bias: Vector3  # rad/s
-    force_bias: Vector3  # m/s^2
-    # Upper triangle, of the errors of attitude, gyro bias, velocity, force bias, position, and those of the sensors.
-    covariance: Float[Array, " entries"]
-    rates: Vector3  # last reading of the gyroscopes, rad/s
-    force: Vector3  # last reading of the accelerometers, m/s^2
-    actuator: Any
-    history: MotionHistory
-    tolerance: Float[Array, " sensors"]  # factor of the gate's square: doubled by every rejection in a row
-    rejected: Int[Array, ""]  # readings so far
-    monitor: InnovationMonitor
-    sensor_errors: ErrorValues | None = None  # correlated errors of all sensors; None where the filter has none
 
 
 class Kalman(AbstractCovarianceFilter):
@@ -84,14 +64,17 @@ class Kalman(AbstractCovarianceFilter):
     estimate is its own `reading`, which is differentiated. Its variances are those of the sensors, times a scale.
 
     A late reading is compared with the estimate of its time. A reading whose errors exceed `gate` standard deviations
-    is rejected; every rejection in a row doubles the square that is tolerated, up to a thousand times the gate, so that
-    the filter finds back. Entries that are not finite are left out.
+    is rejected; rejections in a row double the square that is tolerated, at most every 0.1 s and up to a thousand times
+    the gate. A reading that is tolerated raises the variance of what it measures, so that the next one is taken. Where
+    most sensors are rejected, it is the filter that errs: all its variances grow until they are taken. Gyroscopes and
+    accelerometers pass a gate of their own, `InertialGate`. Entries that are not finite are left out.
 
     Raises:
         BadInput: no IMU, or a deviation that is not positive.
     """
 
     sensors: tuple[AbstractSensor, ...]
+    inertial: InertialGate
     position_deviation: Float[Param, ""] = param("m", "initial standard deviation of the position")
     velocity_deviation: Float[Param, ""] = param("m/s", "initial standard deviation of the velocity")
     tilt_deviation: Float[Param, ""] = param("rad", "initial standard deviation of roll and pitch")
@@ -125,11 +108,10 @@ class Kalman(AbstractCovarianceFilter):
             still,
             still,
             self._initial_covariance()[packing(self._size()).upper],
-            body.nu[3:],
-            matvec(body.rotation.T, -gravity()),
+            self.inertial.start(jnp.concatenate([body.nu[3:], matvec(body.rotation.T, -gravity())])),
             y.actuator if reports else None,
             resting(body.attitude),
-            jnp.ones(len(self.sensors)),
+            no_disagreement(len(self.sensors)),
             jnp.zeros((), dtype=int),
             innovation_monitor([self._compared(sensor, y) for sensor in self.sensors]),
             None if errors is None else jnp.zeros(len(errors.deviation)),
@@ -139,13 +121,12 @@ class Kalman(AbstractCovarianceFilter):
         imu, inertial = next(
             (sensor, one) for sensor, one in zip(self.sensors, received, strict=True) if isinstance(sensor, IMU)
         )
-        new = lambda read, old, most: jnp.where(inertial.fresh & (jnp.abs(read) <= most), read, old)
-        rates = new(inertial.reading[2:5], state.rates, _FASTEST)
-        force = new(inertial.reading[5:], state.force, _STRONGEST)
+        deviation = inertial_deviation(imu, self.noise_scale)
+        memory = self.inertial.received(state.inertial, elapsed, inertial.reading[2:], inertial.fresh, deviation)
         covariance = self.covariance(state)
-        turning = (rates + state.rates) / 2 - state.gyro_bias
+        turning = (memory.values[:3] + state.rates) / 2 - state.gyro_bias
         half = rotation_from_quaternion(_turned(state.attitude, elapsed / 2 * turning))
-        acceleration = matvec(half, force - state.force_bias) + gravity()
+        acceleration = matvec(half, memory.values[3:] - state.force_bias) + gravity()
         history = state.history.after(
             elapsed, acceleration, _turned(state.history.attitude, elapsed * turning), spacing_for(self.longest_delay)
         )
@@ -153,11 +134,14 @@ class Kalman(AbstractCovarianceFilter):
             position=state.position + elapsed * (state.velocity + elapsed / 2 * acceleration),
             velocity=state.velocity + elapsed * acceleration,
             attitude=_turned(state.attitude, elapsed * turning),
-            rates=rates,
-            force=force,
+            inertial=memory,
             history=history,
+            disagreement=state.disagreement.later(elapsed),
         )
-        covariance = self._spread(covariance, elapsed, half, state.velocity, imu)
+        of_rates, of_force = self.inertial_noise(imu)
+        odd = self.inertial.uncertainty(memory)
+        of_inertial, of_biases = (of_rates + odd[:3], of_force + odd[3:]), (self.gyro_drift**2, self.force_drift**2)
+        covariance = spread(covariance, elapsed, half, state.velocity, of_inertial, of_biases)
         errors = self._sensor_errors()
         if errors is not None and state.sensor_errors is not None:
             covariance = faded(covariance, errors, elapsed)
@@ -167,7 +151,8 @@ class Kalman(AbstractCovarianceFilter):
                 state = state._replace(actuator=_propellers(state.actuator, sensor, one))
             else:
                 state, covariance = self._corrected(state, covariance, i, one)
-        return state._replace(covariance=covariance[packing(len(covariance)).upper])
+        disagreement, covariance = state.disagreement.reopening(self._periods(), covariance, self.initial_deviations())
+        return state._replace(disagreement=disagreement, covariance=covariance[packing(len(covariance)).upper])
 
     def measurement(self, state: KalmanState) -> Measurement:
         rotation = rotation_from_quaternion(state.attitude)
@@ -201,6 +186,8 @@ class Kalman(AbstractCovarianceFilter):
             "innovation_rms": Signal(("sensor",), "1", "rms of the normalised innovations over 30 s; 1 as assumed"),
             "innovation_correlation": Signal(("sensor",), "1", "correlation of successive innovations; 0 as assumed"),
             "inconsistent_sensors": Signal(("sensor",), "1", "1 where innovations contradict what the filter assumes"),
+            "rejected_inertial": Signal((), "1", "samples of the IMU so far that no motion of the vehicle explains"),
+            "reopened_gates": Signal((), "1", "times so far that most sensors were believed against the filter"),
         }
 
     def diagnostics(self, state: KalmanState):
@@ -211,14 +198,19 @@ class Kalman(AbstractCovarianceFilter):
         slopes = angles(jnp.eye(3)).T
         of_angles = (slopes[:, :, None] * slopes[:, None, :] * covariance[ATTITUDE, ATTITUDE][None]).sum((1, 2))
         variances = jnp.concatenate([jnp.diag(covariance)[POSITION], of_angles])
-        periods = jnp.stack([jnp.asarray(sensor.sampling.period, dtype=float) for sensor in self.sensors])
         return {
             "navigation_deviation": jnp.sqrt(variances),
             "rejected_readings": state.rejected,
             "innovation_rms": state.monitor.rms(),
             "innovation_correlation": state.monitor.correlation(),
-            "inconsistent_sensors": state.monitor.inconsistent(periods),
+            "inconsistent_sensors": state.monitor.inconsistent(self._periods()),
+            "rejected_inertial": state.inertial.rejected,
+            "reopened_gates": state.disagreement.reopened,
         }
+
+    def _periods(self) -> Float[Array, " sensors"]:
+        """Time between readings of each sensor, s."""
+        return jnp.stack([jnp.asarray(sensor.sampling.period, dtype=float) for sensor in self.sensors])
 
     def _compared(self, sensor: AbstractSensor, y: Measurement) -> int:
         """Entries of a reading of a sensor that the filter compares with the estimate."""
@@ -237,7 +229,7 @@ class Kalman(AbstractCovarianceFilter):
         sensed = []
         for sensor in self.sensors:
             if not isinstance(sensor, PropellerSpeed):
-                slopes = _expected(level, sensor, 0.0, None)[1]
+                slopes = expected_reading(level, sensor, 0.0, None)[1]
                 sensed.append((slopes, self.variance(sensor, len(slopes)), jnp.asarray(sensor.sampling.period)))
         of_rates, of_force = self.inertial_noise(next(one for one in self.sensors if isinstance(one, IMU)))
         one = jnp.ones(3)
@@ -258,7 +250,7 @@ class Kalman(AbstractCovarianceFilter):
     def _size(self) -> int:
         """Number of states."""
         errors = self._sensor_errors()
-        return _SIZE if errors is None else _SIZE + len(errors.deviation)
+        return MOTION_STATES if errors is None else MOTION_STATES + len(errors.deviation)
 
     def _initial_covariance(self) -> Covariance:
         errors = self._sensor_errors()
@@ -269,8 +261,8 @@ class Kalman(AbstractCovarianceFilter):
 
     def inertial_noise(self, imu: IMU) -> tuple[Vector3, Vector3]:
         """Densities of the noise of gyroscopes, (rad/s)^2 s, and accelerometers, (m/s^2)^2 s."""
-        noise = jnp.broadcast_to(jnp.asarray(imu.sampling.noise, dtype=float), (8,)) * self.noise_scale
-        return noise[2:5] ** 2 * imu.sampling.period, noise[5:] ** 2 * imu.sampling.period
+        density = inertial_deviation(imu, self.noise_scale) ** 2 * imu.sampling.period
+        return density[:3], density[3:]
 
     def variance(self, sensor: AbstractSensor, width: int) -> Float[Array, " width"]:
         """Variance of each entry of a reading: of noise, resolution and offset."""
@@ -281,38 +273,14 @@ class Kalman(AbstractCovarianceFilter):
             whole = jnp.broadcast_to(whole, (8,))[:width]
         return jnp.maximum(jnp.broadcast_to(whole, (width,)), _LEAST_VARIANCE)
 
-    def _spread(self, covariance: Covariance, h: Number, rotation: Matrix3, velocity: Vector3, imu: IMU) -> Covariance:
-        """The covariance h (s) later. Half steps before and after make products of matrices of second order in h."""
-        of_rates, of_force = self.inertial_noise(imu)
-        across = skew(velocity)
-
-        def half(p: Covariance) -> Covariance:
-            p = _sheared(p, POSITION, VELOCITY, h / 2 * jnp.eye(3))
-            p = _sheared(p, POSITION, ATTITUDE, -h / 2 * across)
-            p = _sheared(p, ATTITUDE, GYRO_BIAS, -h / 2 * rotation)
-            return _sheared(p, VELOCITY, GYRO_BIAS, -h / 2 * _product(across, rotation))
-
-        covariance = _sheared(half(covariance), VELOCITY, ATTITUDE, h * skew(gravity()))
-        covariance = half(_sheared(covariance, VELOCITY, FORCE_BIAS, -h * rotation))
-        in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density[None, None, :]).sum(-1)
-        turning = in_world(of_rates)
-        sideways = _product(across, turning)  # noise of the gyroscopes turns the velocity in body axes
-        gained = jnp.zeros(covariance.shape)
-        gained = (
-            gained.at[ATTITUDE, ATTITUDE].set(turning).at[GYRO_BIAS, GYRO_BIAS].set(self.gyro_drift**2 * jnp.eye(3))
-        )
-        gained = gained.at[VELOCITY, ATTITUDE].set(sideways).at[ATTITUDE, VELOCITY].set(sideways.T)
-        gained = gained.at[VELOCITY, VELOCITY].set(in_world(of_force) - _product(sideways, across))
-        return covariance + h * gained.at[FORCE_BIAS, FORCE_BIAS].set(self.force_drift**2 * jnp.eye(3))
-
     def _corrected(
         self, state: KalmanState, covariance: Covariance, i: int, one: Received
     ) -> tuple[KalmanState, Covariance]:
         """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none."""
         sensor = self.sensors[i]
         reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
-        states = error_states(self.sensors, _SIZE)[i] if state.sensor_errors is not None else None
-        expected, slopes = _expected(state, sensor, jnp.minimum(one.age, self.longest_delay), states)
+        states = error_states(self.sensors, MOTION_STATES)[i] if state.sensor_errors is not None else None
+        expected, slopes = expected_reading(state, sensor, jnp.minimum(one.age, self.longest_delay), states)
         error = reading - expected
         for entry in sensor.angles:
             error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
@@ -321,7 +289,7 @@ class Kalman(AbstractCovarianceFilter):
         correction, square, normalised = jnp.zeros(len(covariance)), jnp.zeros(()), []
         diagonal = np.eye(len(covariance), dtype=bool)
         for k, variance in enumerate(self.variance(sensor, len(reading))):
-            shared = _product(posterior, slopes[k])
+            shared = product(posterior, slopes[k])
             total = (slopes[k] * shared).sum() + variance
             left = error[k] - (slopes[k] * correction).sum()
             gain, share = shared / jnp.sqrt(total), jnp.where(there[k], 1.0, 0.0)
@@ -331,15 +299,17 @@ class Kalman(AbstractCovarianceFilter):
             posterior = posterior - share * gain[:, None] * gain[None, :]
             least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
             posterior = jnp.where(diagonal, jnp.maximum(posterior, least[:, None]), posterior)
-        count, tolerance = jnp.where(there, 1.0, 0.0).sum(), state.tolerance[i]
-        known = one.fresh & (count > 0)
-        taken = known & (square <= self.gate**2 * count * tolerance)
-        following = jnp.where(taken, 1.0, jnp.where(known, jnp.minimum(2 * tolerance, _MOST_TOLERATED), tolerance))
+        count = jnp.where(there, 1.0, 0.0).sum()
+        known, gate = one.fresh & (count > 0), self.gate**2 * count
+        taken = known & (square <= gate)
+        period = sensor.sampling.period
+        tolerated = known & ~taken & (square <= gate * state.disagreement.tolerance[i])
+        disagreement = state.disagreement.after(i, taken, known, square / jnp.maximum(count, 1.0), period)
         # One reading far away says nothing of the others: it counts as at the gate.
         most = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
         innovation = jnp.clip(jnp.stack(normalised), -most, most)
         innovation = jnp.where(jnp.isnan(innovation), most, innovation)
-        monitor = state.monitor.updated(i, innovation, count, known, sensor.sampling.period)
+        monitor = state.monitor.updated(i, innovation, count, known, period)
         correction = jnp.where(taken, correction, 0.0)
         turn = quaternion_of_turn(correction[ATTITUDE])
         turned = quaternion_product(turn, state.attitude)
@@ -349,12 +319,14 @@ class Kalman(AbstractCovarianceFilter):
             attitude=turned / jnp.sqrt((turned * turned).sum()),
             gyro_bias=state.gyro_bias + correction[GYRO_BIAS],
             force_bias=state.force_bias + correction[FORCE_BIAS],
-            tolerance=state.tolerance.at[i].set(following),
+            disagreement=disagreement,
             rejected=state.rejected + jnp.where(known & ~taken, 1, 0),
             monitor=monitor,
-            sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[_SIZE:],
+            sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[MOTION_STATES:],
         )
-        return after, jnp.where(taken, posterior, covariance)
+        # What is tolerated after many rejections opens the gate for the next reading.
+        opened = jnp.where(diagonal & tolerated, doubted(covariance, slopes, error)[:, None], 0.0)
+        return after, jnp.where(taken, posterior, covariance + opened)
 
 
 _DEVIATIONS = (
@@ -369,79 +341,10 @@ _DEVIATIONS = (
 )
 
 
-def _expected(state: KalmanState, sensor: AbstractSensor, age: Number, of_errors: slice | None):
-    """What a sensor would have read `age` (s) ago, and its slopes in the errors of now, [entries, states].
-
-    What the biases changed in the meantime is not kept in the slopes: age^2 / 2 times a force bias, some millimetres in
-    a second. With correlated errors that of the accelerometers is. Such errors are those of the reading that arrives: a
-    delayed one is as correlated with the next.
-
-    Args:
-        state: of the filter.
-        sensor: which.
-        age: s.
-        of_errors: states of the correlated errors of this sensor; None where those of no sensor are states.
-    """
-    past = state.history.at(age)
-    then = quaternion_product(state.attitude, quaternion_product(conjugate(state.history.attitude), past.attitude))
-    rotation, fallen = rotation_from_quaternion(then), age * gravity()
-    estimated = jnp.zeros(0)
-    if of_errors is not None and state.sensor_errors is not None:
-        estimated = state.sensor_errors[of_errors.start - _SIZE : of_errors.stop - _SIZE]
-
-    def read(errors):
-        turn, faster, moved = errors[:3], errors[3:6], errors[6:9]
-        velocity = state.velocity + faster + cross(turn, state.velocity)
-        turned = rotation + _product(skew(turn), rotation)
-        # What accelerated the body since then is turned with it, gravity is not.
-        displaced = past.displacement + cross(turn, past.displacement - age / 2 * fallen)
-        motion = Motion(
-            position=state.position + moved + displaced - age * velocity,
-            angles=euler_from_rotation(turned),
-            rotation=turned,
-            velocity=velocity + past.velocity + cross(turn, past.velocity + fallen),
-            rates=state.rates - state.gyro_bias,
-            specific_force=state.force - state.force_bias,
-            actuator=state.actuator,
-        )
-        reading = sensor.reading(motion)
-        if len(estimated):
-            reading = reading + matvec(error_slopes(sensor, motion), estimated + errors[9:])
-        return reading[:2] if isinstance(sensor, IMU) else reading
-
-    none = jnp.zeros(9 + len(estimated))
-    slopes, zero = jax.jacfwd(read)(none), jnp.zeros
-    of = lambda errors: slopes[:, errors]
-    rows = slopes.shape[0]
-    whole = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
-    if of_errors is not None and state.sensor_errors is not None:
-        # Where tilt is known from the accelerometers alone, a late velocity without this would tell it from their bias.
-        faster, moved = age * rotation, age**2 / 2 * rotation
-        whole[3] = _product(of(slice(3, 6)), faster) + _product(of(slice(6, 9)), moved)
-        last = _SIZE + len(state.sensor_errors)
-        whole += [zero((rows, of_errors.start - _SIZE)), of(slice(9, None)), zero((rows, last - of_errors.stop))]
-    return read(none), jnp.concatenate(whole, axis=1)
-
-
 def _turned(attitude: Quaternion, turn: Vector3) -> Quaternion:
     """The attitude after a turn about body axes, rad."""
     after = quaternion_product(attitude, quaternion_of_turn(turn))
     return after / jnp.sqrt((after * after).sum())
-
-
-def _sheared(covariance: Covariance, to: slice, source: slice, matrix: Matrix3) -> Covariance:
-    """Covariance where errors `to` have gained `matrix` times the errors `source`."""
-    rows = covariance[to] + _product(matrix, covariance[source])
-    corner = rows[:, to] + _product(rows[:, source], matrix.T)
-    rows = rows.at[:, to].set((corner + corner.T) / 2)
-    return covariance.at[to].set(rows).at[:, to].set(rows.T)
-
-
-def _product(a: Array, b: Array) -> Array:
-    """Product of a small matrix with a vector or a matrix, without a call of a library."""
-    if b.ndim == 1:
-        return matvec(a, b)
-    return (a[:, :, None] * b[None, :, :]).sum(1)
 
 
 def _propellers(report: Any, sensor: PropellerSpeed, one: Received) -> Any:
@@ -468,6 +371,9 @@ def kalman(
     noise_scale: float = 1.0,
     longest_delay: float | None = None,
     sensor_error_states: bool = True,
+    authority=None,
+    inertial_factor: float = 2.0,
+    largest_rate: float = 10.0,
 ) -> SensorNavigation:
     """Navigation of a vehicle from its sensors, by an error-state Kalman filter. For the sampled loop.
 
@@ -490,6 +396,11 @@ def kalman(
             for twice the longest delay of the sensors, at least half a second.
         sensor_error_states: whether the correlated errors of the sensors, iron and currents of a compass included, are
             states of the filter. Without, it neglects them.
+        authority: acceleration that the thrusters can give along and about the axes of the body, m/s^2 and rad/s^2; six
+            numbers, 0 for one that is not known. It bounds how fast samples of the IMU change. None for that of the
+            nominal model in a scenario, and for unknown elsewhere (20 m/s^2, 100 rad/s^2).
+        inertial_factor: largest acceleration of the vehicle over that of the thrusters.
+        largest_rate: angular rate beyond which no sample is believed, rad/s.
     """
     sensors = tuple(sensors)
     check_sensors(sensors)
@@ -497,5 +408,6 @@ def kalman(
     longest: Any = max(_USUAL_DELAY, 2 * max(delays)) if longest_delay is None else longest_delay
     of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
     of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
-    filter = Kalman(sensors, *of_motion, *of_biases, gate, noise_scale, longest, sensor_error_states)
+    gates = inertial_gate(authority, inertial_factor, largest_rate)
+    filter = Kalman(sensors, gates, *of_motion, *of_biases, gate, noise_scale, longest, sensor_error_states)
     return SensorNavigation(filter=filter)

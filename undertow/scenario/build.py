@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.metrics import meanings
@@ -15,13 +17,16 @@ from undertow.analysis.success import criterion_of
 from undertow.analysis.temporal.requirements import Requirement, requirements_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array, in_present_precision
+from undertow.core.authority import authority_of, limits_of
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
     AbstractInformedNavigation,
     AbstractNavigation,
+    AbstractPlant,
     AbstractReference,
+    Model,
 )
 from undertow.core.errors import Advice, BadInput, advice, within
 from undertow.core.metric import AbstractMetric, Metric
@@ -228,6 +233,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("model"):
         model, of_model = part_cache.part("model", options, (nominal,), known)
     resolved["model"] = of_model | described
+    if "sensors" in (scenario.navigation.model_extra or {}):  # a filter of readings
+        context["authority"] = _authority(nominal, model)
     navigation = make("navigation")
     noise = velocity_noise_of(navigation, scenario.loop.dt)
     check_noise(navigation, noise, plant, own_parts(scenario, text.folder))
@@ -276,6 +283,26 @@ def _required(built: Built) -> tuple[Requirement, ...]:
     bounds = {name: one.below for name, one in given.items() if one.below is not None}
     found = requirements_of(formulas, bounds, built.closed_loop, built.known_metrics(), built.scenario.loop.duration)
     return tuple(sorted(found, key=lambda one: list(given).index(one.name)))
+
+
+def _authority(plant: AbstractPlant, model: Model) -> list[float] | None:
+    """Acceleration that the actuators of a nominal vehicle give it, m/s^2 and rad/s^2, for gates of navigation.
+
+    It is zero where it is unknown, and rounded, so that a finished run states the same number in either precision; None
+    for what is no vehicle.
+    """
+    with jax.ensure_compile_time_eval():  # a number even where a scenario is built inside a compiled function
+        found = np.asarray(_largest_acceleration(plant, model))
+    if not len(found):
+        return None
+    return [float(f"{value:.3g}") if np.isfinite(value) else 0.0 for value in found]
+
+
+@eqx.filter_jit
+def _largest_acceleration(plant: AbstractPlant, model: Model):
+    x = plant.initial_state()
+    start = plant.output(jnp.zeros(()), x)
+    return jnp.zeros(0) if start.body is None else authority_of(model.in_body_axes(), start, limits_of(plant, x))
 
 
 def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 
 from undertow.core import runtime
 from undertow.core.arrays import as_array
+from undertow.core.authority import limits_of
 from undertow.core.status import Status
 from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.outcome import Outcome
@@ -24,7 +25,6 @@ from undertow.scenario.part_cache import PartCache, structure
 from undertow.soak.watching import Counts, Watch
 from undertow.supervision.conditions import state_of
 from undertow.supervision.supervised_controller import state_in
-from undertow.supervision.supervisor import limits_of
 from undertow.supervision.transition_log import Transition, transitions
 
 _BEGINNING = 2  # transitions to READY and to ACTIVE

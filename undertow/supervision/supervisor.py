@@ -4,11 +4,10 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PyTree
 
 from undertow.core import checks
-from undertow.core.actuator_model import force_of
-from undertow.core.contracts import AbstractController, AbstractPlant, Inputs, Measurement, Model, Outputs
+from undertow.core.authority import authority_of, limits_of
+from undertow.core.contracts import AbstractController, AbstractPlant, Model, Outputs
 from undertow.core.errors import BadInput
 from undertow.supervision.condition_values import ConditionValues
 from undertow.supervision.fault_tolerant_law import fault_tolerant
@@ -119,7 +118,7 @@ def supervisor(
     if thruster_faults and vehicle:
         law = fault_tolerant(law, sampling_time, (low, high))
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
-    authority = _authority(law.model, start, (low, high))
+    authority = authority_of(law.model, start, (low, high))
     estimate = largest_estimate(law.model, plant) if max_estimate is None else max_estimate
     least, largest = jnp.maximum(low, -_BEYOND), jnp.minimum(high, _BEYOND)
     return Supervised(
@@ -138,30 +137,15 @@ def supervisor(
     )
 
 
-def limits_of(plant: AbstractPlant, x: PyTree) -> tuple[Inputs, Inputs]:
-    """Least and largest input that a plant takes in a state; infinite where there is no limit."""
-    beyond = jnp.full(plant.inputs(), _BEYOND)
-    found = (plant.admissible(x, sign * beyond) for sign in (-1.0, 1.0))
-    low, high = (jnp.where(jnp.abs(limit) < beyond, limit, jnp.inf * jnp.sign(limit)) for limit in found)
-    return low, high
-
-
 def largest_estimate(model: Model, plant: AbstractPlant) -> Outputs:
     """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2.
 
     It is ten times the acceleration that the actuators of a plant can give, and 500 where they have no limit.
     """
     x = plant.initial_state()
-    authority = _authority(model, plant.output(jnp.zeros(()), x), limits_of(plant, x))
+    authority = authority_of(model, plant.output(jnp.zeros(()), x), limits_of(plant, x))
     known = jnp.isfinite(authority) & (authority > 0)
     return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
-
-
-def _authority(model: Model, start: Measurement, limits: tuple[Any, Any]) -> Outputs:
-    """Largest acceleration of the actuators along each axis of a model, m/s^2 and rad/s^2; infinite without limits."""
-    gain = jnp.abs(model.dynamics.gain(start))
-    forces = jnp.stack([jnp.abs(force_of(model.actuators, limit)) for limit in limits]).max(0)
-    return jnp.where(gain > 0, gain * forces[None, :], 0.0).sum(1)
 
 
 def _reported_input(authority: Outputs) -> ReportedInput:

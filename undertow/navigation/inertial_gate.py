@@ -1,0 +1,126 @@
+"""Gate for the samples of an IMU: what the vehicle cannot do is not believed at once, and never without doubt."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.param import Param, param
+from undertow.numerics.number import Number
+from undertow.sensors.imu import IMU
+
+Inertial = Float[Array, "6"]  # p, q, r, rad/s; specific force along forward, starboard, down, m/s^2
+
+# Largest acceleration of a vehicle whose actuators are not known, m/s^2 and rad/s^2; and what waves and tethers do to
+# one of which they are.
+_UNKNOWN = np.repeat([20.0, 100.0], 3)
+_LEAST = np.repeat([5.0, 20.0], 3)
+_GRAVITY = 9.81  # m/s^2, which accelerometers of a vehicle at rest read
+_FULL_SCALE = np.repeat([35.0, 160.0], 3)  # of MEMS devices, rad/s and m/s^2: what is larger was not measured
+_RISE = 0.05  # s in which thrusters reach their largest force
+_DEVIATIONS = 8.0  # of the noise of a sample: the difference of two is below it
+_PATIENCE = 0.25  # s for which the last believed value stands for what the gate rejects
+_FORGETTING = 2.0  # s in which doubt of what was believed in the end falls to 1/e
+_LASTING = 0.1  # s for which an error of a sample in doubt stays the same
+
+
+class InertialMemory(NamedTuple):
+    """What the gate remembers of each axis of gyroscopes and accelerometers."""
+
+    values: Inertial  # last believed sample
+    age: Inertial  # s since then
+    suspected: Bool[Array, "6"]  # whether a sample was rejected since
+    doubt: Inertial  # standard deviation of the error of what was believed after rejections
+    rejected: Int[Array, ""]  # samples so far of which an axis was rejected
+
+
+class InertialGate(eqx.Module):
+    """Compares each sample with the last believed one: thrusters and water bound how fast it can change.
+
+    A sample beyond is rejected, and the last believed value stands in its place. When this has gone on for a quarter of
+    a second, or the difference is one that the vehicle could have reached in the meantime, the samples are believed
+    again, as after a collision, but with a standard deviation as large as the difference, which fades over two seconds.
+    What is larger than the vehicle can ever do is never believed.
+    """
+
+    slew: Float[Param, "6"] = param("rad/s^2, m/s^3", "largest rate of change of gyroscopes and accelerometers")
+    step: Float[Param, "6"] = param("rad/s, m/s^2", "largest change between two samples, however far apart")
+    most: Float[Param, "6"] = param("rad/s, m/s^2", "largest value")
+
+    def start(self, values: Inertial) -> InertialMemory:
+        """The memory of a vehicle whose first sample may be any."""
+        zero = jnp.zeros(6)
+        none = jnp.zeros((), dtype=int)
+        return InertialMemory(values, zero + _PATIENCE, jnp.zeros(6, dtype=bool), zero, none)
+
+    def received(
+        self, memory: InertialMemory, elapsed: Number, sample: Inertial, fresh: Bool[Array, ""], noise: Inertial
+    ) -> InertialMemory:
+        """The memory `elapsed` (s) later.
+
+        Args:
+            memory: of before.
+            elapsed: s.
+            sample: of the IMU; entries that are not finite were not measured.
+            fresh: whether it is new.
+            noise: standard deviation of a sample.
+        """
+        age = memory.age + elapsed
+        doubt = memory.doubt / (1 + elapsed / _FORGETTING)
+        measured = fresh & (jnp.abs(sample) <= self.most)
+        change = jnp.where(measured, jnp.abs(sample - memory.values), 0.0)
+        possible = jnp.minimum(self.slew * age, self.step) + _DEVIATIONS * noise
+        plausible = change <= possible + 2 * doubt
+        believed = measured & (plausible | (memory.suspected & (age >= _PATIENCE)))
+        missed = fresh & jnp.isfinite(sample) & ~believed
+        return InertialMemory(
+            values=jnp.where(believed, sample, memory.values),
+            age=jnp.where(believed, 0.0, age),
+            suspected=jnp.where(believed, False, memory.suspected | missed),
+            doubt=jnp.where(believed & memory.suspected, jnp.maximum(doubt, change), doubt),
+            rejected=memory.rejected + jnp.where(missed.any(), 1, 0),
+        )
+
+    def uncertainty(self, memory: InertialMemory) -> Inertial:
+        """Density of the further noise of what is believed, (rad/s)^2 s and (m/s^2)^2 s; zero after no rejection.
+
+        What a value that stands for a rejected one may be off by is three standard deviations.
+        """
+        held = jnp.where(memory.suspected, jnp.minimum(self.slew * memory.age, self.step) / 3, 0.0)
+        return memory.doubt**2 * _LASTING + held**2 * memory.age
+
+
+def inertial_gate(authority, inertial_factor, largest_rate) -> InertialGate:
+    """The gate of a vehicle.
+
+    Args:
+        authority: acceleration that the actuators can give along and about the axes of the body, m/s^2 and rad/s^2: six
+            numbers, 0 where it is not known; None for none of them.
+        inertial_factor: largest acceleration over that of the actuators.
+        largest_rate: rad/s.
+
+    Raises:
+        BadInput: not six numbers, or one of them negative; a factor or a rate that is not positive.
+    """
+    checks.positive("inertial_factor", inertial_factor)
+    checks.positive("largest_rate", largest_rate, "rad/s")
+    given = np.zeros(6) if authority is None else np.asarray(authority, dtype=float)
+    if given.shape != (6,):
+        raise BadInput("authority", "be six numbers, m/s^2 and rad/s^2", f"of shape {given.shape}")
+    checks.not_negative("authority", given, "m/s^2, rad/s^2")
+    known = np.maximum(inertial_factor * given, _LEAST)
+    reached = np.where(given > 0, known, _UNKNOWN)
+    linear, angular = reached[:3], reached[3:]
+    slew = np.concatenate([angular, linear / _RISE])
+    step = np.concatenate([np.full(3, 2 * largest_rate), 2 * linear])
+    most = np.concatenate([np.full(3, largest_rate), _GRAVITY + 2 * linear])
+    return InertialGate(slew, step, np.minimum(most, _FULL_SCALE))
+
+
+def inertial_deviation(imu: IMU, scale: Number = 1.0) -> Inertial:
+    """Standard deviation of a sample of gyroscopes and accelerometers."""
+    return jnp.broadcast_to(jnp.asarray(imu.sampling.noise, dtype=float), (8,))[2:] * scale
