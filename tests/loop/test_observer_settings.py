@@ -31,5 +31,5 @@ def test_propeller_speeds_are_known_only_by_their_sensor():
     y = measurement_of_outputs(np.zeros(6), np.zeros(6), PropellerReport(np.arange(8.0), None))
     without = observer([imu(), dvl()]).filter.start(y)
     with_sensor = observer([imu(), dvl(), propeller_speed()]).filter.start(y)
-    assert without.actuator is None
-    np.testing.assert_array_equal(with_sensor.actuator.speed, np.arange(8.0))
+    assert without.estimate.actuator is None
+    np.testing.assert_array_equal(with_sensor.estimate.actuator.speed, np.arange(8.0))

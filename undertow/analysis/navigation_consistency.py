@@ -38,7 +38,7 @@ def navigation_consistency(
         if not isinstance(sensor, PropellerSpeed):
             found.append({"sensor": name} | _assumed(own, sensor) | _innovations(run, i))
     nees = None if metrics is None else metrics.get("nees")
-    return {"sensors": found, "nees": nees, "findings": _findings(found, nees)}
+    return {"sensors": found, "nees": nees, "findings": [*_findings(found, nees), *_gate_findings(run)]}
 
 
 def _assumed(own: Kalman, sensor: AbstractSensor) -> dict[str, list[float]]:
@@ -84,5 +84,21 @@ def _findings(sensors: list[dict[str, Any]], nees: float | None) -> list[str]:
         found.append(
             f"The errors of the navigation filter are {math.sqrt(nees / _EXPECTED):.2g} times as large as it says "
             f"(`nees` is {nees:.3g}, {_EXPECTED} is expected){unseen}"
+        )
+    return found
+
+
+def _gate_findings(run: xr.Dataset) -> list[str]:
+    """Sentences about gates of the filter that had to act."""
+    inertial, reopened = (int(run[name].values[-1]) for name in ("rejected_inertial", "reopened_gates"))
+    found = []
+    if inertial:
+        found.append(
+            f"The navigation filter did not believe {inertial} samples of the IMU: no motion of the vehicle explains "
+            "them. Look for glitches, or raise its `inertial_factor` or `largest_rate`"
+        )
+    if reopened:
+        found.append(
+            f"The navigation filter was wrong {reopened} times: most sensors contradicted it, and were believed again"
         )
     return found

@@ -146,11 +146,15 @@ class Kalman(AbstractCovarianceFilter):
         if errors is not None and state.sensor_errors is not None:
             covariance = faded(covariance, errors, elapsed)
             state = state._replace(sensor_errors=errors.kept(elapsed) * state.sensor_errors)
+        opened = jnp.zeros(len(covariance))
         for i, (sensor, one) in enumerate(zip(self.sensors, received, strict=True)):
             if isinstance(sensor, PropellerSpeed):
                 state = state._replace(actuator=_propellers(state.actuator, sensor, one))
             else:
-                state, covariance = self._corrected(state, covariance, i, one)
+                state, covariance, doubt = self._corrected(state, covariance, i, one)
+                opened = opened + doubt
+        # What is tolerated after many rejections opens the gate for the next reading.
+        covariance = covariance + jnp.where(np.eye(len(covariance), dtype=bool), opened[:, None], 0.0)
         disagreement, covariance = state.disagreement.reopening(self._periods(), covariance, self.initial_deviations())
         return state._replace(disagreement=disagreement, covariance=covariance[packing(len(covariance)).upper])
 
@@ -275,8 +279,11 @@ class Kalman(AbstractCovarianceFilter):
 
     def _corrected(
         self, state: KalmanState, covariance: Covariance, i: int, one: Received
-    ) -> tuple[KalmanState, Covariance]:
-        """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none."""
+    ) -> tuple[KalmanState, Covariance, Float[Array, " states"]]:
+        """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none.
+
+        And the variances that a reading adds which is rejected, but tolerated.
+        """
         sensor = self.sensors[i]
         reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
         states = error_states(self.sensors, MOTION_STATES)[i] if state.sensor_errors is not None else None
@@ -324,9 +331,8 @@ class Kalman(AbstractCovarianceFilter):
             monitor=monitor,
             sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[MOTION_STATES:],
         )
-        # What is tolerated after many rejections opens the gate for the next reading.
-        opened = jnp.where(diagonal & tolerated, doubted(covariance, slopes, error)[:, None], 0.0)
-        return after, jnp.where(taken, posterior, covariance + opened)
+        opened = jnp.where(tolerated, doubted(covariance, slopes, error), 0.0)
+        return after, jnp.where(taken, posterior, covariance), opened
 
 
 _DEVIATIONS = (

@@ -1,5 +1,7 @@
 """Observer with constant gains, which estimates the motion of a vehicle from its sensors at every control step."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -7,9 +9,11 @@ from jaxtyping import Array, Float
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
+from undertow.core.signals import Signal
 from undertow.navigation.drift import drift_advice
 from undertow.navigation.estimate import Estimate, estimate_of
 from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
+from undertow.navigation.inertial_gate import Inertial, InertialGate, InertialMemory, inertial_deviation, inertial_gate
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Vector3, quaternion_from_euler
 from undertow.sensors.compass import Compass
@@ -22,19 +26,28 @@ from undertow.sensors.propeller_speed import PropellerSpeed
 from undertow.sensors.sensor import AbstractSensor
 
 
+class ObserverState(NamedTuple):
+    """State of the observer."""
+
+    estimate: Estimate
+    inertial: InertialMemory  # samples of gyroscopes, rad/s, and accelerometers, m/s^2
+
+
 class Observer(AbstractFilter):
     """Strapdown inertial navigation, corrected by every other sensor with a constant gain.
 
     Between readings the estimate is integrated from rates and acceleration of the IMU. A delayed reading is compared
     with the estimate of the time at which it was taken. There is no covariance and no estimate of a bias: an offset
     of the accelerometers, or of roll or pitch (times gravity), causes an error of the velocity: its growth between two
-    readings of the DVL, divided by `dvl_blend`. A reading that is not finite counts as lost.
+    readings of the DVL, divided by `dvl_blend`. A reading that is not finite counts as lost. Gyroscopes and
+    accelerometers pass an `InertialGate`; other readings have none.
 
     Raises:
         BadInput: no IMU, a sensor that the observer does not know, or a blend outside (0, 1].
     """
 
     sensors: tuple[AbstractSensor, ...]
+    inertial: InertialGate
     imu_blend: Float[Param, ""] = param("", "share of each new inclination in the estimated one")
     dvl_blend: Float[Param, ""] = param("", "share of each new velocity in the estimated one")
     compass_blend: Float[Param, ""] = param("", "share of each new heading in the estimated one")
@@ -54,44 +67,47 @@ class Observer(AbstractFilter):
             if not checks.assumed(lambda share: (share <= 1).all(), blend):
                 raise BadInput(f"{name}_blend", "be at most 1", f"{float(blend):g}")
 
-    def start(self, y) -> Estimate:
+    def start(self, y) -> ObserverState:
         estimate = estimate_of(y)
         if not any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors):
             estimate = estimate._replace(actuator=None)
-        return estimate
+        at_rest = matvec(estimate.rotation().T, -gravity())
+        return ObserverState(estimate, self.inertial.start(jnp.concatenate([estimate.rates, at_rest])))
 
-    def update(self, state: Estimate, elapsed, received: tuple[Received, ...]) -> Estimate:
+    def update(self, state: ObserverState, elapsed, received: tuple[Received, ...]) -> ObserverState:
         news = [
             (sensor, one.reading, one.fresh & jnp.isfinite(one.reading).all(), one.age)
             for sensor, one in zip(self.sensors, received, strict=True)
         ]
-        estimate = state
+        estimate, memory = state
         for sensor, reading, new, _ in news:
             if isinstance(sensor, IMU):
-                estimate = _either(new, _with_inertial(estimate, reading), estimate)
+                memory = self.inertial.received(memory, elapsed, reading[2:], new, inertial_deviation(sensor))
+                estimate = _either(new, _with_inertial(estimate, memory.values), estimate)
         estimate = estimate.predicted(elapsed)
         for sensor, reading, new, age in news:
             correct = next(_CORRECTIONS[kind] for kind in _CORRECTIONS if isinstance(sensor, kind))
             estimate = _either(new, correct(self, sensor, estimate, reading, age), estimate)
-        return estimate
+        return ObserverState(estimate, memory)
 
-    def measurement(self, state: Estimate):
-        return state.measurement()
+    def measurement(self, state: ObserverState):
+        return state.estimate.measurement()
 
     def signals(self):
-        return {}
+        meaning = "samples of the IMU so far that no motion of the vehicle explains"
+        return {"rejected_inertial": Signal((), "1", meaning)}
 
-    def diagnostics(self, state):
-        return {}
+    def diagnostics(self, state: ObserverState):
+        return {"rejected_inertial": state.inertial.rejected}
 
     def advice(self, duration):
         return drift_advice(self.sensors, self.dvl_blend, duration)
 
 
-def _with_inertial(estimate: Estimate, reading) -> Estimate:
-    """Rates and acceleration as the IMU reads them."""
-    acceleration = matvec(estimate.rotation(), reading[5:]) + gravity()
-    return estimate._replace(rates=reading[2:5], acceleration=acceleration)
+def _with_inertial(estimate: Estimate, sample: Inertial) -> Estimate:
+    """Rates and acceleration as gyroscopes and accelerometers read them."""
+    acceleration = matvec(estimate.rotation(), sample[3:]) + gravity()
+    return estimate._replace(rates=sample[:3], acceleration=acceleration)
 
 
 def _inclination(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
@@ -171,6 +187,9 @@ def observer(
     depth_blend: float = 0.2,
     fix_blend: float = 0.2,
     propeller_blend: float = 1.0,
+    authority=None,
+    inertial_factor: float = 2.0,
+    largest_rate: float = 10.0,
 ) -> SensorNavigation:
     """Navigation of a vehicle from its sensors, by an observer with constant gains. For the sampled loop.
 
@@ -182,6 +201,14 @@ def observer(
         depth_blend: alpha of the alpha-beta filter of depth and its rate.
         fix_blend: alpha of the alpha-beta filter of north and east and their rates.
         propeller_blend: share of each new reading of propeller speeds in the estimate; 1 for no filter.
+        authority: acceleration that the thrusters can give along and about the axes of the body, m/s^2 and rad/s^2; six
+            numbers, 0 for one that is not known. It bounds how fast samples of the IMU change. None for that of the
+            nominal model in a scenario, and for unknown elsewhere (20 m/s^2, 100 rad/s^2).
+        inertial_factor: largest acceleration of the vehicle over that of the thrusters.
+        largest_rate: angular rate beyond which no sample is believed, rad/s.
     """
     blends = imu_blend, dvl_blend, compass_blend, depth_blend, fix_blend, propeller_blend
-    return SensorNavigation(filter=Observer(tuple(sensors), *blends))
+    sensors = tuple(sensors)
+    check_sensors(sensors)
+    gate = inertial_gate(authority, inertial_factor, largest_rate)
+    return SensorNavigation(filter=Observer(sensors, gate, *blends))
