@@ -112,7 +112,7 @@ def motions() -> dict[str, np.ndarray]:
     return jax.tree.map(np.asarray, jax.vmap(motion)(jnp.asarray(times)))
 
 
-def drawn(rng: np.random.Generator) -> Glitch:
+def random_glitch(rng: np.random.Generator) -> Glitch:
     """A random glitch."""
     target = rng.choice(list(TARGETS))
     sensor, entries, full_scale = TARGETS[target]
@@ -189,7 +189,7 @@ def main() -> None:
         own, truth = build(from_data(scenario(options.filter))).closed_loop.navigation.filter, motions()
         steps = len(truth["position"])
         noise = {name: each * rng.normal(size=(steps, len(each))) for name, (_, each) in SENSORS.items()}
-        glitches = [drawn(rng) for _ in range(options.glitches)]
+        glitches = [random_glitch(rng) for _ in range(options.glitches)]
         offsets = {name: np.stack([one.offset(name) for one in glitches]) for name in SENSORS}
         durations = np.array([one.duration for one in glitches])
         found = jax.tree.map(np.asarray, damages(own, truth, noise, offsets, durations))
