@@ -7,7 +7,7 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.disagreement import doubted
+from undertow.navigation.disagreement import distrusted
 from undertow.navigation.from_sensors import Received
 from undertow.navigation.inertial_gate import inertial_gate
 from undertow.navigation.kalman import kalman
@@ -88,13 +88,13 @@ GATE = inertial_gate([5.0, 5.0, 5.0, 20.0, 20.0, 20.0], 2.0, 10.0)
 
 
 def passed(samples, memory=None, fresh=None):
-    """What a gate believes of samples of the first gyroscope, and the doubt in it."""
+    """What a gate believes of samples of the first gyroscope, and the distrust in it."""
     memory = GATE.start(jnp.zeros(6)) if memory is None else memory
     found = []
     for k, sample in enumerate(samples):
         new = np.asarray(True if fresh is None else fresh[k])
         memory = _received(GATE, memory, sample * np.eye(6)[0], new)
-        found.append((float(memory.values[0]), float(memory.doubt[0])))
+        found.append((float(memory.values[0]), float(memory.distrust[0])))
     return np.array(found), memory
 
 
@@ -116,14 +116,14 @@ def test_the_largest_acceleration_passes_and_a_larger_one_does_not():
 def test_a_lasting_change_is_believed_after_a_quarter_of_a_second_with_a_doubt_that_fades():
     """A change that would take 0.5 s at the largest acceleration of 20 rad/s^2 is believed earlier."""
     slow = inertial_gate([5.0, 5.0, 5.0, 10.0, 10.0, 10.0], 2.0, 10.0)
-    memory, values, doubts = slow.start(jnp.zeros(6)), [], []
+    memory, values, distrusts = slow.start(jnp.zeros(6)), [], []
     for k in range(400):
         sample = np.full(6, 9.9) * (np.arange(6) == 0) * (k > 0)
         memory = _received(slow, memory, sample, np.asarray(True))
         values.append(float(memory.values[0]))
-        doubts.append(float(memory.doubt[0]))
+        distrusts.append(float(memory.distrust[0]))
     assert values[24] == 0.0 and values[25] == pytest.approx(9.9)
-    assert doubts[25] == pytest.approx(9.9) and doubts[225] == pytest.approx(9.9 / np.e, rel=0.01)
+    assert distrusts[25] == pytest.approx(9.9) and distrusts[225] == pytest.approx(9.9 / np.e, rel=0.01)
 
 
 def test_a_gate_is_open_after_silence_and_shut_to_what_no_vehicle_does():
@@ -203,8 +203,8 @@ def test_one_sensor_alone_opens_no_gate_of_another():
 
 
 def test_what_a_reading_contradicts_falls_to_what_it_depends_on():
-    """Not to what is merely correlated with it; a reading of a sum doubts each term by its variance."""
+    """Not to what is merely correlated with it; a reading of a sum distrusts each term by its variance."""
     covariance = jnp.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 2.0]])
-    np.testing.assert_allclose(doubted(covariance, jnp.array([[1.0, 0.0, 0.0]]), jnp.array([3.0])), [9.0, 0.0, 0.0])
-    both = doubted(covariance, jnp.array([[1.0, 0.0, 1.0]]), jnp.array([3.0]))
+    np.testing.assert_allclose(distrusted(covariance, jnp.array([[1.0, 0.0, 0.0]]), jnp.array([3.0])), [9.0, 0.0, 0.0])
+    both = distrusted(covariance, jnp.array([[1.0, 0.0, 1.0]]), jnp.array([3.0]))
     np.testing.assert_allclose(both, [9 * (4 / 6) ** 2, 0.0, 9 * (2 / 6) ** 2])

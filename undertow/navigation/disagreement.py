@@ -98,7 +98,7 @@ def no_disagreement(sensors: int) -> Disagreement:
     return Disagreement(ones, 0 * ones, _FOREVER * ones, jnp.zeros((), dtype=int))
 
 
-def doubted(
+def distrusted(
     covariance: Covariance, slopes: Float[Array, "entries states"], error: Float[Array, " entries"]
 ) -> Float[Array, " states"]:
     """Variances to be added so that errors of a reading become likely: each falls to the states that it depends on.

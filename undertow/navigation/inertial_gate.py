@@ -1,4 +1,4 @@
-"""Gate for the samples of an IMU: what the vehicle cannot do is not believed at once, and never without doubt."""
+"""Gate for the samples of an IMU: what the vehicle cannot do is not believed at once, and never without distrust."""
 
 from typing import NamedTuple
 
@@ -24,8 +24,8 @@ _FULL_SCALE = np.repeat([35.0, 160.0], 3)  # of MEMS devices, rad/s and m/s^2: w
 _RISE = 0.05  # s in which thrusters reach their largest force
 _DEVIATIONS = 8.0  # of the noise of a sample: the difference of two is below it
 _PATIENCE = 0.25  # s for which the last believed value stands for what the gate rejects
-_FORGETTING = 2.0  # s in which doubt of what was believed in the end falls to 1/e
-_LASTING = 0.1  # s for which an error of a sample in doubt stays the same
+_FORGETTING = 2.0  # s in which distrust of what was believed in the end falls to 1/e
+_LASTING = 0.1  # s for which an error of a sample in distrust stays the same
 
 
 class InertialMemory(NamedTuple):
@@ -34,7 +34,7 @@ class InertialMemory(NamedTuple):
     values: Inertial  # last believed sample
     age: Inertial  # s since then
     suspected: Bool[Array, "6"]  # whether a sample was rejected since
-    doubt: Inertial  # standard deviation of the error of what was believed after rejections
+    distrust: Inertial  # standard deviation of the error of what was believed after rejections
     rejected: Int[Array, ""]  # samples so far of which an axis was rejected
 
 
@@ -70,18 +70,18 @@ class InertialGate(eqx.Module):
             noise: standard deviation of a sample.
         """
         age = memory.age + elapsed
-        doubt = memory.doubt / (1 + elapsed / _FORGETTING)
+        distrust = memory.distrust / (1 + elapsed / _FORGETTING)
         measured = fresh & (jnp.abs(sample) <= self.most)
         change = jnp.where(measured, jnp.abs(sample - memory.values), 0.0)
         possible = jnp.minimum(self.slew * age, self.step) + _DEVIATIONS * noise
-        plausible = change <= possible + 2 * doubt
+        plausible = change <= possible + 2 * distrust
         believed = measured & (plausible | (memory.suspected & (age >= _PATIENCE)))
         missed = fresh & jnp.isfinite(sample) & ~believed
         return InertialMemory(
             values=jnp.where(believed, sample, memory.values),
             age=jnp.where(believed, 0.0, age),
             suspected=jnp.where(believed, False, memory.suspected | missed),
-            doubt=jnp.where(believed & memory.suspected, jnp.maximum(doubt, change), doubt),
+            distrust=jnp.where(believed & memory.suspected, jnp.maximum(distrust, change), distrust),
             rejected=memory.rejected + jnp.where(missed.any(), 1, 0),
         )
 
@@ -91,7 +91,7 @@ class InertialGate(eqx.Module):
         What a value that stands for a rejected one may be off by is three standard deviations.
         """
         held = jnp.where(memory.suspected, jnp.minimum(self.slew * memory.age, self.step) / 3, 0.0)
-        return memory.doubt**2 * _LASTING + held**2 * memory.age
+        return memory.distrust**2 * _LASTING + held**2 * memory.age
 
 
 def inertial_gate(authority, inertial_factor, largest_rate) -> InertialGate:

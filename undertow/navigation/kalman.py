@@ -19,7 +19,7 @@ from undertow.core.measurement import body_of, measurement_of_outputs, measureme
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.navigation.consistency import innovation_monitor
-from undertow.navigation.disagreement import doubted, no_disagreement
+from undertow.navigation.disagreement import distrusted, no_disagreement
 from undertow.navigation.from_sensors import AbstractCovarianceFilter, Received, SensorNavigation, check_sensors
 from undertow.navigation.inertial_covariance import (
     ATTITUDE,
@@ -151,8 +151,8 @@ class Kalman(AbstractCovarianceFilter):
             if isinstance(sensor, PropellerSpeed):
                 state = state._replace(actuator=_propellers(state.actuator, sensor, one))
             else:
-                state, covariance, doubt = self._corrected(state, covariance, i, one)
-                opened = opened + doubt
+                state, covariance, distrust = self._corrected(state, covariance, i, one)
+                opened = opened + distrust
         # What is tolerated after many rejections opens the gate for the next reading.
         covariance = covariance + jnp.where(np.eye(len(covariance), dtype=bool), opened[:, None], 0.0)
         disagreement, covariance = state.disagreement.reopening(self._periods(), covariance, self.initial_deviations())
@@ -331,7 +331,7 @@ class Kalman(AbstractCovarianceFilter):
             monitor=monitor,
             sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[MOTION_STATES:],
         )
-        opened = jnp.where(tolerated, doubted(covariance, slopes, error), 0.0)
+        opened = jnp.where(tolerated, distrusted(covariance, slopes, error), 0.0)
         return after, jnp.where(taken, posterior, covariance), opened
 
 
