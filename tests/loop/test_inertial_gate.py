@@ -9,7 +9,7 @@ from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.navigation.disagreement import distrusted
 from undertow.navigation.from_sensors import Received
-from undertow.navigation.inertial_gate import inertial_gate
+from undertow.navigation.inertial_gate import gate_for
 from undertow.navigation.kalman import kalman
 from undertow.navigation.observer import observer
 from undertow.scenario.build import build
@@ -84,7 +84,7 @@ def test_a_lasting_error_of_the_gyroscopes_leaves_the_estimate_to_the_other_sens
     assert signals["rejected_inertial"][-1] < 50
 
 
-GATE = inertial_gate([5.0, 5.0, 5.0, 20.0, 20.0, 20.0], 2.0, 10.0)
+GATE = gate_for([5.0, 5.0, 5.0, 20.0, 20.0, 20.0], 2.0, 10.0)
 
 
 def passed(samples, memory=None, fresh=None):
@@ -115,7 +115,7 @@ def test_the_largest_acceleration_passes_and_a_larger_one_does_not():
 
 def test_a_lasting_change_is_believed_after_a_quarter_of_a_second_with_a_doubt_that_fades():
     """A change that would take 0.5 s at the largest acceleration of 20 rad/s^2 is believed earlier."""
-    slow = inertial_gate([5.0, 5.0, 5.0, 10.0, 10.0, 10.0], 2.0, 10.0)
+    slow = gate_for([5.0, 5.0, 5.0, 10.0, 10.0, 10.0], 2.0, 10.0)
     memory, values, distrusts = slow.start(jnp.zeros(6)), [], []
     for k in range(400):
         sample = np.full(6, 9.9) * (np.arange(6) == 0) * (k > 0)

@@ -94,7 +94,7 @@ class InertialGate(eqx.Module):
         return memory.distrust**2 * _LASTING + held**2 * memory.age
 
 
-def inertial_gate(authority, inertial_factor, largest_rate) -> InertialGate:
+def gate_for(authority, inertial_factor, largest_rate) -> InertialGate:
     """The gate of a vehicle.
 
     Args:

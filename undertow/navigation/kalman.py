@@ -31,7 +31,7 @@ from undertow.navigation.inertial_covariance import (
     product,
     spread,
 )
-from undertow.navigation.inertial_gate import InertialGate, inertial_deviation, inertial_gate
+from undertow.navigation.inertial_gate import InertialGate, gate_for, inertial_deviation
 from undertow.navigation.kalman_state import KalmanState, expected_reading
 from undertow.navigation.motion_history import resting, spacing_for
 from undertow.navigation.observability import Sensed, drift_sentences
@@ -414,6 +414,6 @@ def kalman(
     longest: Any = max(_USUAL_DELAY, 2 * max(delays)) if longest_delay is None else longest_delay
     of_motion = position_deviation, velocity_deviation, tilt_deviation, heading_deviation
     of_biases = gyro_bias_deviation, force_bias_deviation, gyro_drift, force_drift
-    gates = inertial_gate(authority, inertial_factor, largest_rate)
+    gates = gate_for(authority, inertial_factor, largest_rate)
     filter = Kalman(sensors, gates, *of_motion, *of_biases, gate, noise_scale, longest, sensor_error_states)
     return SensorNavigation(filter=filter)

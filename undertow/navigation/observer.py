@@ -13,7 +13,7 @@ from undertow.core.signals import Signal
 from undertow.navigation.drift import drift_advice
 from undertow.navigation.estimate import Estimate, estimate_of
 from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
-from undertow.navigation.inertial_gate import Inertial, InertialGate, InertialMemory, inertial_deviation, inertial_gate
+from undertow.navigation.inertial_gate import Inertial, InertialGate, InertialMemory, gate_for, inertial_deviation
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Vector3, quaternion_from_euler
 from undertow.sensors.compass import Compass
@@ -210,5 +210,5 @@ def observer(
     blends = imu_blend, dvl_blend, compass_blend, depth_blend, fix_blend, propeller_blend
     sensors = tuple(sensors)
     check_sensors(sensors)
-    gate = inertial_gate(authority, inertial_factor, largest_rate)
+    gate = gate_for(authority, inertial_factor, largest_rate)
     return SensorNavigation(filter=Observer(sensors, gate, *blends))
