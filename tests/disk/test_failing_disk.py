@@ -42,6 +42,7 @@ def check(results, names):
     assert all(one["tried"] >= 6 for one in results)
 
 
+@pytest.mark.full
 def test_files_on_a_failing_disk(shim, tmp_path):
     """A few calls of each: the first, the last, and some between."""
     names = ("knowledge", "checkpoint", "export")

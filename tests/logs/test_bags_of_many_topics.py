@@ -206,6 +206,7 @@ def test_the_sum_of_the_chunks_is_bounded(tmp_path):
         read_log(tmp_path / "a.mcap")
 
 
+@pytest.mark.full
 def test_messages_with_a_field_of_their_own_each(tmp_path):
     """Twice as many take about twice the memory, not four times; a column is there when it is asked for."""
     sizes = []

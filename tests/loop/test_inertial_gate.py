@@ -66,6 +66,7 @@ def glitch(entry, size, samples, steps=1000, onset=500):
     return offsets
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", FILTERS)
 @pytest.mark.parametrize(("entry", "size"), [(2, 34.9), (3, -34.9), (4, 34.9), (5, 159.0), (7, -149.0)])
 def test_samples_at_full_scale_move_nothing(kind, entry, size):
@@ -157,6 +158,7 @@ def test_impossible_gates(made, wrong, named):
         made([imu()], **wrong)
 
 
+@pytest.mark.full
 def test_a_scenario_gives_the_gate_what_the_thrusters_of_the_nominal_model_can_do():
     """The sum over the thrusters of the acceleration of each at its limit: 4 N/V at 10 V."""
     scenario = {
@@ -187,6 +189,7 @@ def displaced(state):
     )
 
 
+@pytest.mark.full
 def test_most_sensors_are_right_against_the_filter():
     """Its covariance grows until they are taken: it is right again within a second, and says that it was wrong."""
     speed, angle, _, signals = followed("kalman", np.zeros((500, 8)), displaced)

@@ -134,6 +134,7 @@ def with_reading(received, index, reading, age=0.0):
     return (*received[:index], one, *received[index + 1 :])
 
 
+@pytest.mark.full
 def test_the_covariance_spreads_as_the_matrix_exponential_says():
     """At rest and level the errors follow constant matrices; Van Loan (1978) gives the covariance exactly."""
     own, h, steps = kalman(ALL, gyro_drift=1e-3, force_drift=1e-2).filter, 0.01, 300

@@ -124,6 +124,7 @@ def test_a_deep_vehicle_does_not_know_of_the_surface():
         jax.tree.map(np.testing.assert_array_equal, *found)
 
 
+@pytest.mark.full
 def test_energy_is_kept_at_the_surface():
     """Without damping, of a body that tumbles through the surface: kinetic energy with the added mass of the submerged
     share, height of the weight, and work against buoyancy.
