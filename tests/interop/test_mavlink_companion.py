@@ -339,14 +339,24 @@ def test_a_command_that_is_rejected(talk):
 
 
 def test_a_start_without_a_jump(driven):
-    """By default the output turns from neutral into the law's within seconds."""
-    companion = Companion(driven, output="servo")
+    """Without a supervisor the output turns from neutral into the law's within seconds."""
+    companion = Companion(driven, output="servo", unsupervised=True)
     talk = Talk(companion)
     talk.heartbeat()
     first = talk.odometry(place=[0.5, 0.5, 0.5])
     assert [(one.param1, one.param2) for one in first] == [(n, 1500) for n in range(1, 9)]
     last = [one.param2 for one in talk.odometry(place=[0.5, 0.5, 0.5])]
     assert max(abs(np.array(last) - 1500)) < 40
+
+
+def test_a_supervised_start_without_a_jump(driven):
+    """With it, as links have it, from neutral and no faster than a range per second."""
+    companion = Companion(driven, output="servo")
+    talk = Talk(companion)
+    talk.heartbeat()
+    first = np.array([one.param2 for one in talk.odometry(place=[0.5, 0.5, 0.5])])
+    assert 0 < np.abs(first - 1500).max() <= 800 * companion.sampling_time + 1
+    assert companion.state(talk.now) == "running, ACTIVE"
 
 
 def test_anything_may_arrive(talk):
