@@ -33,7 +33,7 @@ class InertialMemory(NamedTuple):
 
     values: Inertial  # last believed sample
     age: Inertial  # s since then
-    suspected: Bool[Array, "6"]  # whether a sample was rejected since
+    suspected: Inertial  # 1 where a sample was rejected since, else 0
     distrust: Inertial  # standard deviation of the error of what was believed after rejections
     rejected: Int[Array, ""]  # samples so far of which an axis was rejected
 
@@ -55,7 +55,7 @@ class InertialGate(eqx.Module):
         """The memory of a vehicle whose first sample may be any."""
         zero = jnp.zeros(6)
         none = jnp.zeros((), dtype=int)
-        return InertialMemory(values, zero + _PATIENCE, jnp.zeros(6, dtype=bool), zero, none)
+        return InertialMemory(values, zero + _PATIENCE, zero, zero, none)
 
     def received(
         self, memory: InertialMemory, elapsed: Number, sample: Inertial, fresh: Bool[Array, ""], noise: Inertial
@@ -69,19 +69,19 @@ class InertialGate(eqx.Module):
             fresh: whether it is new.
             noise: standard deviation of a sample.
         """
-        age = memory.age + elapsed
+        age, suspected = memory.age + elapsed, memory.suspected > 0
         distrust = memory.distrust / (1 + elapsed / _FORGETTING)
         measured = fresh & (jnp.abs(sample) <= self.most)
         change = jnp.where(measured, jnp.abs(sample - memory.values), 0.0)
         possible = jnp.minimum(self.slew * age, self.step) + _DEVIATIONS * noise
         plausible = change <= possible + 2 * distrust
-        believed = measured & (plausible | (memory.suspected & (age >= _PATIENCE)))
+        believed = measured & (plausible | (suspected & (age >= _PATIENCE)))
         missed = fresh & jnp.isfinite(sample) & ~believed
         return InertialMemory(
             values=jnp.where(believed, sample, memory.values),
             age=jnp.where(believed, 0.0, age),
-            suspected=jnp.where(believed, False, memory.suspected | missed),
-            distrust=jnp.where(believed & memory.suspected, jnp.maximum(distrust, change), distrust),
+            suspected=jnp.where(~believed & (suspected | missed), 1.0, 0.0),
+            distrust=jnp.where(believed & suspected, jnp.maximum(distrust, change), distrust),
             rejected=memory.rejected + jnp.where(missed.any(), 1, 0),
         )
 
@@ -90,7 +90,7 @@ class InertialGate(eqx.Module):
 
         What a value that stands for a rejected one may be off by is three standard deviations.
         """
-        held = jnp.where(memory.suspected, jnp.minimum(self.slew * memory.age, self.step) / 3, 0.0)
+        held = jnp.where(memory.suspected > 0, jnp.minimum(self.slew * memory.age, self.step) / 3, 0.0)
         return memory.distrust**2 * _LASTING + held**2 * memory.age
 
 
