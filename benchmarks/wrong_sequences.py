@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 import undertow as ut
-from undertow.interop.stepped_vehicle import SteppedVehicle
 from undertow.scenario.reading import dump
+from undertow.soak.links.driven_vehicle import DrivenVehicle
+from undertow.soak.links.scenario import SUPPLY
 
 DT, ONSET = 0.02, 5.0  # s
-SUPPLY, FULL = 16.0, 0.95  # V; share of it
 ALWAYS = 1e9  # s
 SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": SUPPLY}},
@@ -148,36 +148,33 @@ class Attacked:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "vehicle.yaml"
             path.write_text(dump(SCENARIO | changes))
-            self._vehicle, self._law = SteppedVehicle(path), ut.Autopilot(path, attitude="quaternion")
+            self._vehicle, self._law = DrivenVehicle(path), ut.Autopilot(path, attitude="quaternion")
 
     def run(self, wrong: tuple[Wrong, ...], duration: float) -> Caused:
         """One run of so many seconds after the onset."""
         vehicle, law = self._vehicle, self._law
         vehicle.restart()
-        onset, history, frozen = round(ONSET / DT), [], {}
-        way, applied, volts = 0.0, None, None
+        onset, frozen = round(ONSET / DT), {}
         for step in range(onset + round(duration / DT)):
-            state = vehicle.state()
+            state = vehicle.state
+            if step == onset:
+                vehicle.count_anew()
             given = {
                 "position": state.position,
                 "attitude": state.attitude,
                 "velocity": state.body_velocity[:3],
                 "rate": state.body_velocity[3:],
-                "applied": vehicle.input,
+                "applied": vehicle.stepped.input,
             }
             for one in wrong if step >= onset else ():
                 given[one.quantity] = _wrong(one, step - onset, given[one.quantity], frozen)
             motion = given["position"], np.concatenate([given["velocity"], given["rate"]]), given["attitude"]
             volts = law.step(*motion, applied=given["applied"]) if step else law.start(*motion)
-            applied = np.clip(volts, -SUPPLY, SUPPLY)
-            if step >= onset:
-                history.append(np.abs(applied))
-                way = max(way, float(np.linalg.norm(state.position)))
-            if not vehicle.hold(applied, DT):
+            vehicle.hold(volts, DT)
+            if vehicle.failed:
                 break
-        volts = np.array(history)
         ended = law.state if law.supervised else ("", "")
-        return Caused(float(volts.sum() * DT), float((volts.max(1) >= FULL * SUPPLY).sum() * DT), way, *ended)
+        return Caused(vehicle.volt_seconds, vehicle.full, vehicle.furthest, *ended)
 
 
 def _wrong(one: Wrong, step: int, true: np.ndarray, frozen: dict[str, np.ndarray]) -> np.ndarray:

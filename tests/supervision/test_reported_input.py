@@ -17,7 +17,7 @@ T, LIMIT = 0.02, 20.0
 @functools.cache
 def parts():
     model = DoubleIntegrator(LIMIT, outputs=("x",), output_units=("m",)).model()
-    return model, ReportedInput(np.array([0.1 * LIMIT * 0.5]))
+    return model, ReportedInput(np.array([LIMIT]))
 
 
 @jax.jit
@@ -35,8 +35,8 @@ def contradicted(command, reported, applied, mass=1.0, load=0.0, noise=0.0, seco
     state = test.init(model, model.coordinates.measurement(jnp.zeros(1), jnp.asarray(velocity)))
     for k in range(round(seconds / T)):
         read = velocity + noise * chance.normal(size=1)
-        told = (np.atleast_1d(np.asarray(of(k * T), dtype=float)) for of in (reported, command))
-        state, ratio = _after(state, read, *told)
+        inputs = (np.atleast_1d(np.asarray(of(k * T), dtype=float)) for of in (reported, command))
+        state, ratio = _after(state, read, *inputs)
         largest = max(largest, float(ratio))
         velocity = velocity + T * (applied(k * T) / mass + load)
     return largest

@@ -19,6 +19,7 @@ from undertow.autopilot.saved_state import packed, unpacked
 from undertow.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
+from undertow.core.authority import authority_of
 from undertow.core.contracts import AbstractGatedController, Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
@@ -510,4 +511,4 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
 def _largest_estimate(loop: ClosedLoop) -> Any:
     """Largest plausible estimate of the uncertainty; without limit where the law has no nominal model."""
     model = getattr(loop.controller, "model", None)
-    return np.inf if model is None else np.asarray(largest_estimate(model, loop.plant))
+    return np.inf if model is None else np.asarray(largest_estimate(authority_of(model, loop.plant)))

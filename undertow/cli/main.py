@@ -17,7 +17,7 @@ import typer
 from undertow.cli import outside_commands
 from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
-from undertow.cli.options import AllowCode, Pdf, Replay
+from undertow.cli.options import AllowCode, Pdf, Replay, ScenarioFile
 from undertow.cli.soak import soak
 from undertow.process_setup import prepare
 
@@ -102,7 +102,7 @@ def init(
 
 @app.command()
 def simulate(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -165,7 +165,7 @@ def bench(
 
 @app.command()
 def tune(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-tuned, or the next free one."),
@@ -201,7 +201,7 @@ def tune(
 
 @app.command()
 def falsify(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results. Default: runs/NAME-falsified, or the next free one."),
@@ -233,7 +233,7 @@ def falsify(
 
 @app.command()
 def analyze(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the page. Default: runs/NAME-prediction, or the next free one."),

@@ -1,8 +1,11 @@
 """Options that several commands have, as typer declares them."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
+
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")]
 
 AllowCode = Annotated[
     bool,

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import typer
 
-from undertow.cli.options import AllowCode, Unsupervised
+from undertow.cli.options import AllowCode, ScenarioFile, Unsupervised
 
 
 def export(
-    scenario: Annotated[
-        Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or the run.nc of an earlier run.")
-    ],
+    scenario: ScenarioFile,
     c99: Annotated[
         Path | None, typer.Option("--c99", metavar="DIR", help="Write a part of the scenario as C99 into this folder.")
     ] = None,
@@ -59,7 +57,7 @@ def export(
 
 
 def ardupilot(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     address: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Address of this machine to listen on; 0.0.0.0 for all.")
     ] = "127.0.0.1",
@@ -104,7 +102,7 @@ def ardupilot(
 
 
 def mavlink(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     connect: Annotated[
         str,
         typer.Option(metavar="PLACE", help="udpin:HOST:PORT (or udp:...) to listen, udpout:HOST:PORT to send first."),
@@ -162,7 +160,7 @@ def mavlink(
 
 
 def run(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     link: Annotated[
         str,
         typer.Option(
@@ -237,7 +235,7 @@ def run(
 
 
 def ros2(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.")],
+    scenario: ScenarioFile,
     role: Annotated[
         str, typer.Option("--as", metavar="ROLE", help="controller, or vehicle (simulated).")
     ] = "controller",

@@ -17,7 +17,7 @@ from undertow.analysis.success import criterion_of
 from undertow.analysis.temporal.requirements import Requirement, requirements_of
 from undertow.core import runtime
 from undertow.core.arrays import as_array, in_present_precision
-from undertow.core.authority import authority_of, limits_of
+from undertow.core.authority import authority_of
 from undertow.core.catalogue import KIND_OF
 from undertow.core.contracts import (
     AbstractController,
@@ -300,9 +300,8 @@ def _authority(plant: AbstractPlant, model: Model) -> list[float] | None:
 
 @eqx.filter_jit
 def _largest_acceleration(plant: AbstractPlant, model: Model):
-    x = plant.initial_state()
-    start = plant.output(jnp.zeros(()), x)
-    return jnp.zeros(0) if start.body is None else authority_of(model.in_body_axes(), start, limits_of(plant, x))
+    start = plant.output(jnp.zeros(()), plant.initial_state())
+    return jnp.zeros(0) if start.body is None else authority_of(model.in_body_axes(), plant)
 
 
 def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:

@@ -32,20 +32,21 @@ class ReportState(NamedTuple):
 
 
 class ReportedInput(eqx.Module):
-    """The test, and how much the nominal model may be wrong.
+    """The test, and how much the nominal model may be wrong. Axes that no actuator moves tell nothing.
 
     Raises:
-        BadInput: a number is not positive.
+        BadInput: a number is not positive, or the authority is negative.
     """
 
-    unit: Float[Param, " n"] = param("m/s or rad/s", "error of the model's velocity within `memory`, of each axis")
+    authority: Float[Param, " n"] = param("m/s^2 or rad/s^2", "largest acceleration of the actuators, of each axis")
+    mismatch: Float[Param, ""] = param("", "share of it that the nominal model may miss", default=0.1)
     memory: Float[Param, ""] = param("s", "over which velocities are compared", default=0.5)
     fading: Float[Param, ""] = param("s", "in which the likelihood is forgotten", default=2.0)
     threshold: Float[Param, ""] = param("", "log-likelihood ratio from which on the report is wrong", default=4.0)
 
     def __check_init__(self):
-        checks.positive("unit", self.unit, finite=False)
-        for name in ("memory", "fading", "threshold"):
+        checks.not_negative("authority", self.authority, finite=False)
+        for name in ("mismatch", "memory", "fading", "threshold"):
             checks.positive(name, getattr(self, name))
 
     def init(self, model: Model, y: Measurement) -> ReportState:
@@ -70,7 +71,8 @@ class ReportedInput(eqx.Module):
         velocity, dynamics = model.coordinates.velocity(y), model.dynamics
         forget = jnp.exp(-dt / self.memory)
         residual = forget * (state.residual + velocity - state.predicted)
-        ratio = ((-2 * residual - state.difference) * state.difference / self.unit**2).sum() / 2
+        missed = jnp.where(self.authority > 0, self.mismatch * self.authority * self.memory, jnp.inf)  # m/s, rad/s
+        ratio = ((-2 * residual - state.difference) * state.difference / missed**2).sum() / 2
         most = 2 * self.threshold
         likelihood = jnp.clip((1 - dt / self.fading) * state.likelihood + dt / self.memory * ratio, 0.0, most)
         actuators, effect = model.actuators.quasi_static(), dynamics.gain(y)

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import checks
-from undertow.core.authority import authority_of, limits_of
-from undertow.core.contracts import AbstractController, AbstractPlant, Model, Outputs
+from undertow.core.authority import BEYOND, authority_of, limits_of
+from undertow.core.contracts import AbstractController, AbstractPlant, Outputs
 from undertow.core.errors import BadInput
 from undertow.supervision.condition_values import ConditionValues
 from undertow.supervision.fault_tolerant_law import fault_tolerant
@@ -23,8 +23,6 @@ _PERIODS = 3  # the same where readings are rarer than control steps
 _SHARE = 10.0  # of the largest acceleration of the actuators that an estimate may have
 _LEAST = 1.0  # m/s^2 or rad/s^2 that an estimate may have in any case
 _UNLIMITED = 500.0  # the same without limits of the actuators
-_MODEL_ERROR = 0.1  # of that acceleration that the nominal model may miss
-_BEYOND = 1e9  # more than any actuator takes, in its unit
 _DECAY = 10.0  # s in which an allowed tracking error of the size of its limit decays
 
 
@@ -118,14 +116,14 @@ def supervisor(
     if thruster_faults and vehicle:
         law = fault_tolerant(law, sampling_time, (low, high))
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
-    authority = authority_of(law.model, start, (low, high))
-    estimate = largest_estimate(law.model, plant) if max_estimate is None else max_estimate
-    least, largest = jnp.maximum(low, -_BEYOND), jnp.minimum(high, _BEYOND)
+    authority = authority_of(law.model, plant)
+    estimate = largest_estimate(authority) if max_estimate is None else max_estimate
+    least, largest = jnp.maximum(low, -BEYOND), jnp.minimum(high, BEYOND)
     return Supervised(
         law=law,
         fallback=fallback,
         gate=gate,
-        report=_reported_input(authority),
+        report=ReportedInput(authority),  # pyright: ignore[reportArgumentType] - an array is a Param
         tracking=TrackingAllowance(max_position_error, max_angle_error, _DECAY),
         watch=ConditionValues(least, largest, estimate, max_variation, restarts),
         model=law.model,
@@ -137,19 +135,10 @@ def supervisor(
     )
 
 
-def largest_estimate(model: Model, plant: AbstractPlant) -> Outputs:
+def largest_estimate(authority: Outputs) -> Outputs:
     """Largest plausible estimate of the uncertainty along each axis of a model, m/s^2 and rad/s^2.
 
-    It is ten times the acceleration that the actuators of a plant can give, and 500 where they have no limit.
+    It is ten times the acceleration that the actuators can give, and 500 where they have no limit.
     """
-    x = plant.initial_state()
-    authority = authority_of(model, plant.output(jnp.zeros(()), x), limits_of(plant, x))
     known = jnp.isfinite(authority) & (authority > 0)
     return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
-
-
-def _reported_input(authority: Outputs) -> ReportedInput:
-    """The test of the reported input; axes that no actuator moves tell nothing."""
-    test = ReportedInput(jnp.ones_like(authority))
-    unit = jnp.where(authority > 0, _MODEL_ERROR * authority * test.memory, jnp.inf)
-    return ReportedInput(unit)  # pyright: ignore[reportArgumentType] - an array is a Param

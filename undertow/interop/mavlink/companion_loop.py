@@ -81,14 +81,16 @@ class CompanionLoop:
         for message in _newest(arrived, self._companion):
             before = self._companion.counts["steps"]
             answer = self._companion.receive(message, now)
-            if (
-                self._companion.running and self._link.peer and now - self._held > _HELD
-            ):  # before the first command, too
-                watchdog.hold(self._link.peer, self._link.codec.packed_ahead(self._companion.neutral()))
-                self._held = now
+            self._hold_if_due(watchdog, now)  # before the first command, too
             self._link.send(answer)
             if self._companion.counts["steps"] > before:
                 self._latency.add(time.perf_counter() - begun)
+
+    def _hold_if_due(self, watchdog: Watchdog, now: float) -> None:
+        """Give the watchdog what stops the vehicle, while the law runs."""
+        if self._companion.running and self._link.peer and now - self._held > _HELD:
+            watchdog.hold(self._link.peer, self._link.codec.packed_ahead(self._companion.neutral()))
+            self._held = now
 
     def _is_welcome(self, message: Any, sender: Any, now: float) -> bool:
         """False for a message of the target from another address than that of the vehicle, which talks."""
