@@ -42,7 +42,7 @@ def scenario(tmp_path, monkeypatch):
 
 
 def test_a_fast_run_has_the_bits_of_simulate_and_replays(scenario, tmp_path, capsys):
-    assert run(["run", "rov.yaml", "--fast", "--json"]) == 0
+    assert run(["run", "rov.yaml", "--fast", "--json", "--unsupervised"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((tmp_path / "runs/rov/statistics.json").read_text())
     assert (printed["steps"], printed["overruns"], printed["missed"], printed["stale"]) == (50, 0, 0, 0)
@@ -189,7 +189,7 @@ def test_a_lost_vehicle_and_one_that_never_was(scenario, peer, capsys):
     vehicle = threading.Thread(target=controlled, args=(peer, ended.is_set))
     vehicle.start()
     try:
-        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--max-age", "1"])
+        code = run(["run", "rov.yaml", "--link", f"udp:{peer.place}", "--max-age", "1", "--unsupervised"])
     finally:
         ended.set()
         vehicle.join()

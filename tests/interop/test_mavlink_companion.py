@@ -114,7 +114,7 @@ def test_nothing_is_sent_before_the_vehicle_is_armed(talk):
     assert talk.companion.state(talk.now) == "disarmed"
     talk.heartbeat(armed=True)
     assert talk.companion.state(talk.now) == "no valid odometry"
-    assert len(pulses(talk.odometry())) == 8 and talk.companion.state(talk.now) == "running"
+    assert len(pulses(talk.odometry())) == 8 and talk.companion.state(talk.now) == "running, ACTIVE"
 
 
 def test_our_heartbeat(talk):

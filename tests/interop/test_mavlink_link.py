@@ -131,7 +131,7 @@ def test_status_lines(companion, vehicle):
             while not (lines and "MAV_FRAME_LOCAL_ENU" in lines[-1]):
                 assert len(lines) < 50
                 threading.Event().wait(0.05)
-    assert re.match(r"(no valid odometry|running); \d+ Hz; step (p50 \d|no step)", lines[-1])
+    assert re.match(r"(no valid odometry|running, [A-Z]+( \(.*\))?); \d+ Hz; step (p50 \d|no step)", lines[-1])
 
 
 @pytest.mark.parametrize(

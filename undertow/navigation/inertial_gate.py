@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from undertow.core import checks
+from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.numerics.number import Number
@@ -47,9 +48,34 @@ class InertialGate(eqx.Module):
     What is larger than the vehicle can ever do is never believed.
     """
 
-    slew: Float[Param, "6"] = param("rad/s^2, m/s^3", "largest rate of change of gyroscopes and accelerometers")
-    step: Float[Param, "6"] = param("rad/s, m/s^2", "largest change between two samples, however far apart")
-    most: Float[Param, "6"] = param("rad/s, m/s^2", "largest value")
+    authority: Float[Param, "6"] = param("m/s^2, rad/s^2", "acceleration that the actuators give; 0 where it is not known")
+    inertial_factor: Float[Param, ""] = param("", "largest acceleration over that of the actuators")
+    largest_rate: Float[Param, ""] = param("rad/s", "angular rate beyond which no sample is believed")
+
+    @property
+    def _acceleration(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+        """The largest ones along and about the axes of the body, m/s^2 and rad/s^2."""
+        known = jnp.maximum(self.inertial_factor * self.authority, _LEAST)
+        reached = jnp.where(self.authority > 0, known, _UNKNOWN)
+        return reached[:3], reached[3:]
+
+    @property
+    def slew(self) -> Inertial:
+        """Largest rate of change of gyroscopes and accelerometers, rad/s^2 and m/s^3."""
+        linear, angular = self._acceleration
+        return jnp.concatenate([angular, linear / _RISE])
+
+    @property
+    def step(self) -> Inertial:
+        """Largest change between two samples, however far apart, rad/s and m/s^2."""
+        linear, _ = self._acceleration
+        return jnp.concatenate([jnp.full(3, 2 * self.largest_rate), 2 * linear])
+
+    @property
+    def most(self) -> Inertial:
+        """Largest value that a device reads and the vehicle reaches, rad/s and m/s^2."""
+        linear, _ = self._acceleration
+        return jnp.minimum(jnp.concatenate([jnp.full(3, self.largest_rate), _GRAVITY + 2 * linear]), _FULL_SCALE)
 
     def start(self, values: Inertial) -> InertialMemory:
         """The memory of a vehicle whose first sample may be any."""
@@ -108,17 +134,11 @@ def gate_for(authority, inertial_factor, largest_rate) -> InertialGate:
     """
     checks.positive("inertial_factor", inertial_factor)
     checks.positive("largest_rate", largest_rate, "rad/s")
-    given = np.zeros(6) if authority is None else np.asarray(authority, dtype=float)
+    given = as_array(np.zeros(6) if authority is None else authority)
     if given.shape != (6,):
         raise BadInput("authority", "be six numbers, m/s^2 and rad/s^2", f"of shape {given.shape}")
     checks.not_negative("authority", given, "m/s^2, rad/s^2")
-    known = np.maximum(inertial_factor * given, _LEAST)
-    reached = np.where(given > 0, known, _UNKNOWN)
-    linear, angular = reached[:3], reached[3:]
-    slew = np.concatenate([angular, linear / _RISE])
-    step = np.concatenate([np.full(3, 2 * largest_rate), 2 * linear])
-    most = np.concatenate([np.full(3, largest_rate), _GRAVITY + 2 * linear])
-    return InertialGate(slew, step, np.minimum(most, _FULL_SCALE))
+    return InertialGate(given, inertial_factor, largest_rate)
 
 
 def inertial_deviation(imu: IMU, scale: Number = 1.0) -> Inertial:

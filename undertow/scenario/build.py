@@ -15,7 +15,7 @@ import numpy as np
 from undertow.analysis.metrics import meanings
 from undertow.analysis.success import criterion_of
 from undertow.analysis.temporal.requirements import Requirement, requirements_of
-from undertow.core import runtime
+from undertow.core import checks, runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.authority import authority_of
 from undertow.core.catalogue import KIND_OF
@@ -34,6 +34,7 @@ from undertow.disturbances.adding import Together
 from undertow.loop import continuous
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.from_sensors import SensorNavigation
+from undertow.numerics.rounding import three_digits
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import (
@@ -285,23 +286,26 @@ def _required(built: Built) -> tuple[Requirement, ...]:
     return tuple(sorted(found, key=lambda one: list(given).index(one.name)))
 
 
-def _authority(plant: AbstractPlant, model: Model) -> list[float] | None:
+def _authority(plant: AbstractPlant, model: Model) -> Any:
     """Acceleration that the actuators of a nominal vehicle give it, m/s^2 and rad/s^2, for gates of navigation.
 
-    It is zero where it is unknown, and rounded, so that a finished run states the same number in either precision; None
-    for what is no vehicle.
+    It is zero where it is unknown, and has three digits, so that a finished run states the same number in either
+    precision; None for what is no vehicle.
     """
     with jax.ensure_compile_time_eval():  # a number even where a scenario is built inside a compiled function
-        found = np.asarray(_largest_acceleration(plant, model))
+        found = _largest_acceleration(plant, model)
     if not len(found):
         return None
-    return [float(f"{value:.3g}") if np.isfinite(value) else 0.0 for value in found]
+    return found if checks.traced(found) else [float(f"{value:.3g}") for value in found.tolist()]
 
 
 @eqx.filter_jit
 def _largest_acceleration(plant: AbstractPlant, model: Model):
     start = plant.output(jnp.zeros(()), plant.initial_state())
-    return jnp.zeros(0) if start.body is None else authority_of(model.in_body_axes(), plant)
+    if start.body is None:
+        return jnp.zeros(0)
+    found = authority_of(model.in_body_axes(), plant)
+    return three_digits(jnp.where(jnp.isfinite(found), found, 0.0))
 
 
 def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:
