@@ -48,7 +48,9 @@ class InertialGate(eqx.Module):
     What is larger than the vehicle can ever do is never believed.
     """
 
-    authority: Float[Param, "6"] = param("m/s^2, rad/s^2", "acceleration that the actuators give; 0 where it is not known")
+    authority: Float[Param, "6"] = param(
+        "m/s^2, rad/s^2", "acceleration that the actuators give; 0 where it is not known"
+    )
     inertial_factor: Float[Param, ""] = param("", "largest acceleration over that of the actuators")
     largest_rate: Float[Param, ""] = param("rad/s", "angular rate beyond which no sample is believed")
 

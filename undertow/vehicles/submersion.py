@@ -40,8 +40,8 @@ _SPHERE = 3 / (4 * np.pi * FRESH_WATER)  # m^3/kg, cube of the radius of a spher
 def half_size(vehicle: Vehicle) -> Float[Array, "3"]:
     """Semi-axes of the ellipsoid, m: half of the vehicle's `size`, or the radius of a sphere of its displaced volume.
 
-    The volume is that of fresh water. The radius is a whole number of micrometres (almost: a binary fraction), so that it
-    has the same bits where many vehicles are built together.
+    The volume is that of fresh water. The radius is rounded to a micrometre, a binary one, so that it has the same bits
+    where many vehicles are built together.
     """
     if vehicle.size is not None:
         return as_array(vehicle.size) / 2
