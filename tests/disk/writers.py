@@ -144,8 +144,8 @@ def writers(inputs: Path) -> dict[str, Writer]:
         scenario = AXIS | {"controller": {"kind": "pid", "frequency": 2.0 + version}}
         (inputs / f"{version}.yaml").write_text(json.dumps(scenario))
         a_log(version).save(inputs / f"{version}.mcap")
-        study = {"scenario": "0.yaml", "trials": 2 + version, "vary": {"controller.frequency": {"uniform": [1, 2]}}}
-        (inputs / f"study{version}.yaml").write_text(json.dumps(study))
+        campaign = {"scenario": "0.yaml", "trials": 2 + version, "vary": {"controller.frequency": {"uniform": [1, 2]}}}
+        (inputs / f"study{version}.yaml").write_text(json.dumps(campaign))
     scenario, log = f"{inputs}/{{version}}.yaml", f"{inputs}/{{version}}.mcap"
     knowledge = lambda version: xr.Dataset({name: ("time", np.arange(4.0) + version) for name in _SIGNALS.values()})
     files = lambda version: {

@@ -167,4 +167,4 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     # In memory first: where a disk fails while the library writes to it, the process crashes.
     file = netCDF4.Dataset(path.name, "w", memory=2**16)
     dataset.dump_to_store(NetCDF4DataStore(file))
-    write_whole(path, file.close())
+    write_whole(path, bytes(file.close()))
