@@ -33,15 +33,15 @@ Vector6 = Float[Array, "6"]
 Matrix6 = Float[Array, "6 6"]
 
 FRESH_WATER = 1000.0  # kg/m^3
-_GRID = 2.0**-20  # m
+_GRID = 2.0**-40  # m, a picometre
 _SPHERE = 3 / (4 * np.pi * FRESH_WATER)  # m^3/kg, cube of the radius of a sphere of water over its mass
 
 
 def half_size(vehicle: Vehicle) -> Float[Array, "3"]:
     """Semi-axes of the ellipsoid, m: half of the vehicle's `size`, or the radius of a sphere of its displaced volume.
 
-    The volume is that of fresh water. The radius is rounded to a micrometre, a binary one, so that it has the same bits
-    where many vehicles are built together.
+    The volume is that of fresh water. The radius is rounded to a picometre, so that it has the same bits where many
+    vehicles are built together.
     """
     if vehicle.size is not None:
         return as_array(vehicle.size) / 2
