@@ -79,7 +79,7 @@ def test_share_is_one_when_deep_and_zero_in_the_air():
 def test_without_a_size_it_is_the_sphere_of_the_displaced_water():
     radius = float(PLANT.hull.half_size[0])
     displaced = 114.8 / (112.8 / 11.5)  # kg
-    assert FRESH_WATER * 4 / 3 * np.pi * radius**3 == pytest.approx(displaced, rel=3e-11)  # to a picometre
+    assert FRESH_WATER * 4 / 3 * np.pi * radius**3 == pytest.approx(displaced, rel=1e-12)
     np.testing.assert_array_equal(BOX.hull.half_size, SIZE / 2)
 
 
