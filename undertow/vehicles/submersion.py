@@ -33,21 +33,23 @@ Vector6 = Float[Array, "6"]
 Matrix6 = Float[Array, "6 6"]
 
 FRESH_WATER = 1000.0  # kg/m^3
+_GRID = 2.0**-44  # m, a twentieth of a picometre
 _SPHERE = 3 / (4 * np.pi * FRESH_WATER)  # m^3/kg, cube of the radius of a sphere of water over its mass
 
 
 def half_size(vehicle: Vehicle) -> Float[Array, "3"]:
     """Semi-axes of the ellipsoid, m: half of the vehicle's `size`, or the radius of a sphere of its displaced volume.
 
-    The volume is that of fresh water. The numbers that vehicles share are gathered in one factor, because XLA would round
-    them in another way where many vehicles are built together.
+    The volume is that of fresh water. The radius is rounded a little, so that it has the same bits where many
+    vehicles are built together.
     """
     if vehicle.size is not None:
         return as_array(vehicle.size) / 2
-    cube = vehicle.mass * (vehicle.buoyancy / vehicle.weight * _SPHERE)
+    displaced = vehicle.buoyancy * vehicle.mass / vehicle.weight  # kg
+    cube = displaced * _SPHERE
     if isinstance(cube, Tracer):
-        return jnp.broadcast_to(jnp.cbrt(cube), (3,))
-    return as_array(np.full(3, np.cbrt(np.asarray(cube))))
+        return jnp.broadcast_to(jnp.round(jnp.cbrt(cube) / _GRID) * _GRID, (3,))
+    return as_array(np.full(3, np.round(np.cbrt(np.asarray(cube)) / _GRID) * _GRID))
 
 
 def dry_share(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
