@@ -65,7 +65,7 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes | memoryview) -> None:
     """Write a file whole or not at all; text as UTF-8."""
     with replacing(path) as file:
         file.write_bytes(content.encode() if isinstance(content, str) else content)

@@ -162,9 +162,9 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         OSError: the folder cannot be written.
     """
-    import netCDF4  # takes a tenth of a second, which only a run that is saved needs
+    import netCDF4  # which only a run that is saved needs
 
     # In memory first: where a disk fails while the library writes to it, the process crashes.
     file = netCDF4.Dataset(path.name, "w", memory=2**16)
     dataset.dump_to_store(NetCDF4DataStore(file))
-    write_whole(path, bytes(file.close()))
+    write_whole(path, file.close())
