@@ -1,5 +1,8 @@
 """Run a scenario: outcome, metrics and a dataset from which the run can be repeated."""
 
+import errno
+import shutil
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -7,7 +10,6 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 import xarray as xr
-from xarray.backends import NetCDF4DataStore
 
 from undertow.analysis.metrics import Gathered, accumulators
 from undertow.analysis.success import Success
@@ -25,6 +27,8 @@ from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Initial, Loop
 from undertow.scenario.step_size import step_failure
+
+_OVERHEAD = 2**24  # bytes of a file of netCDF beside its numbers, at most
 
 
 class Executed(NamedTuple):
@@ -162,19 +166,13 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     Raises:
         OSError: the folder cannot be written.
     """
-    import netCDF4  # which only a run that is saved needs
-
-    # In memory first: where a disk fails while the library writes to it, the process crashes.
-    file = netCDF4.Dataset(path.name, "w", memory=2**16)
-    dataset.dump_to_store(NetCDF4DataStore(file))
-    write_whole(path, _without_padding(file.close()))
-
-
-def _without_padding(image: memoryview) -> memoryview:
-    """A file of HDF5 up to its end, which its superblock states: one in memory is filled up with zeros.
-
-    Without them a file that was cut off anywhere is a damaged one. Source: HDF5 File Format Specification 3.0, II.A.
-    """
-    version = image[8]
-    at = {0: 40, 1: 44}.get(version, 28)  # of the "end of file address"
-    return image[: int.from_bytes(image[at : at + 8], "little")]
+    # In a temporary folder with room for it first: where a disk fails while the library writes, the process crashes.
+    with tempfile.TemporaryDirectory() as folder:
+        if shutil.disk_usage(folder).free < dataset.nbytes + _OVERHEAD:
+            raise OSError(errno.ENOSPC, "no room for the run; free some, or set TMPDIR to another folder", folder)
+        file = Path(folder) / path.name
+        try:
+            dataset.to_netcdf(file, engine="netcdf4")
+        except RuntimeError as error:  # NetCDF: HDF error, for whatever the disk says
+            raise OSError(errno.EIO, f"it could not be written whole; is the disk full? ({error})", folder) from None
+        write_whole(path, file.read_bytes())
