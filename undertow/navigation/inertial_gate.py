@@ -18,10 +18,10 @@ Inertial = Float[Array, "6"]  # p, q, r, rad/s; specific force along forward, st
 
 # Largest acceleration of a vehicle whose actuators are not known, m/s^2 and rad/s^2; and what waves and tethers do to
 # one of which they are.
-_UNKNOWN = np.repeat([20.0, 100.0], 3)
-_LEAST = np.repeat([5.0, 20.0], 3)
+_UNKNOWN = 20.0, 100.0
+_LEAST = 5.0, 20.0
 _GRAVITY = 9.81  # m/s^2, which accelerometers of a vehicle at rest read
-_FULL_SCALE = np.repeat([35.0, 160.0], 3)  # of MEMS devices, rad/s and m/s^2: what is larger was not measured
+_FULL_SCALE = 35.0, 160.0  # of MEMS devices, rad/s and m/s^2: what is larger was not measured
 _RISE = 0.05  # s in which thrusters reach their largest force
 _DEVIATIONS = 8.0  # of the noise of a sample: the difference of two is below it
 _PATIENCE = 0.25  # s for which the last believed value stands for what the gate rejects
@@ -57,9 +57,11 @@ class InertialGate(eqx.Module):
     @property
     def _acceleration(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
         """The largest ones along and about the axes of the body, m/s^2 and rad/s^2."""
-        known = jnp.maximum(self.inertial_factor * self.authority, _LEAST)
-        reached = jnp.where(self.authority > 0, known, _UNKNOWN)
-        return reached[:3], reached[3:]
+        linear, angular = (
+            jnp.where(given > 0, jnp.maximum(self.inertial_factor * given, least), unknown)
+            for given, least, unknown in zip((self.authority[:3], self.authority[3:]), _LEAST, _UNKNOWN, strict=True)
+        )
+        return linear, angular
 
     @property
     def slew(self) -> Inertial:
@@ -77,7 +79,9 @@ class InertialGate(eqx.Module):
     def most(self) -> Inertial:
         """Largest value that a device reads and the vehicle reaches, rad/s and m/s^2."""
         linear, _ = self._acceleration
-        return jnp.minimum(jnp.concatenate([jnp.full(3, self.largest_rate), _GRAVITY + 2 * linear]), _FULL_SCALE)
+        rate, force = _FULL_SCALE
+        rates = jnp.full(3, jnp.minimum(self.largest_rate, rate))
+        return jnp.concatenate([rates, jnp.minimum(_GRAVITY + 2 * linear, force)])
 
     def start(self, values: Inertial) -> InertialMemory:
         """The memory of a vehicle whose first sample may be any."""
