@@ -64,6 +64,7 @@ def pretended(arguments):
         print("said")
         return int(arguments[1])
     try:
+        print("asleep", flush=True)
         time.sleep(60)
     except KeyboardInterrupt:
         return 130
@@ -76,7 +77,8 @@ def test_the_process_that_is_tested_says_how_a_call_ended(tmp_path):
         command.begin(["code", "5"])
         assert command.wait(60.0) == 5 and command.printed() == "said\n"
         command.begin(["sleep"])
-        time.sleep(0.5)
+        while command.printed() != "asleep\n":
+            time.sleep(0.01)
         command.send(signal.SIGINT)
         assert command.wait(20.0) == 130
         command.begin(["sleep"])
