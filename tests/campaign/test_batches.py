@@ -31,7 +31,8 @@ def columns(data, rows):
     return run_trials(text_of(data), "", rows)
 
 
-@pytest.mark.parametrize("backend", ["simd", pytest.param("xla", marks=pytest.mark.full)], indirect=True)
+@pytest.mark.full
+@pytest.mark.parametrize("backend", ["simd", "xla"], indirect=True)
 def test_rows_are_runs(campaign, backend):
     found = columns(campaign(), range(3))
     for trial in range(3):

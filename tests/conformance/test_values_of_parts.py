@@ -17,7 +17,7 @@ from undertow.core.param import tuning_ranges
 
 # Their programs take longest to compile, and tests of their own check what they compute.
 HEAVY = {("navigation", "kalman"), ("supervision", "supervisor"), ("controllers", "nmpc")}
-QUICK = ("faults", "sensors", "navigation", "power", "references", "thrusters")
+QUICK = ("sensors", "power", "references", "thrusters")
 
 
 def values_of(pairs):
@@ -45,12 +45,14 @@ def test_values_are_those_that_were_recorded(pairs):
         is_as_recorded(name, values)
 
 
+@pytest.mark.full
 def test_parameters_are_those_that_were_recorded():
     """All numbers of every part and of what it is made of, its defaults among them; nothing is compiled."""
     for pair in ALL:
         is_as_recorded(f"parameters of {'/'.join(pair)}", eqx.filter(make(*pair), eqx.is_inexact_array))
 
 
+@pytest.mark.full
 def test_ranges_of_gains_are_those_that_were_recorded():
     """Between which `undertow tune` searches."""
     for pair in ALL:

@@ -1,6 +1,7 @@
 """What holds a compiled program is not copied: a copy would go on with the numbers of the original, or with old ones."""
 
 import copy
+import functools
 import pickle
 
 import pytest
@@ -18,11 +19,15 @@ PENDULUM = {
 }
 
 
-@pytest.mark.parametrize("made", [make, lambda of: make_vec(of, num_envs=2), ut.Autopilot])
+@pytest.fixture(scope="module", params=[make, functools.partial(make_vec, num_envs=2), ut.Autopilot])
+def compiled(request):
+    return request.param(PENDULUM)
+
+
 @pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_copying_is_refused_with_the_remedy(made, how):
+def test_copying_is_refused_with_the_remedy(compiled, how):
     with pytest.raises(BadInput, match="must not be copied"):
-        how(made(PENDULUM))
+        how(compiled)
 
 
 def test_no_part_of_it_is_copied_either():

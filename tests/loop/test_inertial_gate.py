@@ -78,6 +78,7 @@ def test_samples_at_full_scale_move_nothing(kind, entry, size):
         assert signals["rejected_readings"][-1] == 0
 
 
+@pytest.mark.full
 def test_a_lasting_error_of_the_gyroscopes_leaves_the_estimate_to_the_other_sensors():
     """Half a second of 9 rad/s, which is believed after a quarter: the attitude follows the inclination."""
     speed, angle, _, signals = followed("kalman", glitch(2, 9.0, 50))

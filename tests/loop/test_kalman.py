@@ -78,8 +78,8 @@ def _followed(navigation, size, keys, states, first):
 
 
 def updated(own, state, elapsed, received, steps=1):
-    """State of a filter after steps that are alike: one program for all numbers in it."""
-    return _updated(own, state, elapsed, received, np.asarray(steps))
+    """State of a filter after steps that are alike: one program for all numbers in it, wherever the state is from."""
+    return _updated(own, jax.tree.map(np.asarray, state), elapsed, received, np.asarray(steps))
 
 
 @jax.jit

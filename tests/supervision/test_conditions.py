@@ -119,7 +119,7 @@ class Stepped:
         self.compiled = jax.jit(functools.partial(_steps, self.parts))
         # All outputs move: a reading that keeps its bits is stuck.
         start = plant.initial_state(0.01 * np.arange(6), np.array([0.3, 0, 0, 0, 0, 0]))
-        # As NumPy arrays: what JAX knows of the types of its own would be another program.
+        # As NumPy arrays here and after every block: what JAX knows of the types of its own would be another program.
         self.first, *begun = jax.tree.map(np.asarray, _begun(self.parts, start))
         self.begun = (jax.tree.map(np.asarray, start), *begun)
         self.restart()
@@ -154,8 +154,9 @@ class Stepped:
         padded = ahead + [UNTOUCHED] * (BLOCK - count)
         rows = jax.tree.map(lambda *values: np.array(values, dtype=float), *padded)
         times = T * (self.k + np.arange(BLOCK))
-        self.now, found = self.compiled(np.asarray(count), times, (*self.now, self.first), rows)
-        outputs, states, reasons = (np.asarray(values)[:count] for values in found)
+        found = self.compiled(np.asarray(count), times, (*self.now, self.first), rows)
+        self.now, found = jax.tree.map(np.asarray, found)
+        outputs, states, reasons = (values[:count] for values in found)
         self.k += count
         self.outputs.extend(outputs)
         self.states.extend(
