@@ -54,29 +54,30 @@ class Writer(NamedTuple):
     """What writes results.
 
     Attributes:
-        write: writes version 0 or 1 of them into a folder; both may be there.
+        write: writes version 0 or 1 of them into a folder; both may be there. What it returns it said on stderr.
         whole: why a file is not whole that has neither the earlier nor the new bytes, by its path; "" where it is.
         marker: once this file is the new one, files of an earlier result may be gone.
         alike: how much the bytes of a version may differ from one time to the next, as a share of its size.
         remade: where the files are that the next try makes again from what was stored.
     """
 
-    write: Callable[[Path, int], None]
+    write: Callable[[Path, int], str | None]
     whole: Callable[[Path], str] = lambda path: "neither the earlier nor the new one"
     marker: str = ""
     alike: float = 0.0
     remade: str = ""
 
 
-def words(*given: str) -> Callable[[Path, int], None]:
-    """A command; {folder} and {version} are replaced."""
+def words(*given: str) -> Callable[[Path, int], str]:
+    """A command, which gives what it said on stderr; {folder} and {version} are replaced."""
 
-    def write(folder: Path, version: int) -> None:
+    def write(folder: Path, version: int) -> str:
         said = io.StringIO()
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
             code = command([word.format(folder=folder, version=version) for word in given])
         if code not in (0, 1):
             raise Refused(code, said.getvalue())
+        return said.getvalue()
 
     return write
 
@@ -133,8 +134,13 @@ def of_a_run(path: Path) -> str:
     return "" if path.read_text().endswith("</html>\n") else "a part of a page"
 
 
-def in_store(path: Path) -> str:
-    return "" if "trials.zarr" in path.parts else "neither the earlier nor the new one"
+def of_a_campaign(path: Path) -> str:
+    """A store is whole by its own rules, and a page lacks a figure that failed."""
+    return of_a_run(path) if path.suffix == ".html" else "neither the earlier nor the new one" * (not in_store(path))
+
+
+def in_store(path: Path) -> bool:
+    return "trials.zarr" in path.parts
 
 
 def writers(inputs: Path) -> dict[str, Writer]:
@@ -155,9 +161,9 @@ def writers(inputs: Path) -> dict[str, Writer]:
     }
     out = ("--out", "{folder}/out", "--overwrite")
 
-    def study(folder: Path, version: int) -> None:
+    def study(folder: Path, version: int) -> str:
         resume = ["--resume"] if version else []
-        words("campaign", f"{inputs}/study{{version}}.yaml", "--out", "{folder}/out", *resume)(folder, version)
+        return words("campaign", f"{inputs}/study{{version}}.yaml", "--out", "{folder}/out", *resume)(folder, version)
 
     return {
         "run.nc": Writer(lambda folder, version: save(a_dive(version), folder / "run.nc"), alike=0.01),
@@ -174,7 +180,7 @@ def writers(inputs: Path) -> dict[str, Writer]:
         "simulate": Writer(words("simulate", scenario, *out), of_a_run, "out/run.nc", 0.05),
         "run": Writer(words("run", scenario, "--fast", *out), of_a_log, "out/run.mcap", 0.2),
         "analyze": Writer(words("analyze", scenario, *out), of_a_run, "out/prediction.json", 0.05),
-        "campaign": Writer(study, in_store, remade="out/worst/"),
+        "campaign": Writer(study, of_a_campaign, remade="out/worst/"),
     }
 
 
@@ -194,11 +200,14 @@ def same(writer: Writer, data: bytes, other: bytes | None) -> bool:
     return abs(len(data) - len(other)) <= writer.alike * len(other)
 
 
-def fault(writer: Writer, folder: Path, disk: Any, at: int, how: str) -> str:
+def fault(writer: Writer, folder: Path, disk: Any, at: int, how: str, state: dict[str, bytes]) -> str:
     """Write version 1 while call `at` fails; what is wrong with the way in which that ends."""
     disk.disk_fail(at, HOW[how])
     try:
-        writer.write(folder, 1)
+        said = writer.write(folder, 1)
+        disk.disk_fail(-1, 0)
+        if how != "killed" and "could not be" not in (said or ""):
+            return unsaid(writer, visible(folder), state)
     except (OSError, BadInput) as error:
         return "more than a line" * ("\n" in str(error) and how != "killed")
     except Refused as refused:
@@ -210,6 +219,14 @@ def fault(writer: Writer, folder: Path, disk: Any, at: int, how: str) -> str:
     finally:
         disk.disk_fail(-1, 0)
     return ""
+
+
+def unsaid(writer: Writer, found: dict[str, bytes], state: dict[str, bytes]) -> str:
+    """What a writer kept to itself that said of no trouble: all of version 1 must be there."""
+    missing = sorted(state.keys() - found.keys())
+    different = [name for name, data in found.items() if name in state and not same(writer, data, state[name])]
+    different = [name for name in different if not in_store(Path(name))]
+    return f"says nothing of {(missing + different)[0]}" if missing + different else ""
 
 
 def is_error(line: str) -> bool:
@@ -263,7 +280,7 @@ def tried(name: str, writer: Writer, work: Path, most: int, disk: Any) -> dict[s
         for at in chosen:
             shutil.rmtree(work)
             shutil.copytree(earlier, work)
-            why = fault(writer, work, disk, at, how) or trouble(writer, work, states)
+            why = fault(writer, work, disk, at, how, states[1]) or trouble(writer, work, states)
             if not why and "{version}" not in name:
                 why = again_if_possible(writer, work, states)
             if why:
