@@ -15,7 +15,7 @@ from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
 from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
-from undertow.interop.ros2.link import Link, why_nothing
+from undertow.interop.ros2.link import DIFFERENT_NETWORKS, Link, why_nothing
 from undertow.interop.ros2.node import Reporter, Topics
 from undertow.interop.ros2.to_messages import odometry_of, target_message
 from undertow.logs.frames import quaternions
@@ -311,7 +311,7 @@ def test_missing_odometry_is_explained(setup, monkeypatch):
     nothing(node, peer)
     assert said.warnings == ["Warning: /odom has a publisher that sends nothing"]
     peer.link.close()
-    nothing_more = "Warning: nobody publishes /odom (nav_msgs/msg/Odometry). Is the domain right?"
+    nothing_more = f"Warning: nobody publishes /odom (nav_msgs/msg/Odometry). {DIFFERENT_NETWORKS}"
     until(lambda: node.spin(0.02) or said.warnings[1:] == [nothing_more])
 
 
@@ -368,7 +368,7 @@ def test_why_nothing_arrives(empty_domain):
     with Link(domain, True) as one, Link(domain, True, "best-effort") as other:
         inlet = one.subscriber("/odom", ros.Odometry)
         why = lambda: why_nothing(one, inlet, ros.Odometry)
-        assert "nobody publishes /odom (nav_msgs/msg/Odometry). Is the domain right?" in why()
+        assert "nobody publishes /odom (nav_msgs/msg/Odometry). Is the domain right, and --localhost" in why()
         other.publisher("/vehicle/odom", ros.Odometry)
         until(lambda: "is published on /vehicle/odom: use --remap" in why())
         other.publisher("/odom", ros.Odometry)

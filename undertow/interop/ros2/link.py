@@ -228,6 +228,10 @@ class Link:
         return made
 
 
+# What makes that two sides see nothing of each other.
+DIFFERENT_NETWORKS = "Is the domain right, and --localhost given to both sides or to neither?"
+
+
 def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     """Why nothing arrives at a subscriber, in a sentence."""
     there, expected = link.topics(), ros_type(kind)
@@ -241,7 +245,7 @@ def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     if inlet.publishers():
         return f"{inlet.topic} has a publisher that sends nothing"
     alike = sorted(name for name, one in there.items() if one == expected)
-    hint = f"{expected} is published on {', '.join(alike)}: use --remap" if alike else "Is the domain right?"
+    hint = f"{expected} is published on {', '.join(alike)}: use --remap" if alike else DIFFERENT_NETWORKS
     return f"nobody publishes {inlet.topic} ({expected}). {hint}"
 
 
