@@ -314,6 +314,17 @@ def test_a_condition_leads_to_its_state_in_its_time(make, name):
         assert run.states[-1][1] == name
 
 
+def test_slow_swings_from_limit_to_limit_are_chattering():
+    """Every 0.4 s, which is a quarter of the variation that counts; every 2 s is what large waves do."""
+    run = stepped(on_axes, "")
+    for seconds, chatters in ((0.4, True), (2.0, False)):
+        run.restart()
+        run.steps(0.2)
+        run.steps(12.0, lambda k: Tampering(command=1e3 * (-1) ** int(k * T // seconds)))  # noqa: B023 - used at once
+        assert run.z.variation < 5
+        assert ((State.SAFE, "chattering") in run.states) is chatters
+
+
 @ON_BOTH
 def test_output_that_is_not_finite_never_leaves(make):
     run = stepped(make, "")

@@ -18,6 +18,7 @@ Scalar = Float[Array, ""]
 CLOCK_FAULT = 10.0  # sampling times between two steps
 RESTART_WINDOW = 600.0  # s in which restarts count
 
+_SWINGS = 0.8  # per second; waves of 3 s that are too large for the thrusters make them swing 0.7 times per second
 _OVERRUN = 1.5  # sampling times between two steps
 _NEAR_VERTICAL = np.deg2rad(75)
 _INFEASIBLE = 0.05  # share of the desired acceleration
@@ -44,6 +45,7 @@ class Occasion(NamedTuple):
     contradicted: Scalar  # log-likelihood ratio against the reported input relative to its threshold
     errors: tuple[Scalar, Scalar]  # tracking errors of position and attitude relative to the allowed ones
     variation: Scalar  # of the input, ranges per second
+    swings: Scalar  # of the input from limit to limit per second, those of the thruster that swings most
     restarts: Scalar  # within `RESTART_WINDOW`
     place_held: Bool[Array, ""]  # whether the law holds a place in place of its reference
     broken: Bool[Array, ""]  # whether the state of the law is not finite
@@ -75,7 +77,7 @@ class ConditionValues(eqx.Module):
         controlled = {
             "output_not_finite": (~jnp.isfinite(view.command)).sum(dtype=float),
             "saturated": at_limit.sum(dtype=float),
-            "chattering": what.variation,
+            "chattering": jnp.maximum(what.variation / self.max_variation, what.swings / _SWINGS),
             "reference_infeasible": 1 - signals.get("attained_share", jnp.ones(())),
             "position_error": what.errors[0],
             "attitude_error": what.errors[1],
@@ -112,7 +114,6 @@ class ConditionValues(eqx.Module):
         )
         found |= {
             "restarts_exhausted": float(self.restarts),
-            "chattering": self.max_variation,
             "reference_infeasible": _INFEASIBLE,
             "near_vertical": _NEAR_VERTICAL,
             "overrun": _OVERRUN,

@@ -200,8 +200,9 @@ CONDITIONS = (
     Condition("saturated", "inputs at their limit", "0", 1.0, _NEVER, 1.0, "The law knows the applied input"),
     Condition(
         "chattering",
-        "variation of the input, ranges from limit to limit per second",
-        "`max_variation`",
+        "variation of the input relative to `max_variation`, or swings of a thruster from limit to limit relative to "
+        "0.8 per second",
+        "1",
         1.0,
         5.0,
         1.0,

@@ -41,6 +41,7 @@ from undertow.supervision.conditions import (
 )
 from undertow.supervision.fault_tolerant_law import FaultTolerantController
 from undertow.supervision.held_place import PlaceState, after_jump, is_another, no_place, released, target
+from undertow.supervision.limit_swings import SwingState, no_swings, swung
 from undertow.supervision.measurement_gate import GateState, MeasurementGate
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.reported_input import ReportedInput, ReportState
@@ -95,6 +96,7 @@ class SupervisedState(NamedTuple):
     transfer: Int[Array, ""]  # 1 where control has begun with this step, and `beyond` is not known yet
     beyond: Inputs  # by which the output exceeds that of the law since a transfer; it ends no slower than `slew`
     variation: Float[Array, ""]  # of the input, ranges per second, averaged
+    swings: SwingState
     restarts: Float[Array, " kept"]  # times of the last restarts, s, the latest first
     restarted: Int[Array, ""]  # how often
     fallback_controls: Int[Array, ""]
@@ -167,6 +169,7 @@ class Supervised(AbstractGatedController):
             transfer=jnp.ones((), dtype=int),
             beyond=jnp.zeros_like(self.safe_output),
             variation=zero,
+            swings=no_swings(self.safe_output),
             restarts=jnp.full(self.watch.restarts + 1, _LONG_AGO),
             restarted=none,
             fallback_controls=none,
@@ -202,12 +205,14 @@ class Supervised(AbstractGatedController):
         broken = ~all_finite(laws)
         allowance = self._allowance(z, view, elapsed)
         variation = self._variation(z, view, u, step)
-
+        swings = swung(z.swings, view.output, self.watch.low, self.watch.high, step)
+        swings = jax.tree.map(lambda swing: jnp.where(view.controls, swing, 0.0), swings)
         occasion = Occasion(
             u=u,
             contradicted=contradicted,
             errors=self.tracking.ratios(allowance, self.model.coordinates, view.passed.measurement, view.r),
             variation=variation,
+            swings=swings.rate.max(),
             restarts=(z.time - z.restarts < RESTART_WINDOW).sum(dtype=float),
             broken=broken,
             place_held=z.place.held > 0,
@@ -266,6 +271,7 @@ class Supervised(AbstractGatedController):
             transfer=again.astype(int),
             beyond=jnp.where(view.controls, view.beyond, 0.0),
             variation=variation,
+            swings=swings,
             restarts=jnp.where(switches, _LONG_AGO, times),
             restarted=z.restarted + jnp.where(counted, 1, 0),
             fallback_controls=by_fallback.astype(int),
