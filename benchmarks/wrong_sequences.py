@@ -103,6 +103,7 @@ ALL = (1.0,) * 8
 NAMED = {
     "nothing wrong": (),
     "position +-0.45 m, alternating": (Wrong("position", "alternating", 0.45, NORTH),),
+    "position +-0.3 m, twice a second": (Wrong("position", "sine", 0.3, NORTH, period=0.5),),
     "position +0.9 m per step, 2 s": (Wrong("position", "ramp", 0.9, NORTH, length=2.0),),
     "position reset by 100 m": (Wrong("position", "constant", 100.0, NORTH),),
     "heading +0.45 rad per step": (Wrong("attitude", "ramp", 0.45, YAW),),
