@@ -1,5 +1,6 @@
 """`undertow run` as users run it: results, replay, Ctrl-C, SIGTERM, kill -9, and errors of one line."""
 
+import errno
 import json
 import os
 import signal
@@ -161,6 +162,21 @@ def test_a_signal_ends_it_with_the_safe_output(scenario, tmp_path, peer):
     ended_with_the_safe_output(tmp_path / "runs/rov", peer, out, error)
 
 
+def test_nobody_reads_the_output(scenario, tmp_path, peer):
+    """The pipe is closed, as by a terminal that is gone: the end is the same, but for its code."""
+    process = started(peer, "--safe", "0.5", "--max-age", "60")
+    controlled(peer, lambda: process.poll() is not None)
+    process.stdout.close()
+    process.stderr.close()
+    process.send_signal(signal.SIGTERM)
+    peer.answer(30, until=lambda: process.poll() is not None)
+    peer.answer(0.3)
+    assert process.wait(30) == 141
+    assert all((one.values == 0.5).all() for one in peer.commands[-3:])
+    found = json.loads((tmp_path / "runs/rov/statistics.json").read_text())
+    assert found["steps"] == len(read_log(tmp_path / "runs/rov/run.mcap")["elapsed"].time) > 40
+
+
 def test_ctrl_c_ends_it_with_the_safe_output(scenario, tmp_path, peer, capfd):
     ended = threading.Event()
 
@@ -221,6 +237,18 @@ def test_a_full_disk_does_not_stop_the_controller(scenario, tmp_path):
     assert done.returncode == 4 and "later steps are not recorded" in done.stderr
     assert json.loads((tmp_path / "runs/axis/statistics.json").read_text())["steps"] == 1000
     assert 5 < len(read_log(tmp_path / "runs/axis/run.mcap")["elapsed"].time) < 500
+
+
+def test_a_disk_that_takes_no_statistics_costs_no_table(scenario, tmp_path, monkeypatch, capsys):
+    def full(path, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "axis.yaml").write_text(AXIS)
+    monkeypatch.setattr("undertow.cli.run.write_whole", full)
+    assert run(["run", "axis.yaml", "--fast", "--out", "flight"]) == 4
+    said = capsys.readouterr()
+    assert "Ended: " in said.out
+    assert "flight/statistics.json could not be written: No space left on device" in said.err
 
 
 def test_without_a_vehicle_nothing_is_written(scenario, tmp_path, peer, capsys):

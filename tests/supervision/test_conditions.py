@@ -427,3 +427,27 @@ def test_damage_to_the_memory_never_leaves_and_is_mended(make, field):
     assert run.states[-1] == (State.ACTIVE, "")
     assert "memory_damaged" in {one.reason for one in transitions(run.z.log)}
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(run.z))
+    assert 1 <= run.z.restarted <= 2  # a law that begins from what a damaged gate lets through begins twice
+
+
+@pytest.mark.parametrize("request_, state", [(Request.STOP, State.STOPPED), (Request.HOLD, State.READY)])
+def test_damage_to_the_memory_forgets_no_request(request_, state):
+    run = stepped(on_axes, "")
+    run.restart()
+    run.steps(0.2)
+    run.steps(0.2, Tampering(request=request_))
+    run.z = run.z._replace(output=np.full_like(run.z.output, np.nan))
+    run.steps(0.2, Tampering(request=request_))
+    assert run.states[-1] == (state, "operator")
+    assert all((output == 0.0).all() for output in run.outputs[20:])
+
+
+def test_damage_to_the_memory_again_and_again_ends_in_safe():
+    """Each time is a restart, as of a law that fails."""
+    run = stepped(on_axes, "")
+    run.restart()
+    for _ in range(5):
+        run.steps(0.2)
+        run.z = run.z._replace(variation=np.full_like(run.z.variation, np.nan))
+    run.steps(0.2)
+    assert run.states[-1] == (State.SAFE, "restarts_exhausted")

@@ -73,6 +73,22 @@ def test_any_time_and_reading_gives_an_input_within_limits(autopilot, dt):
         assert (np.abs(output) <= 16).all()
 
 
+@pytest.mark.parametrize("speed", [5.0, 14.0])
+def test_no_reading_damages_the_memory_or_ends_a_stop(autopilot, speed):
+    """A motion that the model's drag would stop within a step, for 5 s; and numbers whose squares are infinite."""
+    autopilot.start(*REST)
+    autopilot.step(*REST)
+    autopilot.request("stop")
+    for _ in range(100):
+        autopilot.step(np.zeros(3), np.array([speed, 0.7 * speed, 0, 0, 0, 0]), np.zeros(3))
+    for size in (1e155, 1e300):
+        autopilot.step(np.full(3, size), np.zeros(6), np.zeros(3))
+        autopilot.step(np.zeros(3), np.full(6, size), np.zeros(3))
+    outputs = [autopilot.step(*REST) for _ in range(40)]
+    assert autopilot.state == ("STOPPED", "operator") and (np.array(outputs) == 0).all()
+    assert "memory_damaged" not in {one.reason for one in autopilot.transitions()}
+
+
 def test_a_damaged_memory_is_mended(autopilot):
     autopilot.start(*REST)
     autopilot.step(*REST)

@@ -33,7 +33,7 @@ from undertow.supervision.supervised_controller import SupervisedState, state_in
 from undertow.supervision.supervisor import largest_estimate
 from undertow.supervision.transition_log import Transition, transitions
 
-_NO_ROTATION = 1e-6  # length of a quaternion that is none
+_NO_ROTATION = 1e-6  # largest entry of a quaternion that is none
 
 
 class Autopilot(Uncopied):
@@ -229,11 +229,13 @@ class Autopilot(Uncopied):
         """One control step.
 
         Args:
-            position: as for `start`; entries that are not finite were not measured, likewise below.
+            position: as for `start`; entries that are not finite were not measured, likewise below, and neither was a
+                quaternion of zeros.
             velocity: as for `start`.
             attitude: as for `start`.
             target: as for `start`.
-            applied: input applied since the last step, in the unit of the plant's input; None for the commanded one.
+            applied: input applied since the last step, in the unit of the plant's input; None, and entries that are not
+                finite, for the commanded one.
             propellers: as for `start`; None where they were not measured.
             health: as for `start`.
             dt: time since the last step, s; None for the sampling time.
@@ -242,11 +244,11 @@ class Autopilot(Uncopied):
             The output.
 
         Raises:
-            BadInput: a shape is wrong, a target or an applied input is not finite, or `start` was not called.
+            BadInput: a shape is wrong, a target is not finite, or `start` was not called.
         """
         self._check_started("step")
         motion = self._motion(position, velocity, attitude)
-        given = self._command.copy() if applied is None else self._input(applied)
+        given = self._command.copy() if applied is None else self._reported(applied)
         report = self._report(propellers, np.nan)
         goal = None if target is None else self._target(target)  # before anything changes
         healthy = self._health(health)
@@ -401,8 +403,9 @@ class Autopilot(Uncopied):
         shapes = map(np.shape, self._begin.inputs.motion)
         given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
         motion = Motion(*(numbers(name, value, shape) for name, value, shape in given))
-        if np.shape(motion.attitude) == (4,) and np.linalg.norm(motion.attitude) < _NO_ROTATION:
-            raise BadInput("attitude", "be a quaternion of some length", "zero")
+        quaternion = np.shape(motion.attitude) == (4,)
+        if quaternion and not _NO_ROTATION <= np.abs(motion.attitude).max() <= 1 / _NO_ROTATION:
+            return motion._replace(attitude=np.full(4, np.nan))  # as drivers say that they have none yet
         return motion
 
     def _report(self, propellers: Any, missing: float) -> Any:
@@ -453,6 +456,11 @@ class Autopilot(Uncopied):
         found = numbers("applied", applied, self._command.shape)
         checks.finite("applied", found)
         return found
+
+    def _reported(self, applied: Any) -> np.ndarray:
+        """The applied input; for entries that are not finite the commanded one."""
+        found = numbers("applied", applied, self._command.shape)
+        return np.where(np.isfinite(found), found, self._command)
 
     def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""

@@ -45,6 +45,8 @@ def _count(rest: Sequence[str], number: int, form: str) -> None:
 def _described(path: Path, mapping: Path | None, out: Path | None, overwrite: bool) -> int:
     if out is not None:
         _check_new(out, (".mcap", ".csv"), overwrite)
+        if out.exists() and path.exists() and out.samefile(path):
+            raise BadInput("--out", "be another file than the log itself", str(out))
     log = read_log(path, mapping)
     console = wide_console()
     _print(log, console)

@@ -33,7 +33,7 @@ def undertow(
     """Simulate, analyse and tune robust adaptive control of underwater vehicles with voltage-driven thrusters.
 
     Exit codes: 0 done; 1 done, but a run failed; 2 bad input; 3 internal error; 4 files could not be read or written;
-    130 interrupted by Ctrl-C; 143, 129 and 131 ended by SIGTERM, SIGHUP and SIGQUIT.
+    130 interrupted by Ctrl-C; 143, 129 and 131 ended by SIGTERM, SIGHUP and SIGQUIT; 141 nobody reads the output.
     """
     if traceback:
         os.environ["UNDERTOW_TRACEBACK"] = "1"

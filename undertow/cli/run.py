@@ -79,9 +79,10 @@ class _Stop:
         """Inside, signals do not raise: the loop asks, and ends with its safe output."""
 
         def note(number: int, frame: FrameType | None) -> None:
-            if not self.number:
-                os.write(2, b"\nInterrupted: stopping.\n")
-            self.number = number
+            first, self.number = not self.number, number
+            if first:
+                with contextlib.suppress(OSError):  # nobody reads it: the terminal is gone, or the pipe closed
+                    os.write(2, b"\nInterrupted: stopping.\n")
 
         before = {one: signal.signal(one, note) for one in ending_signals()}
         try:
@@ -143,8 +144,12 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
                 reason = loop.run(periods=steps)
         if loop.statistics.steps:
             found = _data(loop.statistics, link, autopilot, reason, options)
-            write_whole(folder / "scenario.yaml", dump(built.resolved))
-            write_whole(folder / "statistics.json", json.dumps(found, indent=2) + "\n")
+            texts = {"scenario.yaml": dump(built.resolved), "statistics.json": json.dumps(found, indent=2) + "\n"}
+            for name, text in texts.items():
+                try:
+                    write_whole(folder / name, text)
+                except OSError as error:
+                    troubles.append(f"{folder / name} could not be written: {error.strerror}")
             _print(found, folder, options.json)
         else:
             remove(folder / _BEFORE)

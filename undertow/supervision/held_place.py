@@ -23,7 +23,7 @@ class PlaceState(NamedTuple):
 
     pursued: Target  # the reference, or a place at rest
     held: Int[Array, ""]  # 1 where it is a place
-    jumped: Int[Array, ""]  # 1 in SAFE because of readings that have jumped
+    jumped: Int[Array, ""]  # 1 where control has ended because of readings that have jumped
 
 
 def no_place(r: Target) -> PlaceState:
@@ -37,12 +37,15 @@ def target(state: PlaceState, r: Target) -> Target:
     return jax.tree.map(lambda place, new: jnp.where(state.held > 0, place, new), state.pursued, r)
 
 
-def after_jump(state: PlaceState, safe: Flag, jumps: Flag, begins: Flag, y: Measurement, r: Target) -> PlaceState:
+def after_jump(
+    state: PlaceState, waits: Flag, safe: Flag, jumps: Flag, begins: Flag, y: Measurement, r: Target
+) -> PlaceState:
     """The state with one more step.
 
     Args:
         state: before.
-        safe: whether the supervisor is in SAFE after this step.
+        waits: whether nobody controls after this step.
+        safe: whether the supervisor is in SAFE then.
         jumps: whether readings that have jumped ask for that.
         begins: whether control begins with the next step.
         y: measurement, as the gate lets it through.
@@ -50,7 +53,7 @@ def after_jump(state: PlaceState, safe: Flag, jumps: Flag, begins: Flag, y: Meas
     """
     stays = begins & (state.jumped > 0)
     pursued = jax.tree.map(lambda here, on: jnp.where(stays, here, on), _place(y, r), target(state, r))
-    jumped = safe & ((state.jumped > 0) | jumps)
+    jumped = waits & ((state.jumped > 0) | (safe & jumps))
     return PlaceState(pursued, jnp.where(stays, 1, state.held).astype(int), jumped.astype(int))
 
 

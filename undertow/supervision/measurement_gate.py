@@ -23,6 +23,7 @@ Scalar = Float[Array, ""]
 
 # Larger reports of the actuators are none of a propeller, rad/s and rad/s^2.
 _FASTEST = 1e5
+_LARGEST = 1e12  # of any reading, in any unit
 
 
 class GateState(NamedTuple):
@@ -49,6 +50,13 @@ class Passed(NamedTuple):
     noise: Scalar  # mean size of the differences relative to the largest one
     missing: Scalar  # motion missing from stuck readings relative to its limit
     unreported: Scalar  # entries of the report of the actuators that are not finite, or no speed of a propeller
+
+
+def readable(y: Measurement) -> Measurement:
+    """The measurement with NaN for numbers that are no motion in any unit: their squares might be infinite."""
+    read = lambda array: jnp.where(jnp.abs(array) <= _LARGEST, array, jnp.nan)
+    body = y.body and y.body._replace(nu=read(y.body.nu))
+    return y._replace(position=read(y.position), velocity=read(y.velocity), body=body)
 
 
 class MeasurementGate(eqx.Module):
@@ -139,9 +147,19 @@ class MeasurementGate(eqx.Module):
         )
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:
-        """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s)."""
+        """State one step later, for a rate of the velocity (m/s^2, rad/s^2) by the model, and the time passed (s).
+
+        A prediction stays within what is plausible: one that is made from predictions again and again, by steps that
+        are too long for the drag of a fast vehicle, would grow until it is no number.
+        """
         y = passed.measurement
-        expected = predicted(y, rate, dt)
+        now, expected = motion_of(y), predicted(y, rate, dt)
+        speed = _each(expected.velocity, self.max_speed, self.max_rate)
+        expected = expected._replace(
+            position=jnp.clip(expected.position, -self.max_distance, self.max_distance),
+            velocity=jnp.clip(expected.velocity, -speed, speed),
+        )
+        expected = Motion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, now, strict=True)))
         return GateState(expected, y.velocity, passed.stuck, passed.innovations, jnp.asarray(dt), y.actuator)
 
     def _sizes(self, read: Motion) -> Motion:

@@ -42,7 +42,7 @@ from undertow.supervision.conditions import (
 from undertow.supervision.fault_tolerant_law import FaultTolerantController
 from undertow.supervision.held_place import PlaceState, after_jump, is_another, no_place, released, target
 from undertow.supervision.limit_swings import SwingState, no_swings, swung
-from undertow.supervision.measurement_gate import GateState, MeasurementGate
+from undertow.supervision.measurement_gate import GateState, MeasurementGate, readable
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.reported_input import ReportedInput, ReportState
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
@@ -130,6 +130,7 @@ class Supervised(AbstractGatedController):
         checks.finite("safe_output", self.safe_output)
 
     def init(self, y: Measurement, r: Target) -> SupervisedState:
+        y = readable(y)
         gate = self.gate.init(y)
         passed = self.gate.pass_through(gate, y, jnp.asarray(True))
         target, _ = self._checked(Target(*map(jnp.zeros_like, r)), r)
@@ -241,7 +242,7 @@ class Supervised(AbstractGatedController):
         again = begins | diverged | switches | damaged
         place = released(z.place, is_another(z.reference, view.given, self.model.coordinates, elapsed))
         jumps, safe = self._jumped(conditions), state == int(State.SAFE)
-        place = after_jump(place, safe, jumps, begins, view.passed.measurement, view.given)
+        place = after_jump(place, ~_controls(state), safe, jumps, begins, view.passed.measurement, view.given)
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
         # What has begun again gets its time before it is judged.
@@ -282,12 +283,30 @@ class Supervised(AbstractGatedController):
         return after._replace(law=law, fallback=fallback)
 
     def _mended(self, after: SupervisedState, z: SupervisedState, y: Measurement) -> SupervisedState:
-        """The state without laws after damage to the memory: as at the start, with what can be read of the log."""
+        """The state without laws after damage to the memory: as at the start, but for what may not be forgotten.
+
+        That is what the operator asked for, whether control was stopped, which conditions ask for SAFE, the place that
+        is held, and the restarts, of which this is one.
+        """
         none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
+        y = readable(y)
         new = self._fresh((), (), self.gate.init(y), y, none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
-        entry = (time, new.state, jnp.asarray(code_of(MEMORY)), *new.cause)
-        new = new._replace(reason=entry[2], time=time, log=logged(log, jnp.asarray(True), entry))
+        stopped = z.state == int(State.STOPPED)
+        state, reason = jnp.where(stopped, z.state, new.state), jnp.where(stopped, z.reason, code_of(MEMORY))
+        new = new._replace(
+            state=state,
+            reason=reason,
+            time=time,
+            log=logged(log, jnp.asarray(True), (time, state, reason, *new.cause)),
+            place=_readable(z.place),
+            conditions=_readable(z.conditions),
+            restarts=jnp.concatenate([time[None], _long_ago(z.restarts)[:-1]]),
+            restarted=z.restarted + 1,
+            safe_for=_readable(z.safe_for),
+            fallback_controls=z.fallback_controls,
+            request=z.request,
+        )
         return jax.tree.map(lambda fresh, old: fresh.astype(old.dtype), new, after)
 
     def known_acceleration(self, z: SupervisedState, y: Measurement, u_applied: Inputs) -> Outputs:
@@ -298,6 +317,7 @@ class Supervised(AbstractGatedController):
 
     def _view(self, z: SupervisedState, y: Measurement, r: Target) -> View:
         controls = _controls(z.state)
+        y = readable(y)
         passed = self.gate.pass_through(z.gate, y, ~controls)
         given, rejected = self._checked(z.reference, r)
         r = target(z.place, given)
@@ -443,6 +463,11 @@ class Supervised(AbstractGatedController):
 def _readable(tree: PyTree) -> PyTree:
     """A tree with zeros for what is not finite."""
     return jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, jnp.zeros_like(leaf)), tree)
+
+
+def _long_ago(times: Array) -> Array:
+    """Times of restarts, of which those that cannot be read were long ago."""
+    return jnp.where(jnp.isfinite(times), times, _LONG_AGO)
 
 
 def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
