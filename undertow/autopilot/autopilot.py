@@ -187,6 +187,10 @@ class Autopilot(Uncopied):
         motion = self._motion(position, velocity, attitude)
         for name, value in zip(Motion._fields, motion, strict=True):
             checks.finite(name, value)
+        if _is_no_rotation(motion.attitude):
+            raise BadInput(
+                "attitude", "be a quaternion of some length", f"of length {np.hypot.reduce(motion.attitude):.3g}"
+            )
         before = np.zeros_like(self._command) if applied is None else self._input(applied)
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
@@ -248,6 +252,8 @@ class Autopilot(Uncopied):
         """
         self._check_started("step")
         motion = self._motion(position, velocity, attitude)
+        if _is_no_rotation(motion.attitude):
+            motion = motion._replace(attitude=np.full(4, np.nan))  # so drivers say that they have none yet
         given = self._command.copy() if applied is None else self._reported(applied)
         report = self._report(propellers, np.nan)
         goal = None if target is None else self._target(target)  # before anything changes
@@ -402,11 +408,7 @@ class Autopilot(Uncopied):
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
         shapes = map(np.shape, self._begin.inputs.motion)
         given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
-        motion = Motion(*(numbers(name, value, shape) for name, value, shape in given))
-        quaternion = np.shape(motion.attitude) == (4,)
-        if quaternion and not _NO_ROTATION <= np.abs(motion.attitude).max() <= 1 / _NO_ROTATION:
-            return motion._replace(attitude=np.full(4, np.nan))  # as drivers say that they have none yet
-        return motion
+        return Motion(*(numbers(name, value, shape) for name, value, shape in given))
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
@@ -520,3 +522,8 @@ def _largest_estimate(loop: ClosedLoop) -> Any:
     """Largest plausible estimate of the uncertainty; without limit where the law has no nominal model."""
     model = getattr(loop.controller, "model", None)
     return np.inf if model is None else np.asarray(largest_estimate(authority_of(model, loop.plant)))
+
+
+def _is_no_rotation(attitude: np.ndarray) -> bool:
+    """Whether it is a quaternion of no length, or of one that no rounding gives."""
+    return attitude.shape == (4,) and not _NO_ROTATION <= np.abs(attitude).max() <= 1 / _NO_ROTATION
