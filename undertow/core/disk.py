@@ -62,7 +62,7 @@ def replacing(path: Path) -> Iterator[Path]:
         sync(target.parent)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError):
+        if isinstance(error, OSError) and error.errno:
             error.filename = str(path)  # the name that users know
         raise
 
