@@ -256,9 +256,7 @@ def again(writer: Writer, folder: Path, state: dict[str, bytes]) -> str:
     found = {name: data for name, data in visible(folder).items() if not name.startswith(_RESCUED)}
     if found.keys() != state.keys():
         return f"again: {sorted(found.keys() ^ state.keys())}"
-    different = [
-        name for name, data in found.items() if not same(writer, data, state[name]) and not in_store(Path(name))
-    ]
+    different = [name for name, data in found.items() if not same(writer, data, state[name]) and in_store(Path(name))]
     return f"again: {different[0]}" if different else ""
 
 
