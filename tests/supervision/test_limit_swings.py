@@ -21,7 +21,7 @@ def rates(inputs):
 
 
 def test_a_square_wave_swings_twice_in_a_period():
-    """Its average over a period; both before and after a change of limits by a step."""
+    """On the average of a period, whatever the limits are; an input without limits never does."""
     period = 1.6
     times = STEP * np.arange(round(20 * AVERAGED / STEP))
     found = rates(np.where(times % period < period / 2, 16.0, -16.0)[:, None])

@@ -149,7 +149,7 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
                 try:
                     write_whole(folder / name, text)
                 except OSError as error:
-                    troubles.append(f"{folder / name} could not be written: {error.strerror}")
+                    troubles.append(f"{folder / name} could not be written: {error.strerror or error}")
             _print(found, folder, options.json)
         else:
             remove(folder / _BEFORE)

@@ -52,7 +52,7 @@ class Passed(NamedTuple):
     unreported: Scalar  # entries of the report of the actuators that are not finite, or no speed of a propeller
 
 
-def readable(y: Measurement) -> Measurement:
+def conceivable(y: Measurement) -> Measurement:
     """The measurement with NaN for numbers that are no motion in any unit: their squares might be infinite."""
     read = lambda array: jnp.where(jnp.abs(array) <= _LARGEST, array, jnp.nan)
     body = y.body and y.body._replace(nu=read(y.body.nu))

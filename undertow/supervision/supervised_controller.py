@@ -42,7 +42,7 @@ from undertow.supervision.conditions import (
 from undertow.supervision.fault_tolerant_law import FaultTolerantController
 from undertow.supervision.held_place import PlaceState, after_jump, is_another, no_place, released, target
 from undertow.supervision.limit_swings import SwingState, no_swings, swung
-from undertow.supervision.measurement_gate import GateState, MeasurementGate, readable
+from undertow.supervision.measurement_gate import GateState, MeasurementGate, conceivable
 from undertow.supervision.motion import rate_of_velocity
 from undertow.supervision.reported_input import ReportedInput, ReportState
 from undertow.supervision.tracking_allowance import AllowanceState, TrackingAllowance
@@ -130,7 +130,7 @@ class Supervised(AbstractGatedController):
         checks.finite("safe_output", self.safe_output)
 
     def init(self, y: Measurement, r: Target) -> SupervisedState:
-        y = readable(y)
+        y = conceivable(y)
         gate = self.gate.init(y)
         passed = self.gate.pass_through(gate, y, jnp.asarray(True))
         target, _ = self._checked(Target(*map(jnp.zeros_like, r)), r)
@@ -244,7 +244,7 @@ class Supervised(AbstractGatedController):
         jumps, safe = self._jumped(conditions), state == int(State.SAFE)
         place = after_jump(place, ~_controls(state), safe, jumps, begins, view.passed.measurement, view.given)
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
-        times = jnp.where(counted, jnp.concatenate([z.time[None], z.restarts[:-1]]), z.restarts)
+        times = jnp.where(counted, _with_restart(z.restarts, z.time), z.restarts)
         # What has begun again gets its time before it is judged.
         judged_anew = jnp.arange(len(NAMES)) == wrong
         conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
@@ -289,7 +289,7 @@ class Supervised(AbstractGatedController):
         is held, and the restarts, of which this is one.
         """
         none = AllowanceState(jnp.zeros(()), jnp.zeros(()))
-        y = readable(y)
+        y = conceivable(y)
         new = self._fresh((), (), self.gate.init(y), y, none, _readable(after.reference))
         time, log = _readable(z.time) + self.sampling_time, _readable(z.log)
         stopped = z.state == int(State.STOPPED)
@@ -301,7 +301,7 @@ class Supervised(AbstractGatedController):
             log=logged(log, jnp.asarray(True), (time, state, reason, *new.cause)),
             place=_readable(z.place),
             conditions=_readable(z.conditions),
-            restarts=jnp.concatenate([time[None], _long_ago(z.restarts)[:-1]]),
+            restarts=_with_restart(_readable(z.restarts, _LONG_AGO), time),
             restarted=z.restarted + 1,
             safe_for=_readable(z.safe_for),
             fallback_controls=z.fallback_controls,
@@ -317,7 +317,7 @@ class Supervised(AbstractGatedController):
 
     def _view(self, z: SupervisedState, y: Measurement, r: Target) -> View:
         controls = _controls(z.state)
-        y = readable(y)
+        y = conceivable(y)
         passed = self.gate.pass_through(z.gate, y, ~controls)
         given, rejected = self._checked(z.reference, r)
         r = target(z.place, given)
@@ -460,14 +460,14 @@ class Supervised(AbstractGatedController):
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 
 
-def _readable(tree: PyTree) -> PyTree:
-    """A tree with zeros for what is not finite."""
-    return jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, jnp.zeros_like(leaf)), tree)
+def _readable(tree: PyTree, otherwise: float = 0.0) -> PyTree:
+    """A tree with another number for what is not finite."""
+    return jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, jnp.full_like(leaf, otherwise)), tree)
 
 
-def _long_ago(times: Array) -> Array:
-    """Times of restarts, of which those that cannot be read were long ago."""
-    return jnp.where(jnp.isfinite(times), times, _LONG_AGO)
+def _with_restart(times: Array, time: Scalar) -> Array:
+    """Times of the last restarts with one more."""
+    return jnp.concatenate([time[None], times[:-1]])
 
 
 def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
