@@ -99,7 +99,9 @@ def _serve(run: Run, pipe: Connection, printed: str) -> None:
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # as in a terminal: a stress test may run under `nohup`
+    # As in a terminal: a stress test may run under `nohup`, or in the background of a script.
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     while (asked := _patiently(pipe.recv)) is not None:
         arguments, disk = asked
         most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
