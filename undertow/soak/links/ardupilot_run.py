@@ -67,13 +67,13 @@ class ArdupilotRunner:
             now = [event for event in self._plan.events if event.covers(step)]
             for kind in sorted({_OLD if event.kind in _OLD_KINDS else event.kind for event in now}):
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
-            answer = self._patiently(packet, step)
+            answer = self._patiently(packet, before)
             if answer is None:
                 return found if self._command.code() is not None else [*found, ("N3", f"no answer to frame {step}")]
             numbers = np.hstack([np.ravel(value) for value in _numbers(answer)])
             if not np.isfinite(numbers).all():
                 found.append(("N1", f"an answer with numbers that are not finite at frame {step}"))
-            if answer["timestamp"] <= before:
+            if answer["timestamp"] < before:
                 found.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
             before = answer["timestamp"]
             sent.append(packet)
@@ -99,10 +99,14 @@ class ArdupilotRunner:
         elif kind == "silence" and first:
             time.sleep(1.0)
 
-    def _patiently(self, packet: bytes, step: int) -> Any:
-        """The answer to a packet, which is sent again as ArduPilot does."""
+    def _patiently(self, packet: bytes, before: float) -> Any:
+        """The answer to a packet, which is sent again as ArduPilot does.
+
+        An old packet is answered by the last answer again. Where that comes first, the new one is waited for.
+        """
         for _ in range(20):
-            if (answer := self._exchange(packet, _AGAIN)) is not None:
+            answer = self._exchange(packet, _AGAIN)
+            if answer is not None and answer["timestamp"] != before:
                 return answer
             if self._command.code() is not None:
                 break
