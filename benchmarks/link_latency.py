@@ -31,7 +31,7 @@ WARM_UP = 50  # steps that are not counted
 @contextlib.contextmanager
 def command(*arguments: str) -> Iterator[int]:
     """The port on which a command listens, while it runs."""
-    whole = [sys.executable, "-m", "undertow.cli.main", arguments[0], str(SCENARIO), *arguments[1:]]
+    whole = [sys.executable, "-m", "undertow", arguments[0], str(SCENARIO), *arguments[1:]]
     with subprocess.Popen(whole, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         try:
             assert process.stdout is not None

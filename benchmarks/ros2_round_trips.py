@@ -100,7 +100,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder, fast_dds.running(fast_dds.build(Path(folder)), DOMAIN, "echo"):
             found["Fast DDS, C++"] = measured(given.count)
     scenario = str(ROOT / "examples/bluerov2_heavy.yaml")
-    node = ("-m", "undertow.cli.main", "ros2", scenario, "--use-sim-time", "--localhost", "--domain", str(DOMAIN))
+    node = ("-m", "undertow", "ros2", scenario, "--use-sim-time", "--localhost", "--domain", str(DOMAIN))
     with process(*node):
         found["undertow ros2"] = measured(given.count)
     if given.json:

@@ -38,7 +38,7 @@ def benchmark(name: str, *arguments: str) -> Any:
 
 def scale() -> list[tuple[str, ...]]:
     """Cost of campaigns; the last rows are computed from the others."""
-    speed = result("-m", "undertow.cli.main", "bench", "--json")
+    speed = result("-m", "undertow", "bench", "--json")
     pieces = benchmark("campaign_scale.py", "pieces")
     short = benchmark("campaign_scale.py", "memory")
     million = benchmark("campaign_scale.py", "memory", "--trials", "1000000")
@@ -76,7 +76,7 @@ def scale() -> list[tuple[str, ...]]:
 
 def batch() -> list[tuple[str, ...]]:
     """Speed of the batch compiler, and how it scales."""
-    speed = result("-m", "undertow.cli.main", "bench", "--json")
+    speed = result("-m", "undertow", "bench", "--json")
     scaling = benchmark("compiler_scale.py")
     numpy = speed["numpy_ns"]
     by_hand = benchmark("yardstick.py", "--json")

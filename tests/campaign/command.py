@@ -5,7 +5,7 @@ import sys
 
 from undertow.campaign.run_campaign import STORE
 
-TYPED = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main")
+TYPED = (sys.executable, "-W", "ignore", "-m", "undertow")
 VEHICLE = {
     "controller": {"kind": "pid"},
     "reference": {"kind": "setpoint", "position": [0.0] * 6},

@@ -62,6 +62,6 @@ def test_one_path(undertow, tmp_path, command):
 
 def test_entry_point():
     """As a process of its own, with what ends one."""
-    command = [sys.executable, "-m", "undertow.cli.main"]
+    command = [sys.executable, "-m", "undertow"]
     done = subprocess.run([*command, "version"], capture_output=True, text=True)
     assert done.returncode == 0 and done.stdout.startswith("undertow ") and done.stderr == ""

@@ -110,7 +110,7 @@ def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
 def test_interrupt_of_compiled_code(tmp_path):
     """Hours of simulated time end at once, and leave nothing."""
     write(tmp_path, HOURS)
-    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml", "--out", "out"]
+    command = [sys.executable, "-m", "undertow", "simulate", "s.yaml", "--out", "out"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         for line in process.stdout:
@@ -127,7 +127,7 @@ def test_interrupt_of_compiled_code(tmp_path):
 @pytest.mark.full
 def test_bad_input_as_a_process(tmp_path):
     write(tmp_path, SCENARIO.replace("mass: 125", "mass: -1"))
-    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
+    command = [sys.executable, "-m", "undertow", "simulate", "s.yaml"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "Error: `plant.vehicle.mass` must be positive, but is -1 kg (s.yaml, line 2)\n"
@@ -138,7 +138,7 @@ def test_bad_input_as_a_process(tmp_path):
 @pytest.mark.parametrize("command", ["list", "describe robust", "describe scenario --json-schema"])
 def test_a_reader_that_ends_early_is_no_error(command):
     """As `undertow list | head -1`: the exit code of the signal, and nothing on stderr."""
-    code = [sys.executable, "-m", "undertow.cli.main", *command.split()]
+    code = [sys.executable, "-m", "undertow", *command.split()]
     with subprocess.Popen(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
@@ -235,7 +235,7 @@ def test_signals_while_modules_are_imported_end_every_command(tmp_path, command,
 def test_sigterm_leaves_nothing_of_a_run(tmp_path):
     """Nor does the lock stay, nor the folder that results were to appear in."""
     write(tmp_path, HOURS)
-    command = [sys.executable, "-m", "undertow.cli.main", "simulate", "s.yaml"]
+    command = [sys.executable, "-m", "undertow", "simulate", "s.yaml"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         for line in process.stdout:

@@ -32,7 +32,7 @@ def scenario(tmp_path, monkeypatch):
 
 def started(*arguments):
     environment = os.environ | {"ROS_DOMAIN_ID": str(100 + os.getpid() % 100), "ROS_LOCALHOST_ONLY": "1"}
-    command = [sys.executable, "-m", "undertow.cli.main", "ros2", "odin.yaml", *arguments]
+    command = [sys.executable, "-m", "undertow", "ros2", "odin.yaml", *arguments]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -92,7 +92,7 @@ def test_a_network_that_is_not_there(scenario):
     interfaces = "<Interfaces><NetworkInterface name='nowhere0'/></Interfaces>"
     uri = f"<CycloneDDS><Domain><General>{interfaces}</General></Domain></CycloneDDS>"
     environment = os.environ | {"CYCLONEDDS_URI": uri}
-    command = [sys.executable, "-m", "undertow.cli.main", "ros2", "odin.yaml", "--domain", "3", "--duration", "1"]
+    command = [sys.executable, "-m", "undertow", "ros2", "odin.yaml", "--domain", "3", "--duration", "1"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
     assert done.returncode == 2
     last = done.stderr.splitlines()[-1]

@@ -133,7 +133,7 @@ def peer():
 
 
 def started(peer, *arguments):
-    command = [sys.executable, "-m", "undertow.cli.main", "run", "rov.yaml", "--link", f"udp:{peer.place}", *arguments]
+    command = [sys.executable, "-m", "undertow", "run", "rov.yaml", "--link", f"udp:{peer.place}", *arguments]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
 
 

@@ -139,7 +139,7 @@ def test_wrong_options(driven, capsys, arguments, said):
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it(driven, how):
     """The exit code of an interrupted command; nothing but the line that says so on stderr."""
-    command = [sys.executable, "-m", "undertow.cli.main", "ardupilot", str(driven), "--port", "0"]
+    command = [sys.executable, "-m", "undertow", "ardupilot", str(driven), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None and process.stderr is not None
         for line in process.stdout:

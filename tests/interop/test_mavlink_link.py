@@ -205,7 +205,7 @@ def test_another_vehicles_file(written, capsys):
 
 def command(driven, port=0):
     connect = f"udpin:127.0.0.1:{port}"
-    return [sys.executable, "-m", "undertow.cli.main", "mavlink", str(driven), "--connect", connect]
+    return [sys.executable, "-m", "undertow", "mavlink", str(driven), "--connect", connect]
 
 
 @contextlib.contextmanager

@@ -319,6 +319,20 @@ def test_what_an_autopilot_cannot_be_made_of():
         pendulum.start([0.0], [0.0], propellers=[1.0])
 
 
+def test_gains_are_those_of_the_sampling_time():
+    slow = PENDULUM | {"loop": {"duration": 1.0, "dt": 0.02, "record": 0.02}}
+    given, of_scenario = ut.Autopilot(PENDULUM, sampling_time=0.02), ut.Autopilot(slow)
+    assert given.sampling_time == of_scenario.sampling_time == 0.02
+    for autopilot in (given, of_scenario):
+        autopilot.start([0.05], [0.0])
+    steps = [(given.step([x], [0.1]), of_scenario.step([x], [0.1])) for x in (0.052, 0.054, 0.056)]
+    for ours, theirs in steps:
+        np.testing.assert_array_equal(ours, theirs)
+    as_it_is = ut.Autopilot(PENDULUM)
+    as_it_is.start([0.05], [0.0])
+    assert as_it_is.step([0.052], [0.1], dt=0.02) != steps[0][0]  # with gains for 1 ms
+
+
 @pytest.mark.full
 def test_the_reference_begins_where_the_vehicle_is_found():
     """With an open start: at rest at 5 m there is nothing to correct yet, at another start likewise."""

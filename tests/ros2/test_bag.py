@@ -63,6 +63,16 @@ def test_a_run_file_is_written_too(run, tmp_path):
     np.testing.assert_array_equal(read_rosbag2(tmp_path / "bag")["/thrusters"][1], run.dataset["input"].values)
 
 
+def test_a_damaged_run_file_is_refused(tmp_path):
+    (tmp_path / "run.nc").write_bytes(b"CDF\x01" + bytes(20))  # whole, with nothing in it
+    with pytest.raises(BadInput, match="`run` must be of a vehicle"):
+        write_rosbag2(tmp_path / "run.nc", tmp_path / "bag")
+    (tmp_path / "run.nc").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(20))
+    with pytest.raises(BadInput, match=r"`run` must be the run.nc of a run, but is run.nc, which is damaged"):
+        write_rosbag2(tmp_path / "run.nc", tmp_path / "bag")
+    assert not (tmp_path / "bag").exists()
+
+
 def test_rosbags_reads_what_was_written(run, tmp_path):
     """By the standard names and definitions that are in the bag, not by this package."""
     write_rosbag2(run, tmp_path / "bag")

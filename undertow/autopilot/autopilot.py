@@ -27,6 +27,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.stepped import Uncopied, put
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
+from undertow.scenario.link_scenario import at_sampling_time
 from undertow.scenario.reading import Text, from_data, read
 from undertow.supervision.conditions import Request, reason_of, state_of
 from undertow.supervision.supervised_controller import SupervisedState, state_in, transfer
@@ -60,7 +61,8 @@ class Autopilot(Uncopied):
     Args:
         scenario: a .yaml file or an earlier run.nc, the same as a mapping or as read, a closed loop made of parts, or
             what `build` made of a scenario, whose reference begins where the scenario's plant does.
-        sampling_time: s; None for that of the scenario. A closed loop needs one.
+        sampling_time: s; None for that of the scenario. Rules choose the gains of a scenario for this one; parts that
+            are made already keep theirs. A closed loop needs one.
         attitude: format of measured attitudes, `euler` (roll, pitch, yaw), `quaternion` (w, x, y, z, body -> world) or
             `both`.
         velocity: format of measured velocities: `body`, `world`, `rates` or `both`, see `measured_motion.Format`.
@@ -99,11 +101,12 @@ class Autopilot(Uncopied):
         log_later: bool = False,
         allow_code: bool = False,
     ):
-        loop, precision, usual = _given(scenario, allow_code)
+        if sampling_time is not None:
+            checks.positive("sampling_time", sampling_time, "s")
+        loop, precision, usual = _given(scenario, allow_code, sampling_time)
         period = usual if sampling_time is None else sampling_time
         if period is None:
             raise BadInput("sampling_time", "be given with a closed loop made of parts")
-        checks.positive("sampling_time", period, "s")
         checks.positive("blend", blend, "s")
         form = Format(attitude, velocity)
         form.check()
@@ -501,7 +504,7 @@ class Autopilot(Uncopied):
         self._log.append(self._clock.time, own | signals | self._received.numbers())
 
 
-def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | None]:
+def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tuple[ClosedLoop, str, float | None]:
     """Closed loop, precision and sampling time of what an autopilot is made from."""
     if isinstance(scenario, ClosedLoop):
         return scenario, "float64", None
@@ -510,7 +513,7 @@ def _given(scenario: Any, allow_code: bool) -> tuple[ClosedLoop, str, float | No
         if isinstance(built, Mapping):
             built = from_data(built)
         text = built if isinstance(built, Text) else read(Path(built), allow_code=allow_code)
-        built = build(text)
+        built = build(at_sampling_time(text, sampling_time))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
     loop = built.closed_loop if placed else built.without_faults().closed_loop

@@ -19,6 +19,7 @@ from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.loop.stepped import Uncopied, put
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario.build import build
+from undertow.scenario.link_scenario import at_sampling_time
 from undertow.scenario.reading import from_data, read
 
 
@@ -61,13 +62,13 @@ class NavigationFilter(Uncopied):
         allow_code: bool = False,
     ):
         text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-        built = build(text)
+        if sampling_time is not None:
+            checks.positive("sampling_time", sampling_time, "s")
+        built = build(at_sampling_time(text, sampling_time))
         navigation = built.closed_loop.navigation
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
-        period = built.scenario.loop.dt if sampling_time is None else sampling_time
-        checks.positive("sampling_time", period, "s")
-        self.sampling_time = float(period)
+        self.sampling_time = built.scenario.loop.dt
         self._clock, self._started = Clock(self.sampling_time), np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))

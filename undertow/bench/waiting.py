@@ -52,7 +52,7 @@ CASES = {
     "pendulum": _changed(_PENDULUM, "reference", {"kind": "sine", "amplitude": 0.12, "frequency": 1}),
 }
 _COMPARED = "robust,pid,adrc"
-_COMMAND = (sys.executable, "-m", "undertow.cli.main")
+_COMMAND = (sys.executable, "-m", "undertow")
 _JAX = (sys.executable, "-c", "import jax; jax.jit(lambda x: x + 1)(1.0)")
 
 

@@ -496,7 +496,3 @@ def main() -> None:
             sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
-
-
-if __name__ == "__main__":
-    main()

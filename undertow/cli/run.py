@@ -36,8 +36,8 @@ from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.realtime.vehicle_link import VehicleLink
 from undertow.report.run_tables import transition_rows
 from undertow.scenario.build import Built, build
-from undertow.scenario.link_scenario import read_for_link
-from undertow.scenario.reading import dump
+from undertow.scenario.link_scenario import at_sampling_time, read_for_link
+from undertow.scenario.reading import Text, dump
 from undertow.supervision.conditions import State
 from undertow.supervision.transition_log import Transition
 
@@ -95,14 +95,14 @@ class _Stop:
 def run(scenario: Path, options: Options) -> int:
     """Run until the end of the scenario, of the link, or Ctrl-C; return the exit code."""
     _check(options)
-    made = lambda: read_for_link(scenario, allow_code=options.allow_code, unsupervised=options.unsupervised)
-    built = interruptible(lambda: build(made()))
+    text = read_for_link(scenario, allow_code=options.allow_code, unsupervised=options.unsupervised)
+    built = interruptible(lambda: build(text))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for `undertow run`", built.scenario.loop.kind)
     if options.serve is not None:
         return _serve(built, options)
     if options.link.startswith("log:"):
-        return _replay(built, options)
+        return _replay(text, built, options)
     return _controlled(scenario, built, options)
 
 
@@ -281,15 +281,14 @@ def _ending(reason: Reason, link: AbstractLink, options: Options, stop: _Stop) -
     return RUN_FAILED if link.failed or reason in failed else DONE
 
 
-def _replay(built: Built, options: Options) -> int:
+def _replay(text: Text, built: Built, options: Options) -> int:
     """Feed a log to the controller, and compare the commands."""
     link = LogLink(Path(options.link.removeprefix("log:")), built.closed_loop.plant)
     form = link.form or Format()
     if link.precision != built.scenario.precision:
         raise BadInput("precision", f"be {link.precision}, as in the log", built.scenario.precision)
-    period = link.sampling_time
-    made = lambda: Autopilot(built, sampling_time=period, attitude=form.attitude, velocity=form.velocity)
-    autopilot = interruptible(made)
+    same_rate = lambda: build(at_sampling_time(text, link.sampling_time))
+    autopilot = interruptible(lambda: Autopilot(same_rate(), attitude=form.attitude, velocity=form.velocity))
     for note in link.notes:
         typer.echo(f"Note: {note}", err=True)
     reason = RealTimeLoop(autopilot, link, SimulatedClock()).run()

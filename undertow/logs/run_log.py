@@ -12,6 +12,8 @@ from undertow.logs.messages import group_of
 if TYPE_CHECKING:
     import xarray as xr
 
+_MUST = "be the run.nc of a run"
+
 # Attributes of a run that a log keeps: what it takes to repeat it, and who made it.
 _KEPT = ("title", "seed", "status", "scenario", "scenario_hash", "content_hash", "version_undertow")
 
@@ -56,14 +58,29 @@ def read_run(path: Path) -> Log:
     Raises:
         BadInput: it is none, or damaged.
     """
+    run = read_dataset(path, "log")
+    try:
+        return log_of_run(run, path.name)
+    except Exception as error:  # a netCDF file of something else
+        raise BadInput("log", _MUST, f"{path.name}: {str(error) or type(error).__name__}") from None
+
+
+def read_dataset(path: Path, name: str) -> "xr.Dataset":
+    """All of a result file.
+
+    Args:
+        path: of the file.
+        name: of what it is, for messages.
+
+    Raises:
+        BadInput: it is no netCDF file, damaged, or would unpack to more than a run has.
+    """
     import xarray as xr
 
     try:
-        with xr.open_dataset(path, engine="netcdf4") as run:
-            if complaint := size_complaint(path, run.nbytes):
-                raise BadInput("log", "be the run.nc of a run", f"{path.name}, {complaint}")
-            return log_of_run(run.load(), path.name)
-    except BadInput:
-        raise
-    except Exception as error:  # whatever bytes may cause
-        raise BadInput("log", "be the run.nc of a run", f"{path.name}: {str(error) or type(error).__name__}") from None
+        with xr.open_dataset(path, engine="netcdf4") as dataset:
+            if not (complaint := size_complaint(path, dataset.nbytes)):
+                return dataset.load()
+    except Exception:  # netCDF and xarray raise many kinds of errors for whatever bytes there are
+        complaint = "which is missing" if not path.exists() else "which is damaged, incomplete, or not a netCDF file"
+    raise BadInput(name, _MUST, f"{path.name}, {complaint}")

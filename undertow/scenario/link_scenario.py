@@ -1,5 +1,6 @@
 """Scenarios of controllers that drive a vehicle at the other end of a link."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from undertow.scenario.reading import Text, read
@@ -20,3 +21,18 @@ def read_for_link(path: Path, *, allow_code: bool = False, unsupervised: bool = 
     if unsupervised or text.data.get("supervisor"):
         return text
     return text._replace(data=text.data | {"supervisor": True})
+
+
+def at_sampling_time(text: Text, sampling_time: float | None) -> Text:
+    """The scenario with another time between control steps, for which rules choose gains then.
+
+    Args:
+        text: of the scenario.
+        sampling_time: s; None for that of the scenario.
+    """
+    loop = text.data.get("loop") or {}
+    if sampling_time is None or not isinstance(loop, Mapping):
+        return text
+    # Nothing is recorded, but a time between records must be a multiple of that between steps.
+    steps = {"dt": float(sampling_time), "record": float(sampling_time)}
+    return text._replace(data=text.data | {"loop": dict(loop) | steps})

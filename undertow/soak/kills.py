@@ -18,7 +18,7 @@ from undertow.scenario.yaml_text import load
 from undertow.soak import specimens
 from undertow.soak.verdict import Failure
 
-_COMMAND = (sys.executable, "-W", "ignore", "-m", "undertow.cli.main", "campaign")
+_COMMAND = (sys.executable, "-W", "ignore", "-m", "undertow", "campaign")
 _LATEST = 120.0  # s, for one process
 
 # Signals and how often each of twenty ends a campaign; the exit codes of those that it may answer.

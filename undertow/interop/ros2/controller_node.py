@@ -40,7 +40,7 @@ from undertow.interop.ros2.simulated_vehicle import check_vehicle
 from undertow.interop.ros2.to_messages import stamp_of, thrusters_of, wrench_of
 from undertow.loop.stepped import put
 from undertow.scenario.build import build
-from undertow.scenario.link_scenario import read_for_link
+from undertow.scenario.link_scenario import at_sampling_time, read_for_link
 
 RESTART = 0.1  # s, by which a clock must go back to be one that was set back
 
@@ -98,12 +98,11 @@ class CompiledController:
         if rate is not None:
             checks.positive("rate", rate, "Hz")
         text = read_for_link(scenario, allow_code=allow_code, unsupervised=unsupervised)
+        text = at_sampling_time(text, None if rate is None else 1 / rate)
         built = build(text)
         check_vehicle(built)
         plant, law = built.closed_loop.plant, built.closed_loop.controller
-        self.autopilot = Autopilot(
-            text, sampling_time=None if rate is None else 1 / rate, attitude="quaternion", velocity="body"
-        )
+        self.autopilot = Autopilot(text, attitude="quaternion", velocity="body")
         self.output, self.thrusters = output, plant.inputs()
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             conversion = output_of(output, plant, law, None)

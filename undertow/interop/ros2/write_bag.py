@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
-import xarray as xr
 from cyclonedds.idl import IdlStruct
 from numpy.typing import NDArray
 from rosbags.interfaces import Connection
@@ -28,6 +27,7 @@ from undertow.interop.ros2.frames import body_velocity_of_rates
 from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity, thruster_label
 from undertow.interop.ros2.to_messages import odometry_of, stamp_of, target_message, thrusters_of
 from undertow.logs.frames import quaternions
+from undertow.logs.run_log import read_dataset
 from undertow.logs.unfinished_bag import END_WITHOUT_INDEX
 
 STORAGES = ("mcap", "sqlite3")
@@ -151,15 +151,14 @@ def write_rosbag2(run: Any, folder: str | Path, storage: str = "mcap") -> None:
         storage: `mcap` or `sqlite3`.
 
     Raises:
-        BadInput: the run is of something else than a vehicle, or the folder exists.
+        BadInput: the run is of something else than a vehicle, a file is damaged, or the folder exists.
     """
-    if isinstance(run, str | Path):
-        with xr.open_dataset(run, engine="netcdf4") as dataset:
-            write_rosbag2(dataset.load(), folder, storage)
-        return
-    dataset = getattr(run, "dataset", run)
-    if tuple(dataset["axis"].values) != BODY_OUTPUTS:
-        raise BadInput("run", "be of a vehicle", f"of a plant with outputs {', '.join(dataset['axis'].values)}")
+    dataset = read_dataset(Path(run), "run") if isinstance(run, str | Path) else getattr(run, "dataset", run)
+    outputs = tuple(dataset["axis"].values) if "axis" in dataset.coords else ()
+    if outputs != BODY_OUTPUTS:
+        raise BadInput(
+            "run", "be of a vehicle", f"of a plant with outputs {', '.join(outputs) or 'that it does not name'}"
+        )
     names = ("measured_position", "measured_velocity", "position", "velocity", "input", "reference")
     columns = [dataset[name].values.astype(float) for name in names]
     frames, label = Frames(), thruster_label(dataset["input"].attrs["units"])

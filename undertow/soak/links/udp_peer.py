@@ -11,6 +11,7 @@ from undertow.soak.links.peer import AbstractPeer, Measured, damaged
 
 _THRUSTERS = 8
 _LONGEST = 2048  # bytes
+_SESSION = slice(8, 12)  # in a datagram
 
 
 class UdpPeer(AbstractPeer):
@@ -24,11 +25,14 @@ class UdpPeer(AbstractPeer):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._received = Received(COMMAND, _THRUSTERS)
         place = f"127.0.0.1:{self._socket.getsockname()[1]}"
         self.arguments = ["run", "SCENARIO", "--link", f"udp:{place}", "--patience", "60", "--out", out, "--overwrite"]
 
     def begin(self, chance: random.Random) -> None:
         self._chance, self._address = chance, None
+        before = self._received.newest
+        self._session_before = b"" if before is None else before.session.to_bytes(4, "little")
         self._sender = Sender(MEASUREMENT, _THRUSTERS, chance.getrandbits(32))
         self._received = Received(COMMAND, _THRUSTERS)
         while self._receive(0.0) is not None:
@@ -58,8 +62,10 @@ class UdpPeer(AbstractPeer):
     def take(self, longest: float) -> tuple[np.ndarray | None, int]:
         newest, count = None, 0
         while (data := self._receive(0.0 if count else longest)) is not None:
-            command = self._received.take(data)
             count += 1
+            if data[_SESSION] == self._session_before:  # on its way when the earlier run ended
+                continue
+            command = self._received.take(data)
             newest = newest if command is None or command.flag else command.values
         return newest, count
 
