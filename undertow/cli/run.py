@@ -22,6 +22,7 @@ from undertow.autopilot.measured_motion import Format
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import ending_signals, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
+from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
 from undertow.core.disk import sync, write_whole
@@ -136,7 +137,9 @@ def _controlled(path: Path, built: Built, options: Options) -> int:
             typer.echo(f"Advice: {one.sentence}", err=True)
         link = VehicleLink(built) if own else UdpVehicleLink(options.link.removeprefix("udp:"), built)
         given, troubles = built if own else _starting_anywhere(built), list[str]()
-        with _logging(given, link, folder, troubles) as autopilot:
+        with contextlib.nullcontext() if options.json else stage(wide_console(), "compiling"):
+            autopilot = interruptible(lambda: _autopilot(given, link.form or Format()))
+        with _logging(autopilot, folder, troubles):
             loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked, lambda: _begin_log(folder))
             say = (lambda line: None) if options.json else typer.echo
             say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
@@ -178,22 +181,20 @@ def _starting_anywhere(built: Built) -> Built:
 
 
 @contextlib.contextmanager
-def _logging(built: Built, link: AbstractLink, folder: Path, troubles: list[str]) -> Iterator[Autopilot]:
-    """The autopilot, compiled, which logs to a folder; see `_begin_log`.
+def _logging(autopilot: Autopilot, folder: Path, troubles: list[str]) -> Iterator[None]:
+    """Inside, an autopilot logs to a folder; see `_begin_log`.
 
     What goes wrong with the log is added to `troubles`: it does not stop the controller.
     """
-    form = link.form or Format()
-    compiled = interruptible(lambda: _autopilot(built, form))
     folder.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings(record=True) as noted:
         warnings.simplefilter("always")
         try:
             (folder / _BEFORE).mkdir(exist_ok=True)
-            compiled.log_to(folder / _BEFORE / "run.mcap")
-            yield compiled
+            autopilot.log_to(folder / _BEFORE / "run.mcap")
+            yield
         finally:
-            compiled.close_log()
+            autopilot.close_log()
             troubles.extend(str(one.message) for one in noted)
 
 
