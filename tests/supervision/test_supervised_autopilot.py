@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.interop.stepped_vehicle import SteppedVehicle
+from undertow.scenario.reading import dump
 from undertow.supervision.supervised_controller import state_in
 
 pytestmark = pytest.mark.full
@@ -87,6 +89,21 @@ def test_no_reading_damages_the_memory_or_ends_a_stop(autopilot, speed):
     outputs = [autopilot.step(*REST) for _ in range(40)]
     assert autopilot.state == ("STOPPED", "operator") and (np.array(outputs) == 0).all()
     assert "memory_damaged" not in {one.reason for one in autopilot.transitions()}
+
+
+def test_a_report_that_stands_still_does_not_set_thrusters_against_each_other(tmp_path):
+    """Of eight thrusters two combinations move nothing, so that no motion contradicts the report."""
+    path = tmp_path / "vehicle.yaml"
+    path.write_text(dump(SCENARIO | {"controller": "robust"}))
+    vehicle, autopilot = SteppedVehicle(path), ut.Autopilot(path, attitude="quaternion")
+    report, outputs, state = np.array([-8.0, -6.0, -8.0, -8.0, -8.0, -6.0, 2.0, -2.5]), [], vehicle.state()
+    outputs.append(autopilot.start(state.position, state.body_velocity, state.attitude))
+    for _ in range(150):
+        vehicle.hold(outputs[-1], 0.02)
+        state = vehicle.state()
+        outputs.append(autopilot.step(state.position, state.body_velocity, state.attitude, applied=report))
+    assert autopilot.state == ("DEGRADED", "applied_contradicted")
+    assert np.abs(outputs[100:]).max() < 5.0
 
 
 def test_a_damaged_memory_is_mended(autopilot):

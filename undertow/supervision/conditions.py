@@ -144,8 +144,9 @@ CONDITIONS = (
     ),
     Condition(
         "applied_contradicted",
-        "log-likelihood ratio of the commanded against the reported input, from the motion and the nominal model",
-        "4",
+        "log-likelihood ratio of the commanded against the reported input, from the motion and the nominal model, "
+        "relative to 4; or changes of the command that the report did not follow, relative to the range of the input",
+        "1",
         0.0,
         _NEVER,
         1.0,

@@ -155,7 +155,7 @@ class Supervised(AbstractGatedController):
             law=law,
             fallback=fallback,
             gate=gate,
-            report=self.report.init(self.model, y),
+            report=self.report.init(self.model, y, self.safe_output),
             reference=r,
             place=no_place(r),
             allowance=allowance,

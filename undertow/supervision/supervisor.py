@@ -123,7 +123,7 @@ def supervisor(
         law=law,
         fallback=fallback,
         gate=gate,
-        report=ReportedInput(authority),  # pyright: ignore[reportArgumentType] - an array is a Param
+        report=ReportedInput(authority, largest - least),  # pyright: ignore[reportArgumentType] - arrays are Params
         tracking=TrackingAllowance(max_position_error, max_angle_error, _DECAY),
         watch=ConditionValues(least, largest, estimate, max_variation, restarts),
         model=law.model,
