@@ -55,7 +55,7 @@ class CommandProcess:
             try:
                 self._code = self._pipe.recv() if self._pipe.poll() else None
             except (EOFError, ConnectionError):
-                self._process.join(1.0)
+                self._process.join(_CONTINUES)  # until it is gone, or the next call would be given to it
                 self._code = self._process.exitcode if self._process.exitcode is not None else -signal.SIGKILL
         return self._code
 
