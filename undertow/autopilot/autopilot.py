@@ -155,6 +155,11 @@ class Autopilot(Uncopied):
         self._convert = step_of(lambda output, _, u: ((), output.of(u)), of.output, (), of.applied)
         self._at = step_of(lambda reference, _, t: ((), reference.at(t)), starting_at(of.reference, zero), (), of.time)
         self.backend = self._go_on.backend
+        # What every step needs, looked up once. The arrays of the state are those of every step.
+        self._supervisor = state_in(self._go_on.state)
+        self._gated = isinstance(self._loop.controller, AbstractGatedController)
+        self._shapes = [place.shape for place in self._begin.inputs.motion]
+        self._no_report = jax.tree.map(lambda place: np.full(place.shape, np.nan), self._begin.inputs.actuator)
 
     def start(
         self,
@@ -212,11 +217,10 @@ class Autopilot(Uncopied):
                 "start", "lead to a finite command of the law", "one that is not", hint="Check the measurement"
             )
         put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
-        supervised = state_in(self._go_on.state)
-        if supervised is not None and applied is not None:
-            self._turn_from(before, supervised)
+        if self._supervisor is not None and applied is not None:
+            self._turn_from(before, self._supervisor)
         self._command[...] = before
-        blended = applied is not None and supervised is None
+        blended = applied is not None and not self.supervised
         self._before[...], self._blended[...], self._started[...] = before, blended, True
         self._broken[...], self._restarts[...] = False, 0
         return self._answered()
@@ -258,12 +262,12 @@ class Autopilot(Uncopied):
         if _is_no_rotation(motion.attitude):
             motion = motion._replace(attitude=np.full(4, np.nan))  # so drivers say that they have none yet
         given = self._command.copy() if applied is None else self._reported(applied)
-        report = self._report(propellers, np.nan)
+        report = self._no_report if propellers is None else self._report(propellers, np.nan)
         goal = None if target is None else self._target(target)  # before anything changes
         healthy = self._health(health)
         passed = self._clock.passed(dt)
         elapsed = self.sampling_time if dt is None else float(dt)
-        if isinstance(self._loop.controller, AbstractGatedController):
+        if self._gated:
             passed = elapsed  # whatever it is: a supervisor knows what to do with it
         elif not passed:
             return self._convert.outputs.copy()
@@ -339,7 +343,7 @@ class Autopilot(Uncopied):
     @property
     def supervised(self) -> bool:
         """Whether a supervisor stands around the controller, which then has a state, transitions and requests."""
-        return state_in(self._go_on.state) is not None
+        return self._supervisor is not None
 
     def request(self, what: str) -> None:
         """Ask the supervisor for something, from the next step on.
@@ -388,10 +392,9 @@ class Autopilot(Uncopied):
 
     def _supervised(self, method: str) -> SupervisedState:
         """State of the supervisor, of which the arrays can be written into."""
-        found = state_in(self._go_on.state)
-        if found is None:
+        if self._supervisor is None:
             raise BadInput(method, "be used with a supervisor", "none", hint="Add `supervisor: true` to the scenario")
-        return found
+        return self._supervisor
 
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step: those that the law declares, and `command`, its input.
@@ -409,8 +412,7 @@ class Autopilot(Uncopied):
         return {"command": command} | self._loop.controller.signals()
 
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
-        shapes = map(np.shape, self._begin.inputs.motion)
-        given = zip(Motion._fields, (position, attitude, velocity), shapes, strict=True)
+        given = zip(Motion._fields, (position, attitude, velocity), self._shapes, strict=True)
         return Motion(*(numbers(name, value, shape) for name, value, shape in given))
 
     def _report(self, propellers: Any, missing: float) -> Any:
