@@ -18,9 +18,8 @@ import numpy as np
 from undertow.cli.trials import trial_text
 from undertow.falsification.evaluator import Evaluator
 from undertow.falsification.falsify import Falsified, evaluator_of, falsify
-from undertow.scenario.execute import execute
-from undertow.scenario.finished_run import requirements_of
 from undertow.scenario.reading import Text, from_data, read
+from undertow.simulation.run_scenario import run_scenario
 
 # Bounds of the full box: nominal value, upper bound, unit. The nominal values are the lower bounds. At each upper bound
 # the law fails, with the other two at their nominal values.
@@ -94,8 +93,8 @@ def report(found: Falsified, folder: Path) -> None:
         print(f"  {axis.key}: {found.values()[axis.key]:.6g} {VARY[axis.key][2]} ({100 * away:.3g} % of the bound)")
     path = folder / "counterexample.yaml"
     path.write_text(trial_text(found.single_runs[-1].built, "Counter-example of the law of the paper."), "utf-8")
-    again = execute(read(path))
-    same = {name: one["robustness"] for name, one in requirements_of(again.dataset).items()} == found.broken
+    again = run_scenario(read(path))
+    same = {name: verdict.robustness for name, verdict in again.facts.requirements.items()} == found.broken
     print(f"{path}: status {again.status.word}, verdict repeated bit for bit: {same}")
 
 

@@ -17,7 +17,6 @@ import numpy as np
 import yaml
 
 import undertow as ut
-from undertow.scenario.finished_run import navigation_of
 
 SCENARIO = Path(__file__).parents[1] / "examples/bluerov2_heavy.yaml"
 MOVING = {"kind": "lissajous", "amplitude": [2.0, 1.0, 0.5, 0.8], "frequency": [0.2, 0.4, 0.3, 0.25]}  # m, rad; rad/s
@@ -62,8 +61,8 @@ def figures(errors: dict[str, dict[str, float]], known: bool, seeds: int, moving
     """Figures of runs with different seeds."""
     nees, yaw_errors, yaw_deviations, contradicted, sensors = [], [], [], 0, []
     for seed in range(seeds):
-        run = ut.simulate_scenario(scenario_of(errors, known, seed, moving)).dataset
-        navigated = navigation_of(run)
+        result = ut.simulate_scenario(scenario_of(errors, known, seed, moving)).result
+        run, navigated = result.series, result.facts.navigation
         assert navigated is not None
         nees.append(navigated["nees"])
         late = run["time"].values >= run["time"].values[-1] / 2

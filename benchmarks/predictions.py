@@ -16,8 +16,8 @@ import numpy as np
 
 from undertow.arena.vehicles import VEHICLES
 from undertow.cli.run_presentation import comparison, predict
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_scenario import run_scenario
 
 # Rate of the loop, Hz, and significant height of the waves as a share of that of the arena.
 CONDITIONS = ((20, 0.5), (100, 1.0))
@@ -51,7 +51,7 @@ def main() -> None:
     within = []
     pairs = itertools.product(VEHICLES, options.laws.split(","))
     for (vehicle, law), (rate, sea) in itertools.product(pairs, CONDITIONS):
-        executed = execute(from_data(scenario_of(vehicle, law, rate, sea)))
+        executed = run_scenario(from_data(scenario_of(vehicle, law, rate, sea)))
         prediction = predict(executed)
         steady = executed.steady or {}
         simulated = [float(steady.get(name, np.nan)) for name in _METRICS]

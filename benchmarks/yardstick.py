@@ -35,7 +35,7 @@ from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.loop.simd_batch import Unsupported
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 SOURCE = Path(__file__).parent / "yardstick" / "w1.cpp"
 # No -ffast-math: sums keep their order. The compiler may use the vector units as it likes, and contract to fused
@@ -187,7 +187,7 @@ def timed_metrics(program: Path, steps: int, runs: int) -> tuple[dict[str, float
 def trajectory_difference(program: Path) -> float:
     """Largest difference from undertow's run, step by step: of outputs in m, rad, of voltages as shares of the peak."""
     loop = {"kind": "sampled", "duration": COMPARED_S, "record": 1e-3}
-    record = execute(W1 | {"loop": loop}).dataset
+    record = run_scenario(W1 | {"loop": loop}).dataset
     outputs, voltages = (record[name].values[:-1] for name in ("position", "input"))
     rows = np.array(printed(program, "trajectory", len(outputs)), dtype=float)
     apart = np.abs(rows[:, 7:] - voltages).max() / np.abs(voltages).max()

@@ -31,15 +31,17 @@ from undertow.faults.mode import AbstractFault
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.outcome import Outcome
 from undertow.navigation.perfect import perfect
-from undertow.scenario import execute, factory
+from undertow.scenario import factory
 from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.faulted import faulted
-from undertow.scenario.finished_run import Measuring, certificate_of, label, metrics_of
 from undertow.scenario.plausibility import angles_meant
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.schema import Fault, Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
+from undertow.simulation.result_files import save
+from undertow.simulation.run_result import MetricsSettings, Origin, RunResult, make_result
+from undertow.simulation.run_scenario import run_loop, run_scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,32 +54,55 @@ class Run:
     """One finished run.
 
     Attributes:
-        dataset: recorded series with names and units, metrics, versions, seed and content hash.
-        metrics: `steady` (over the steady window; None when the run did not last) and `whole`: numbers by name,
-            per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
-        status: how it ended.
-        outcome: the same series as arrays, and the final states.
-        success: whether control succeeded, by the scenario's criterion or the default one; None without one.
-        loop: the closed loop that was run.
+        result: all that is known of it.
     """
 
-    dataset: xr.Dataset
-    metrics: dict[str, dict[str, Any] | None]
-    status: Status
-    outcome: Outcome
-    success: Success | None
-    loop: ClosedLoop
+    result: RunResult
 
     @property
-    def certificate(self) -> dict[str, Any] | None:
+    def dataset(self) -> xr.Dataset:
+        """Recorded series with names and units, metrics, versions, seed and content hash."""
+        return self.result.dataset
+
+    @property
+    def metrics(self) -> dict[str, dict[str, Any] | None]:
+        """Metrics `steady` (over the steady window; None when the run did not last) and `whole`.
+
+        Numbers by name, per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
+        """
+        steady = self.result.steady
+        return {"steady": None if steady is None else dict(steady), "whole": dict(self.result.whole)}
+
+    @property
+    def status(self) -> Status:
+        """How it ended."""
+        return self.result.status
+
+    @property
+    def outcome(self) -> Outcome:
+        """The same series as arrays, and the final states."""
+        return self.result.outcome
+
+    @property
+    def success(self) -> Success | None:
+        """Whether control succeeded, by the scenario's criterion or the default one; None without one."""
+        return self.result.success
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The closed loop that was run."""
+        return self.result.loop
+
+    @property
+    def certificate(self) -> Mapping[str, Any] | None:
         """Lyapunov function in numbers, and for how long each hypothesis of the proof held; None without a proof."""
-        return certificate_of(self.dataset)
+        return self.result.facts.certificate
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
         from undertow.report.figures import run_figures
 
-        return run_figures(self.dataset)
+        return run_figures(self.result.series, self.result.facts)
 
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
@@ -88,8 +113,8 @@ class Run:
         from undertow.report.run_figures import plotted
         from undertow.report.run_page import shown, write_run_page
 
-        parts = shown(self.dataset, self.loop, lambda: plotted(self.dataset))
-        write_run_page(Path(path), self.dataset, parts)
+        parts = shown(self.result, lambda: plotted(self.result))
+        write_run_page(Path(path), self.result, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)
 
@@ -105,19 +130,19 @@ class Run:
         Raises:
             OSError: the folder cannot be written.
         """
-        execute.save(self.dataset, Path(path))
+        save(self.dataset, Path(path))
 
     def __repr__(self) -> str:
-        steady, whole = self.metrics["steady"], self.metrics["whole"] or {}
-        lines = [f"Run: {self.status.word} at {float(self.outcome.ended):g} s. {self.dataset.attrs['status_sentence']}"]
+        facts = self.result.facts
+        lines = [f"Run: {facts.status.word} at {facts.ended:g} s. {facts.sentence}"]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
-        for name, metric in metrics_of(self.dataset).items():
-            if name not in whole:
+        for name, metric in facts.meanings.items():
+            if name not in facts.whole:
                 continue
-            late, value = (_shown(each.get(name), metric.unit) for each in (steady or {}, whole))
+            late, value = (_shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole))
             lines.append(f"  {name:<20}{late:>12}{value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
-        if self.success is not None:
-            lines.append(f"  {self.success.sentence(metrics_of(self.dataset))}")
+        if facts.success is not None:
+            lines.append(f"  {facts.success.sentence(facts.meanings)}")
         return "\n".join(lines)
 
 
@@ -235,13 +260,12 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     check_fit(closed_loop)
     for one in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
         warnings.warn(one.sentence, stacklevel=3)
-    outcome, left_to_xla = execute.run_loop(closed_loop, settings, start, seed)
-    attributes: dict[str, Any] = left_to_xla | {"title": "a closed loop run by undertow", "seed": seed}
-    if why := step_failure(closed_loop, settings, outcome):
-        attributes["status_sentence"] = why
+    outcome, left_to_xla = run_loop(closed_loop, settings, start, seed)
     criterion = criterion_of(None, meanings(closed_loop))
-    how = Measuring(window.of_run(settings.duration), settings.dt, criterion=criterion)
-    return _run(closed_loop, outcome, *label(closed_loop, outcome, how, attributes))
+    metrics_settings = MetricsSettings(window.of_run(settings.duration), settings.dt, criterion=criterion)
+    why = step_failure(closed_loop, settings, outcome) or ""
+    origin = Origin("a closed loop run by undertow", seed, left_to_xla=left_to_xla, why=why)
+    return Run(make_result(closed_loop, outcome, metrics_settings, origin))
 
 
 def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool = False) -> Run:
@@ -255,20 +279,7 @@ def simulate_scenario(scenario: str | Path | Mapping[str, Any], allow_code: bool
         BadInput: anything wrong with it, with key path and line.
     """
     text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
-    built, outcome, *labelled = execute.execute(text)
-    return _run(built.closed_loop, outcome, *labelled)  # pyright: ignore[reportArgumentType] - five values in this order
-
-
-def _run(
-    loop: ClosedLoop,
-    outcome: Outcome,
-    status: Status,
-    steady: Any,
-    whole: Any,
-    success: Success | None,
-    dataset: xr.Dataset,
-) -> Run:
-    return Run(dataset, {"steady": steady, "whole": whole}, status, outcome, success, loop)
+    return Run(run_scenario(text))
 
 
 def _plain(value: Any) -> Any:

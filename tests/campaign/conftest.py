@@ -66,7 +66,7 @@ def blank_figures(monkeypatch, request):
         monkeypatch.setattr(campaign_page, "_plots", lambda results, found: {})
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
-        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
+        monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
 
 
 @pytest.fixture(params=["simd", "xla"])

@@ -10,9 +10,8 @@ from undertow.campaign.prepare import prepare
 from undertow.campaign.trials import Trials
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.scenario.execute import execute
-from undertow.scenario.finished_run import requirements_of
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_scenario import run_scenario
 
 FORMULA = "within 4 s always abs(error) < 0.3"
 CAMPAIGN = f"""\
@@ -46,7 +45,7 @@ def test_robustness_is_that_of_single_runs(campaign, tmp_path):
     several: Trials = prepare(campaign).trials
     for trial in (0, 17, 39):
         data = several.data(trial) | {"requirements": {"settles": {"formula": FORMULA}}}
-        alone = requirements_of(execute(from_data(data)).dataset)["settles"]["robustness"]
+        alone = run_scenario(from_data(data)).facts.requirements["settles"].robustness
         assert rows["settles"].values[rows["trial"].values == trial] == alone
     found = json.loads((tmp_path / "out" / "summary.json").read_text())["combinations"][0]["requirements"]
     assert [one["formula"] for one in found] == [FORMULA, None]

@@ -40,7 +40,7 @@ def undertow(tmp_path, monkeypatch, capsys, request):
     if "whole_figures" not in request.fixturenames:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
-        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
+        monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
 
     def call(*arguments: str) -> Said:

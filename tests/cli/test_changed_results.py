@@ -3,17 +3,18 @@
 import pytest
 from good_scenario import SMALL
 
-from undertow.scenario.execute import execute, save
-from undertow.scenario.finished_run import compare
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
+from undertow.simulation.repetition import compare
+from undertow.simulation.result_files import save
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
-    return execute(parse(SMALL, "s.yaml", tmp_path_factory.mktemp("none"), "SCENARIO")).dataset
+    return run_scenario(parse(SMALL, "s.yaml", tmp_path_factory.mktemp("none"), "SCENARIO")).dataset
 
 
 @pytest.fixture

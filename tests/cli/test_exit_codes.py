@@ -10,7 +10,7 @@ import pytest
 from good_scenario import SCENARIO, SMALL
 
 from undertow.cli import simulate
-from undertow.scenario import execute
+from undertow.simulation import result_files
 
 
 def write(tmp_path, text=SCENARIO):
@@ -64,7 +64,7 @@ def test_run_that_fails_is_1_and_keeps_its_results(undertow, tmp_path):
 
 @pytest.mark.full
 def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
-    monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken\nin two lines")))
+    monkeypatch.setattr(simulate, "run_scenario", raising(RuntimeError("broken\nin two lines")))
     write(tmp_path)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = (
@@ -81,7 +81,7 @@ def test_internal_error_is_3(undertow, tmp_path, monkeypatch):
 @pytest.mark.parametrize("way", ["option", "environment"])
 def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
     monkeypatch.setenv("UNDERTOW_TRACEBACK", "1" if way == "environment" else "")
-    monkeypatch.setattr(simulate, "execute", raising(RuntimeError("broken")))
+    monkeypatch.setattr(simulate, "run_scenario", raising(RuntimeError("broken")))
     write(tmp_path)
     said = undertow(*(["--traceback"] if way == "option" else []), "simulate", "s.yaml", "--out", "out")
     assert said.code == 3 and "Traceback" in said.err
@@ -89,7 +89,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 
 @pytest.mark.full
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
-    monkeypatch.setattr(execute, "save", raising(OSError(28, "No space left on device", "run.nc")))
+    monkeypatch.setattr(result_files, "save", raising(OSError(28, "No space left on device", "run.nc")))
     write(tmp_path, SMALL)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = "Error: files could not be read or written: No space left on device (run.nc)"
@@ -100,7 +100,7 @@ def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
 
 @pytest.mark.full
 def test_interrupt_is_130(undertow, tmp_path, monkeypatch):
-    monkeypatch.setattr(simulate, "execute", raising(KeyboardInterrupt()))
+    monkeypatch.setattr(simulate, "run_scenario", raising(KeyboardInterrupt()))
     write(tmp_path)
     assert undertow("simulate", "s.yaml", "--out", "out").code == 130
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]

@@ -10,11 +10,12 @@ from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.run import simulate_scenario
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute, save
-from undertow.scenario.finished_run import compare
 from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
+from undertow.simulation.repetition import compare
+from undertow.simulation.result_files import save
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -37,7 +38,7 @@ def folder(tmp_path_factory):
     """A result file that names code, and a campaign of it."""
     folder = tmp_path_factory.mktemp("his")
     (folder / "my_goal.py").write_text(CODE)
-    save(execute(parse(QUICK, "s.yaml", folder, "SCENARIO")).dataset, folder / "run.nc")
+    save(run_scenario(parse(QUICK, "s.yaml", folder, "SCENARIO")).dataset, folder / "run.nc")
     (folder / "campaign.yaml").write_text("scenario: run.nc\ntrials: 2\n")
     return folder
 
@@ -124,5 +125,5 @@ def test_the_hash_is_that_of_the_code_that_ran(his):
     """Code that is edited while it runs is recorded as it was read."""
     built = build(parse(QUICK, "s.yaml", his, "SCENARIO"))
     (his / "my_goal.py").write_text(CODE + "\n# later\n")
-    run = execute(built).dataset
+    run = run_scenario(built).dataset
     assert [path.name for path in changed(run.attrs["code"], built.resolved, his)] == ["my_goal.py"]

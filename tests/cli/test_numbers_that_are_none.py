@@ -5,8 +5,8 @@ import pytest
 
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.report.run_tables import certificate_rows
-from undertow.scenario.execute import execute
-from undertow.scenario.finished_run import certificate_of
+from undertow.simulation.run_facts import facts_from
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -31,10 +31,10 @@ def test_what_is_not_finite_is_a_dash(capsys, preset, velocity, precision):
     before = jax.config.jax_enable_x64
     try:
         initial = {"velocity": [velocity] + [0.0] * 5}
-        done = execute(BASE | {"controller": {"preset": preset}, "initial": initial, "precision": precision})
+        done = run_scenario(BASE | {"controller": {"preset": preset}, "initial": initial, "precision": precision})
     finally:
         jax.config.update("jax_enable_x64", before)
-    certificate = certificate_of(done.dataset)
+    certificate = facts_from(done.dataset.attrs).certificate
     assert done.status.word == "command_not_finite"
     assert certificate is not None and certificate["start"] is None
     wide_console().print(terminal_table(certificate_rows(certificate, (0.025, 0.05))))

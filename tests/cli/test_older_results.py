@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.scenario.finished_run import compare, shortened
 from undertow.scenario.provenance import checksum, content_hash
+from undertow.simulation.repetition import compare, shortened
 
 
 def labelled(**columns):

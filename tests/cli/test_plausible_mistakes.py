@@ -201,7 +201,7 @@ def test_advice_names_its_numbers_and_the_remedy(undertow, tmp_path, monkeypatch
     def stop(*arguments):
         raise _Stop("", "", "stopped")
 
-    monkeypatch.setattr(simulate, "execute", stop)
+    monkeypatch.setattr(simulate, "run_scenario", stop)
     file, old, new, named = ADVICE[mistake]
     prepare(tmp_path, monkeypatch, file, old, new)
     *advice, last = undertow(*SIMULATE).err.splitlines()

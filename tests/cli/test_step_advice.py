@@ -10,9 +10,9 @@ from undertow.core.status import Status
 from undertow.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.scenario.build import build
 from undertow.scenario.consistency import rounded_times
-from undertow.scenario.execute import execute
 from undertow.scenario.schema import Loop
 from undertow.scenario.step_size import fastest_decay, step_advice
+from undertow.simulation.run_scenario import run_scenario
 from undertow.thrusters import first_order, linear_voltage, t200
 from undertow.vehicles import bluerov2, bluerov2_heavy
 
@@ -82,7 +82,7 @@ BASE = {
 @pytest.mark.parametrize("method", ["rk4", pytest.param("euler", marks=pytest.mark.slow)])
 def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     """x_ddot = -1000 x_dot + u at 10 ms: 2.785 (2 for Euler's method) over 1000 / s, in so many substeps, and no fewer."""
-    failed = execute(BASE | {"loop": BASE["loop"] | {"method": method}})
+    failed = run_scenario(BASE | {"loop": BASE["loop"] | {"method": method}})
     said = failed.dataset.attrs["status_sentence"]
     assert failed.status is not Status.OK and "the loop is unstable" not in said.replace("because the loop is", "")
     enough = math.ceil(0.01 * 1000 / {"rk4": 2.785, "euler": 2.0}[method])
@@ -93,7 +93,7 @@ def test_a_plant_too_stiff_for_its_steps_is_not_called_an_unstable_loop(method):
     )
     for substeps, status in ((enough - 1, False), (enough, True)):
         loop = BASE["loop"] | {"method": method, "substeps": substeps}
-        assert (execute(BASE | {"loop": loop}).status is Status.OK) == status
+        assert (run_scenario(BASE | {"loop": loop}).status is Status.OK) == status
 
 
 @pytest.mark.full
@@ -101,7 +101,7 @@ def test_an_unstable_loop_is_still_called_one():
     """A law of 100 rad/s at 10 ms: the plant is slow, and finer steps of it change nothing."""
     wild = BASE | {"plant": plant_of(1.0), "controller": {"kind": "pid", "frequency": 300.0}}
     for substeps in (1, 10):
-        failed = execute(wild | {"loop": BASE["loop"] | {"substeps": substeps, "duration": 20.0}})
+        failed = run_scenario(wild | {"loop": BASE["loop"] | {"substeps": substeps, "duration": 20.0}})
         assert failed.status is Status.DIVERGED
         assert "the loop is unstable" in failed.dataset.attrs["status_sentence"]
 
@@ -116,10 +116,10 @@ def test_a_law_too_stiff_for_one_ode():
         "disturbance": {"kind": "sinusoid"},
     }
     loop = {"kind": "continuous", "duration": 20.0, "record": 0.1}
-    failed = execute(scenario | {"loop": loop | {"dt": 0.05}})
+    failed = run_scenario(scenario | {"loop": loop | {"dt": 0.05}})
     assert failed.status is not Status.OK
     assert "plant and controller have a time constant of" in failed.dataset.attrs["status_sentence"]
-    assert execute(scenario | {"loop": loop | {"dt": 0.01}}).status is Status.OK
+    assert run_scenario(scenario | {"loop": loop | {"dt": 0.01}}).status is Status.OK
 
 
 @pytest.mark.full
@@ -150,7 +150,7 @@ def test_times_that_are_no_multiples_are_told(loop, said):
     if loop.get("kind") != "continuous":
         built = build(BASE | {"plant": plant_of(1.0), "loop": loop})
         assert set(given) <= set(built.advice())
-        found = execute(built)
+        found = run_scenario(built)
         end = round(loop["duration"] / loop["dt"]) * loop["dt"]
         assert float(found.outcome.ended) == pytest.approx(end, rel=1e-12)
         left = end - float(found.dataset["time"][-1])

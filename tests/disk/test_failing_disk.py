@@ -77,7 +77,7 @@ IN_PLACE = {
     "undertow/cli/logs.py": "a draft of the results folder",
     "undertow/cli/campaign.py": "a folder that takes another's place",
     "undertow/cli/compare.py": "a folder that takes another's place",
-    "undertow/scenario/execute.py": "a draft of the results folder",
+    "undertow/simulation/result_files.py": "a draft of the results folder",
     "undertow/logs/unpacking.py": "a temporary folder",
     "undertow/report/plotting.py": "a draft of the results folder",
     "undertow/report/prediction_page.py": "a draft of the results folder",

@@ -134,7 +134,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     if not whole:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
-        monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
+        monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": "__docs__"}

@@ -62,7 +62,7 @@ def test_long_scenario_is_built(name):
 def test_scenario(name, tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
     monkeypatch.setattr(writing, "png", lambda figure: b"blank")
-    monkeypatch.setattr(run_page, "replay_of", lambda run, loop: None)
+    monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out"), "--no-prediction"]) == 0
     steady = with_all_outputs(json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"])
     for metric, (value, tolerance) in KNOWN[name].items():

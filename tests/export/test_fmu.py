@@ -17,7 +17,7 @@ from undertow.cli.main import run
 from undertow.core.errors import BadInput
 from undertow.export.fmu import compiled, export_fmu
 from undertow.scenario.build import build
-from undertow.scenario.execute import dump
+from undertow.scenario.reading import dump
 
 pytestmark = pytest.mark.compiler
 

@@ -14,7 +14,7 @@ from undertow.export.controller import export_controller
 from undertow.export.fmu import export_fmu
 from undertow.export.vehicle import export_vehicle
 from undertow.scenario.build import build
-from undertow.scenario.execute import dump
+from undertow.scenario.reading import dump
 
 pytestmark = pytest.mark.compiler
 

@@ -10,9 +10,9 @@ from undertow.falsification.gradient import Gradient
 from undertow.falsification.objective import Objective, Violation
 from undertow.falsification.shrink import shrink
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import Bounds
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -98,7 +98,7 @@ def nearest_by_superposition(two):
         data = two.data | {
             "disturbance": [one | {"amplitude": a} for one, a in zip(TWO["disturbance"], (first, second), strict=True)]
         }
-        outcome = execute(data).outcome
+        outcome = run_scenario(data).outcome
         return np.asarray(outcome.signals["error"])[np.asarray(outcome.time) >= 6 - 1e-9, 0]
 
     rest = error(0.0, 0.0)
@@ -126,7 +126,7 @@ def test_two_disturbances_by_superposition(two, method):
 def test_a_single_run_repeats_the_counterexample(two):
     found = found_in(two, budget=300)
     assert found.repeated()
-    alone = execute(found.single_runs[-1].built.resolved)
+    alone = run_scenario(found.single_runs[-1].built.resolved)
     assert judged_alone(found.evaluator.requirements, alone) == found.broken
     assert not found.broken["kept"] > 0
     data = as_data(found)

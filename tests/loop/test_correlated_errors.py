@@ -8,7 +8,6 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.navigation.consistency import innovation_monitor, normalised_square
-from undertow.scenario.finished_run import navigation_of
 from undertow.sensors import compass, dvl, imu
 from undertow.sensors.gauss_markov import CorrelatedErrors, Disturbed
 from undertow.sensors.motion import motion_of
@@ -136,13 +135,12 @@ def moving(sensors, **options):
             "navigation": {"kind": "kalman", "sensors": sensors} | options,
             "loop": {"dt": 0.01, "duration": 60, "record": 0.5},
         }
-    ).dataset
+    ).result.facts.navigation
 
 
 @pytest.mark.full
 def test_a_filter_that_is_told_is_consistent_and_one_that_is_not_says_so():
-    told, untold = (moving(ERRORS, sensor_error_states=known) for known in (True, False))
-    accurate, wrong = navigation_of(told), navigation_of(untold)
+    accurate, wrong = (moving(ERRORS, sensor_error_states=known) for known in (True, False))
     assert accurate["findings"] == [] and 3 < accurate["nees"] < 18
     assert [one["inconsistent"] for one in accurate["sensors"]] == [0.0] * 5  # propeller_speed is not compared
     by_name = {one["sensor"]: one for one in accurate["sensors"]}
@@ -167,6 +165,6 @@ def test_a_constant_error_that_nothing_contradicts_is_in_no_innovation():
     }
     bent = ["imu", "dvl", "depth", {"kind": "compass", "soft_iron": 0.05}, "position_fix"]
     bent = {"kind": "kalman", "sensors": bent, "sensor_error_states": False}
-    said = navigation_of(ut.simulate_scenario(scenario | {"navigation": bent}).dataset)
+    said = ut.simulate_scenario(scenario | {"navigation": bent}).result.facts.navigation
     assert all(one["inconsistent"] == 0 for one in said["sensors"])
     assert said["nees"] > 18 and "no innovation shows it" in said["findings"][0]

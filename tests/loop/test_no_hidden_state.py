@@ -12,8 +12,8 @@ import pytest
 import undertow as ut
 from undertow.campaign.task import run_trials, site
 from undertow.core.errors import BadInput
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
+from undertow.simulation.run_scenario import run_scenario
 
 # What other packages do to a process when they are imported is theirs; they are imported before.
 PROCESS = """
@@ -95,12 +95,12 @@ def by_parts(precision):
 
 
 def by_scenario(precision):
-    found = execute(SCENARIO | {"precision": precision, "seed": 3})
+    found = run_scenario(SCENARIO | {"precision": precision, "seed": 3})
     return [found.dataset["position"].values, found.whole["input_variation"]]
 
 
 def by_xla(precision):
-    found = execute(SCENARIO | {"precision": precision, "seed": 3, "loop": SCENARIO["loop"] | {"backend": "xla"}})
+    found = run_scenario(SCENARIO | {"precision": precision, "seed": 3, "loop": SCENARIO["loop"] | {"backend": "xla"}})
     return [found.dataset["position"].values, found.whole["input_variation"]]
 
 

@@ -10,8 +10,8 @@ from undertow.campaign.task import run_trials
 from undertow.cli.main import run as command
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump, read
+from undertow.simulation.run_scenario import run_scenario
 
 OVERSHOOT = '''
 import jax.numpy as jnp
@@ -142,7 +142,7 @@ def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
             "steady": {"start": 0.0, "stop": 3.99},
         }
         (folder / "one.yaml").write_text(dump(again), encoding="utf-8")
-        wanted = execute(read(folder / "one.yaml"))
+        wanted = run_scenario(read(folder / "one.yaml"))
         assert found["overshoot"][trial] == pytest.approx(wanted.steady["overshoot"], rel=1e-9)
         assert found["success"][trial] == wanted.success.within
     assert np.isnan(found["never"]).all()
@@ -151,7 +151,7 @@ def test_a_metric_of_ones_own_in_a_campaign(folder, backend):
 def test_a_signal_of_ones_own(folder):
     """Declared by a law in one file: recorded, labelled, with its unit, and kept as a series of a campaign."""
     law = {"kind": "./sliding.py:sliding"}
-    run = execute(read(written(folder, controller=law))).dataset
+    run = run_scenario(read(written(folder, controller=law))).dataset
     surface = -run["velocity"] + 2 * run["error"]
     np.testing.assert_allclose(run["surface"], surface, atol=1e-12)
     np.testing.assert_allclose(run["distance"], np.abs(surface.values).max(-1), atol=1e-12)
@@ -183,7 +183,7 @@ def test_a_certificate_of_ones_own(folder, capsys):
 
 def test_what_a_law_lacks_is_not_there(folder):
     """No estimate, so neither its error nor a zero in its place; no weights, so no largest one."""
-    run = execute(read(written(folder, controller={"kind": "./sliding.py:sliding"})))
+    run = run_scenario(read(written(folder, controller={"kind": "./sliding.py:sliding"})))
     assert not {"estimate", "robust_term", "weights", "modelling_error"} & set(run.dataset)
     lacking = ("estimation_rms", "robust_rms", "model_rms", "weights_peak")
     assert not {f"{group}{name}" for group in ("", "position_", "attitude_") for name in lacking} & set(run.whole)
@@ -210,7 +210,7 @@ def test_what_a_law_lacks_is_not_there(folder):
 def test_declared_and_given_must_agree(folder, old, new, said):
     (folder / "sliding.py").write_text(SLIDING.replace(old, new))
     with pytest.raises(BadInput, match=said):
-        execute(read(written(folder, controller={"kind": "./sliding.py:sliding"})))
+        run_scenario(read(written(folder, controller={"kind": "./sliding.py:sliding"})))
 
 
 @pytest.mark.parametrize(

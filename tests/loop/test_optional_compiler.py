@@ -13,7 +13,7 @@ from undertow import process_setup
 from undertow.bench import measure
 from undertow.cli.main import run
 from undertow.loop import simd_batch
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 SCENARIO = """
 plant: {kind: double_integrator, axes: 1, limit: 20.0}
@@ -98,7 +98,7 @@ def test_simulate_without_llvm(tmp_path):
 def execute_file(folder):
     from undertow.scenario.reading import read
 
-    executed = execute(read(folder / "scenario.yaml"))
+    executed = run_scenario(read(folder / "scenario.yaml"))
     assert "left_to_xla" not in executed.dataset.attrs
     return executed.dataset
 

@@ -16,8 +16,8 @@ from undertow.core import runtime
 from undertow.core.contracts import Load, Pose
 from undertow.disturbances.u1 import u1
 from undertow.numerics.rotations import cross
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
+from undertow.simulation.run_scenario import run_scenario
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},
@@ -29,10 +29,10 @@ SCENARIO = {
 }
 PROGRAM = """
 import sys
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 from undertow.scenario.reading import read
 from pathlib import Path
-print(execute(read(Path(sys.argv[1]))).dataset.attrs["content_hash"])
+print(run_scenario(read(Path(sys.argv[1]))).dataset.attrs["content_hash"])
 """
 
 
@@ -41,7 +41,7 @@ def scenario(precision, backend="simd"):
 
 
 def content(precision, backend="simd"):
-    found = execute(scenario(precision, backend))
+    found = run_scenario(scenario(precision, backend))
     assert found.outcome.signals["position"].dtype == precision == str(found.dataset["position"].dtype)
     return found.dataset.attrs["content_hash"]
 

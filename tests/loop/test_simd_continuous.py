@@ -18,7 +18,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 HOW = {"duration": 0.5, "record_step": 0.02, "dt": 1e-3}
 
@@ -89,7 +89,7 @@ def test_a_scenario_is_run_by_the_backend_that_it_names():
         "disturbance": {"kind": "sinusoid", "amplitude": 1.0, "frequency": 3.0},
         "loop": {"kind": "continuous", "duration": 1.0},
     }
-    own = execute(scenario)
-    other = execute(scenario | {"loop": scenario["loop"] | {"backend": "xla"}})
+    own = run_scenario(scenario)
+    other = run_scenario(scenario | {"loop": scenario["loop"] | {"backend": "xla"}})
     assert "left_to_xla" not in own.dataset.attrs and "left_to_xla" not in other.dataset.attrs
     assert own.whole["position_rms"] == pytest.approx(other.whole["position_rms"], rel=1e-10)

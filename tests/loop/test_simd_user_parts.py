@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 FILE = Path(__file__).with_name("user_parts.py")
 
@@ -49,7 +49,7 @@ SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predi
 )
 def test_the_same_figures_and_the_reason_where_it_is_left_to_xla(name):
     with jax.numpy_dtype_promotion("standard"):  # users are not as strict as these tests
-        found, wanted = (execute(scenario(name, backend)).dataset for backend in ("simd", "xla"))
+        found, wanted = (run_scenario(scenario(name, backend)).dataset for backend in ("simd", "xla"))
     why = found.attrs.get("left_to_xla")
     assert why == LEFT.get(name) or (name == "field" and why.startswith(f"{LEFT[name]}: "))
     assert "left_to_xla" not in wanted.attrs

@@ -17,8 +17,8 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import DoubleIntegrator, double_integrator
 from undertow.references.setpoint import setpoint
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import dump
+from undertow.simulation.run_scenario import run_scenario
 
 KNOWN = {"position_rms": Metric("m", ""), "attitude_rms": Metric("rad", "")}
 
@@ -117,20 +117,20 @@ SCENARIO = {
 @pytest.mark.full
 def test_completed_is_not_success():
     """The same loop with a limit above and below its error; the default where nothing is said."""
-    found = execute(SCENARIO)
+    found = run_scenario(SCENARIO)
     error = found.steady["position_rms"]
     assert found.status is Status.OK and found.dataset.attrs["status"] == "completed"
     assert found.success.criterion == {"position_rms": 0.05, "saturated_fraction": 0.25}
     assert found.success.within == (error < 0.05)
     for most, within in ((1.01 * error, True), (0.99 * error, False)):
-        assert execute(SCENARIO | {"success": {"position_rms": most}}).success.within is within
-    assert execute(SCENARIO | {"success": {}}).success is None
+        assert run_scenario(SCENARIO | {"success": {"position_rms": most}}).success.within is within
+    assert run_scenario(SCENARIO | {"success": {}}).success is None
 
 
 @pytest.mark.full
 def test_success_of_trials():
     """Of the two amplitudes one is within; a trial that fails is not, and without a criterion none is judged."""
-    error = execute(SCENARIO | {"steady": {"every_step": True}}).steady["position_rms"]
+    error = run_scenario(SCENARIO | {"steady": {"every_step": True}}).steady["position_rms"]
     asked = {
         "scenario": SCENARIO | {"success": {"position_rms": 1.5 * error}},
         "trials": 1,

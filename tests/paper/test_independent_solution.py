@@ -6,7 +6,7 @@ import pytest
 from undertow.bench.plain_numpy import ALPHA, CQ, CT, K3, KE, KF, KT, M_INV, B, R, jacobian, law, rk4, suite_u1
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, scenario
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -47,7 +47,7 @@ def paper_example(fidelity, composite, duration=20.0, h=1e-3, every=10):
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_example_1_gives_the_reference_figures(controller):
-    run = execute(scenario("", composite=CONTROLLERS[controller]))
+    run = run_scenario(scenario("", composite=CONTROLLERS[controller]))
     for metric, expected in REFERENCE[controller].items():
         np.testing.assert_allclose(with_all_outputs(run.steady)[metric], expected, rtol=0.02)
 
@@ -64,7 +64,7 @@ def check(run, solution):
 def test_example_2_agrees_with_plain_numpy(controller):
     loop = {"kind": "continuous", "duration": 12.0}
     window = {"start": 10.0, "stop": 12.0}
-    run = execute(scenario("", fidelity="static", composite=CONTROLLERS[controller], loop=loop, steady=window))
+    run = run_scenario(scenario("", fidelity="static", composite=CONTROLLERS[controller], loop=loop, steady=window))
     check(
         with_all_outputs(run.steady), paper_example("static", CONTROLLERS[controller], duration=12.0, h=2e-3, every=5)
     )
@@ -74,5 +74,5 @@ def test_example_2_agrees_with_plain_numpy(controller):
 @pytest.mark.parametrize("fidelity", ["ideal", "static"])
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_examples_agree_with_plain_numpy_throughout(fidelity, controller):
-    run = execute(scenario("", fidelity=fidelity, composite=CONTROLLERS[controller]))
+    run = run_scenario(scenario("", fidelity=fidelity, composite=CONTROLLERS[controller]))
     check(with_all_outputs(run.steady), paper_example(fidelity, CONTROLLERS[controller]))

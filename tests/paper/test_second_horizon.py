@@ -17,7 +17,7 @@ from undertow.reproduction.claims.tracking import perfect_variation
 from undertow.reproduction.running import run_batches
 from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -47,7 +47,7 @@ def test_a_batch_is_its_runs_one_by_one():
     runs["d"] = scenario("d", loop=horizons.sampled(2.0), **SIX_AXES, disturbance="none")
     found = flown(runs, ((0.0, 2.0), (1.0, 4.0)))
     for name, (start, stop) in (("a", (0.0, 2.0)), ("b", (1.0, 4.0))):
-        alone = execute(runs[name] | {"steady": {"start": start, "stop": stop, "every_step": True}})
+        alone = run_scenario(runs[name] | {"steady": {"start": start, "stop": stop, "every_step": True}})
         window = found[name].windows[0 if name == "a" else 1]
         for metric in ("tracking_rms", "input_variation", "weights_peak"):
             assert window[metric] == pytest.approx(with_all_outputs(alone.steady)[metric], rel=1e-12), (name, metric)
@@ -106,7 +106,7 @@ def test_weights_drift_until_the_loop_is_stable():
 
 def test_perfect_cancellation_moves_the_voltages_too():
     """U1 alone asks for 48.5 V/s: of the 53.5 and 48.8 of RCAFC and RAFC 5.0 and 0.3 are too much."""
-    run = execute(scenario("", loop=horizons.sampled(20.0) | {"record": 0.01}))
+    run = run_scenario(scenario("", loop=horizons.sampled(20.0) | {"record": 0.01}))
     assert perfect_variation(run) == pytest.approx(48.5, abs=0.05)
 
 

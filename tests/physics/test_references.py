@@ -17,7 +17,7 @@ from undertow.plants.double_integrator import double_integrator
 from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
 from undertow.references.setpoint import Transition
 from undertow.scenario import factory
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)
@@ -175,7 +175,7 @@ def test_settling_starts_where_the_plant_does_unless_told():
         "loop": {"duration": 0.1, "dt": 0.01},
         "initial": {"position": [0.1]},
     }
-    assert float(execute(cart).dataset["reference"][0, 0]) == 0.1
+    assert float(run_scenario(cart).dataset["reference"][0, 0]) == 0.1
     plant = double_integrator(2)
     for simulate in (sampled.simulate, continuous.simulate):
         law = rcaf(plant.model(), preset="paper", sets=3)

@@ -15,8 +15,8 @@ from undertow.realtime.control_loop import RealTimeLoop, Reason
 from undertow.realtime.loop_clock import SimulatedClock
 from undertow.realtime.vehicle_link import VehicleLink
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -97,7 +97,7 @@ class BiasAndLoss(AbstractFaults):
 
 def test_faults_are_those_of_a_simulation(heavy):
     faulty = heavy._replace(closed_loop=dataclasses.replace(heavy.closed_loop, faults=BiasAndLoss()))
-    link, record = run_of(faulty), execute(faulty).dataset
+    link, record = run_of(faulty), run_scenario(faulty).dataset
     positions, _ = map(np.array, zip(*link.measured, strict=True))
     np.testing.assert_array_equal(positions, record["measured_position"].values[:-1])
     np.testing.assert_array_equal(link.sent[:-1], record["commanded_input"].values[:-1])

@@ -8,6 +8,8 @@ import pytest
 
 from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
 from undertow.report.run_figures import plotted
+from undertow.simulation.run_facts import facts_from
+from undertow.simulation.run_result import RunRecord
 
 pytestmark = pytest.mark.full
 
@@ -24,9 +26,13 @@ pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
 """
 
 
+def record(run):
+    return RunRecord(run, facts_from(run.attrs))
+
+
 @pytest.fixture(scope="module")
 def here(runs):
-    return plotted(runs["rafc"], "wide")
+    return plotted(record(runs["rafc"]), "wide")
 
 
 def elsewhere(run, folder, meanwhile="pass"):
@@ -52,8 +58,8 @@ def test_drawn_here_where_the_process_was_killed(runs, here, tmp_path):
 def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
     from undertow.report import run_figures
 
-    monkeypatch.setattr(run_figures, "run_plots", lambda run: {"error": lambda: 1 / 0})
-    found = plotted(runs["rafc"])
+    monkeypatch.setattr(run_figures, "run_plots", lambda *_: {"error": lambda: 1 / 0})
+    found = plotted(record(runs["rafc"]))
     assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
 
 

@@ -24,8 +24,10 @@ from undertow.report.replay.video import _Scenes, check_video
 from undertow.report.run_figures import LARGE
 from undertow.report.run_page import Shown, write_run_page
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_facts import facts_from
+from undertow.simulation.run_result import RunRecord, RunResult
+from undertow.simulation.run_scenario import run_scenario
 from undertow.thrusters.first_order import first_order
 
 pytestmark = pytest.mark.full
@@ -106,7 +108,7 @@ def test_limits_of_thrust():
 
 
 def test_replay_of_a_run(run, loop):
-    replay = replay_of(run, loop)
+    replay = replay_of(run, loop, 0, None)
     assert replay.time[[0, -1]] == pytest.approx([0.0, 15.0]) and np.diff(replay.time) == pytest.approx(0.05)
     assert all(len(values) == len(replay.time) and np.isfinite(values).all() for values in replay.series.values())
     assert replay.series["position"] == pytest.approx(run["position"].values[:1501:5, :3])
@@ -136,15 +138,16 @@ def test_plant_that_is_no_vehicle_has_no_replay(run):
     pendulum = ClosedLoop(
         plant, ut.rcaf(plant.model(), preset="paper"), ut.references.sine(), ut.disturbances.none(), perfect()
     )
-    assert replay_of(run, pendulum) is None
+    assert replay_of(run, pendulum, 0, None) is None
 
 
 def test_size_is_that_of_the_file_or_follows_from_mass_and_inertia(run):
     odin = ut.vehicles.odin()
     low = np.sqrt(6 * (8.0 - 2 * 125 * 0.05**2) / 125)  # 8 kg m^2 about an origin 5 cm above the centre of gravity
-    assert hull_size(odin, run) == pytest.approx([np.sqrt(6 * 8.0 / 125)] * 2 + [low])  # its sphere is 0.62 m wide
+    assert hull_size(odin, None) == pytest.approx([np.sqrt(6 * 8.0 / 125)] * 2 + [low])  # its sphere is 0.62 m wide
     scenario = "plant: {vehicle: {kind: my_rov.yaml, contents: {size: [1.0, 0.5, 0.4]}}}"
-    assert hull_size(odin, run.assign_attrs(scenario=scenario)).tolist() == [1.0, 0.5, 0.4]
+    known = facts_from(run.attrs | {"scenario": scenario}).hull
+    assert hull_size(odin, known).tolist() == [1.0, 0.5, 0.4]
 
 
 def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):
@@ -155,7 +158,7 @@ def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):
 
 def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_path):
     pictures = {f"figure{number}": "x" * LARGE for number in range(6)}
-    write_run_page(tmp_path / "run.html", run, Shown(pictures, two_minutes, []))
+    write_run_page(tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), Shown(pictures, two_minutes, []))
     page = (tmp_path / "run.html").read_text()
     assert len(page) < 2_000_000
     words = [re.sub(r"<script.*?</script>", "", page, flags=re.S)]
@@ -171,7 +174,7 @@ def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_pa
 
 def test_page_without_three_js_says_what_to_install(run, two_minutes, tmp_path, monkeypatch):
     monkeypatch.setattr(replay_section, "_THREE_JS", ("no_such_package", "three.min.js"))
-    write_run_page(tmp_path / "run.html", run, Shown({}, two_minutes, []))
+    write_run_page(tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), Shown({}, two_minutes, []))
     page = (tmp_path / "run.html").read_text()
     assert "pip install jupyter-threejs-sage==130" in page and "<script" not in page
 
@@ -197,7 +200,7 @@ def test_trials_are_run_again_as_they_were(trials):
     assert failures == [] and [replay.label for replay in replays] == list(trials)
     assert [replay.status for replay in replays] == ["completed", "diverged", "completed"]
     for replay, built in zip(replays, trials.values(), strict=True):
-        single = replay_of(execute(built).dataset, built.closed_loop)
+        single = replay_of(run_scenario(built).series, built.closed_loop, built.scenario.seed, None)
         assert single is not None and (replay.time == single.time).all()
         for name, values in single.series.items():
             assert replay.series[name] == pytest.approx(values, rel=1e-9, abs=1e-9), name
@@ -211,8 +214,8 @@ def test_failed_trials_leave_the_others(trials, monkeypatch):
 
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
-    monkeypatch.setattr(run_page, "replay_of", lambda run, loop: 1 / 0)
-    shown = run_page.shown(run, loop, lambda: Plotted({}, {}, []))
+    monkeypatch.setattr(run_page, "replay_of", lambda *_: 1 / 0)
+    shown = run_page.shown(RunResult(run, facts_from(run.attrs), loop, None), lambda: Plotted({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
 
 

@@ -5,9 +5,9 @@ import xarray as xr
 
 from undertow.reproduction.running import begin_all
 from undertow.reproduction.side_by_side import Tasks, side_by_side
-from undertow.scenario.execute import execute
-from undertow.scenario.finished_run import compare
 from undertow.scenario.reading import read
+from undertow.simulation.repetition import compare
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -32,7 +32,7 @@ def test_a_kept_run_is_repeated_bit_for_bit(tmp_path):
         assert "velocity" in kept.attrs["left_out"].split(", ")
         for name in kept.data_vars:
             assert kept[name].values.tobytes() == ran.dataset[name].values.tobytes()
-    repeated = execute(read(file)).dataset
+    repeated = run_scenario(read(file)).dataset
     assert set(repeated.data_vars) == set(ran.dataset.data_vars)
     found = compare(file, repeated)
     assert found.equal and found.sentence.startswith("axis.nc was repeated bit for bit (content hash ")

@@ -15,8 +15,8 @@ from undertow.bench import measure, plain_numpy, workload
 from undertow.cli.main import run
 from undertow.loop import sampled
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import read
+from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 
@@ -94,7 +94,7 @@ def test_what_jax_would_do_on_a_gpu():
 def recorded_rms(example):
     """Rms of all errors over the second half of an example, from its records, computed by XLA."""
     text = read(EXAMPLES / f"{example}.yaml")
-    run = execute(text._replace(data=text.data | {"loop": text.data["loop"] | {"backend": "xla"}})).dataset
+    run = run_scenario(text._replace(data=text.data | {"loop": text.data["loop"] | {"backend": "xla"}})).dataset
     late = run["error"].sel(time=run["time"] >= run["time"][-1] / 2)
     return np.sqrt(np.mean(late.values**2))
 

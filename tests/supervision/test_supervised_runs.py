@@ -14,8 +14,8 @@ from undertow.loop import simd_batch
 from undertow.loop.sampled import moved
 from undertow.numerics.integrators import METHODS
 from undertow.scenario.build import build
-from undertow.scenario.finished_run import losses_of
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_result import lost_thrusters
 from undertow.supervision.conditions import Request, State
 from undertow.supervision.supervisor import supervisor
 from undertow.supervision.transition_log import transitions
@@ -157,7 +157,7 @@ def _with_a_dead_thruster(thruster, onset, **changes):
             **changes,
         }
     ).dataset
-    (loss,) = losses_of(run)
+    (loss,) = lost_thrusters(run)
     return run, loss
 
 

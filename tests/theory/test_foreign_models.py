@@ -14,8 +14,8 @@ from undertow.checks.flow_stability import flow_advice, munk_rate
 from undertow.core import runtime
 from undertow.core.contracts import AbstractController
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_scenario import run_scenario
 from undertow.vehicles import bluerov2_heavy
 
 CURRENT = 0.5  # m/s
@@ -69,7 +69,7 @@ def test_a_slow_loop_is_unstable_in_a_current_that_turns_its_vehicle():
         points = [OperatingConditions("", load, None), OperatingConditions("", load, np.array([CURRENT, 0.0, 0.0]))]
         with runtime.in_precision("float64"):
             found[rate] = [margins.certify(built.closed_loop, 1 / rate, np.zeros(6), [one])[0] for one in points]
-        attitude[rate] = float(execute(built).steady["attitude_rms"])
+        attitude[rate] = float(run_scenario(built).steady["attitude_rms"])
     assert found[20][0] < 1 < found[20][1]
     assert max(found[50]) < 1
     assert attitude[20] > 0.3 and attitude[50] < 0.05
@@ -111,6 +111,6 @@ LISSAJOUS = {"kind": "lissajous", "amplitude": [2.0, 1.0, 0.5, 0.8], "frequency"
 @pytest.mark.parametrize(("plant", "model"), [("px4", "vonbenzon2022"), ("gazebo_box_drag", "vonbenzon2022")])
 def test_a_model_with_seven_times_the_drag_is_no_danger(plant, model):
     """155 N at 1 m/s are compensated where the vehicle has 22: at the measured velocity that drove it away."""
-    run = execute(build(from_data(scenario(plant, model, 50, LISSAJOUS, (0.3, 0.2, 0)))))
+    run = run_scenario(build(from_data(scenario(plant, model, 50, LISSAJOUS, (0.3, 0.2, 0)))))
     assert run.steady["position_rms"] < 0.02
     assert run.steady["attitude_rms"] < 0.02

@@ -21,8 +21,8 @@ from undertow.plants import double_integrator, hybrid_vehicle, linear_plant
 from undertow.prediction.operating_point import operating_point, predicted
 from undertow.references import setpoint
 from undertow.scenario.build import build
-from undertow.scenario.execute import execute
 from undertow.scenario.reading import from_data
+from undertow.simulation.run_scenario import run_scenario
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2, odin, remus100
 
@@ -267,7 +267,7 @@ def test_thrust_that_holds_a_vehicle_is_no_load():
     np.testing.assert_allclose((plant.thruster_matrix @ known.mean.at["u"])[2], surplus, rtol=1e-6)
     in_current = build(from_data(scenario | {"disturbance": {"kind": "current", "velocity": [0.3, 0.2, 0]}}))
     found = operating_point(in_current).mean.at["u"]
-    simulated = np.asarray(execute(in_current).outcome.signals["input"])[-1]
+    simulated = np.asarray(run_scenario(in_current).outcome.signals["input"])[-1]
     np.testing.assert_allclose(found, simulated, rtol=2e-3, atol=0.2)
 
 
@@ -299,7 +299,7 @@ def test_runs_do_what_was_foretold(name):
     built = build(common | {"reference": {"kind": "setpoint", "position": [0.0, 0.0]}} | SCENARIOS[name])
     metrics, why_not = predicted(operating_point(built))
     assert metrics is not None, why_not
-    run = execute(built)
+    run = run_scenario(built)
     for one in compare_metrics(metrics, run.steady):
         if one.measured > 1e-6 and not one.name.endswith(("max", "peak")):
             assert one.departure < 0.10, one

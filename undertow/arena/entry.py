@@ -13,8 +13,8 @@ from undertow.campaign.prepare import Prepared, prepare_campaign
 from undertow.comparison.candidates import Candidate, in_letters
 from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
+from undertow.core.json_text import to_json
 from undertow.scenario.build import build
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import from_data
 
 LAWS, ENTRY = "laws", "entry.json"

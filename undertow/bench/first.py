@@ -5,12 +5,12 @@ from undertow.process_setup import prepare
 prepare()
 
 from undertow.bench.workload import W1
-from undertow.scenario.execute import execute
+from undertow.simulation.run_scenario import run_scenario
 
 
 def main() -> None:
     """Run W1 and print its rms error of position."""
-    steady = execute(W1).steady
+    steady = run_scenario(W1).steady
     print(steady and steady["position_rms"])
 
 

@@ -17,9 +17,9 @@ from undertow.core.metric import Metric
 from undertow.loop.simd_batch import unavailable
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import whole_steps
-from undertow.scenario.finished_run import law_of, rules
 from undertow.scenario.reading import Text
 from undertow.scenario.schema import check_kind
+from undertow.simulation.run_result import law_of, rules
 
 
 class Prepared(NamedTuple):

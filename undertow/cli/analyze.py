@@ -13,11 +13,11 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import titled, wide_console
+from undertow.core.json_text import to_json
 from undertow.prediction.predict import predict, summary
 from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import Rows, tables, write_prediction
 from undertow.scenario.build import build
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")

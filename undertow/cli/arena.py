@@ -30,8 +30,8 @@ from undertow.comparison.step_time import step_time
 from undertow.core import checks
 from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.json_text import to_json
 from undertow.report.arena_page import PAGE, SCORE, write_board
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import dump
 
 # All laws of undertow but for `nmpc`, which runs by XLA and takes hours.

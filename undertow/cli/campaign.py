@@ -22,8 +22,8 @@ from undertow.cli.tables import titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.core.disk import replacing_folder, write_whole
 from undertow.core.errors import BadInput
+from undertow.core.json_text import to_json
 from undertow.report.campaign_page import by_xla, write_campaign
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.part_cache import PartCache
 
 

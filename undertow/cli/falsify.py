@@ -17,11 +17,11 @@ from undertow.cli.trials import trial_text
 from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.core.json_text import to_json
 from undertow.falsification.falsify import METHODS, Falsified, as_data, falsify
 from undertow.falsification.objective import Violation
 from undertow.report.figures import save_all
 from undertow.report.figures.falsification import beside_nominal_figure, search_figure
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
 
 _WRITTEN = ("falsify.json", "counterexample.yaml", "figures")

@@ -119,11 +119,11 @@ def _score(
     scenario: Path, path: Path, mapping: Path | None, out: Path | None, overwrite: bool, allow_code: bool
 ) -> int:
     """Score the model of a scenario against a log, and write score.json and figures/ to a folder."""
+    from undertow.core.json_text import to_json
     from undertow.interop.log_score import AXES, UNITS, score
     from undertow.report.figures import save
     from undertow.report.figures.log_score import log_score_figure
     from undertow.scenario.build import build
-    from undertow.scenario.finished_run import to_json
     from undertow.scenario.reading import read
 
     console = wide_console()

@@ -1,6 +1,7 @@
 """What `simulate` adds when the results are written: figures, page, and the prediction beside the run."""
 
 import contextlib
+from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,8 +26,8 @@ from undertow.report.replay.replay_data import Replay, hull_size
 from undertow.report.run_page import Shown, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
-from undertow.scenario.execute import Executed, write_metrics
-from undertow.scenario.finished_run import metrics_of
+from undertow.simulation.result_files import write_metrics
+from undertow.simulation.run_result import ScenarioResult
 
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10
@@ -48,7 +49,7 @@ class PredictedMetrics(NamedTuple):
 
 
 def present(
-    executed: Executed,
+    result: ScenarioResult,
     plotting: PlottingProcess,
     predicting: Future[PredictedMetrics] | None,
     asked: bool,
@@ -59,7 +60,7 @@ def present(
     """Write log, figures, page and prediction of a run.
 
     Args:
-        executed: the run.
+        result: of the run.
         plotting: plots its figures.
         predicting: predicts its metrics; None for no prediction.
         asked: whether the user asked for it: the reason is printed as well where there can be none.
@@ -72,53 +73,58 @@ def present(
     """
     page = draft.path / "run.html"
     with stage(console, "figures and page"):
-        looks = shown(executed.dataset, executed.built.closed_loop, lambda: _written(executed, plotting, draft))
+        looks = shown(result, lambda: _written(result, plotting, draft))
         warn_of(looks.failures)
-        write_run_page(page, executed.dataset, looks)
+        write_run_page(page, result, looks)
     draft.publish()  # nobody waits for the prediction, which is added to the page
     console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
     if predicting is not None:
-        _add_prediction(executed, predicting, asked, draft, looks, console)
+        _add_prediction(result, predicting, asked, draft, looks, console)
     return looks.replay
 
 
 def _add_prediction(
-    executed: Executed, predicting: Future[PredictedMetrics], asked: bool, draft: Draft, looks: Shown, console: Console
+    result: ScenarioResult,
+    predicting: Future[PredictedMetrics],
+    asked: bool,
+    draft: Draft,
+    looks: Shown,
+    console: Console,
 ) -> None:
     """Add the prediction to the results and print it; nothing is printed where there can be none, unless asked for."""
     foregone = predicting.done() and predicting.result().foregone
     with contextlib.nullcontext() if foregone else stage(console, "prediction"):
         predicted = predicting.result()
-    write_metrics(executed, draft.path, in_results(predicted))
+    write_metrics(result, draft.path, in_results(predicted))
     if predicted.metrics is not None:
-        write_run_page(draft.path / "run.html", executed.dataset, looks, predicted.metrics)
+        write_run_page(draft.path / "run.html", result, looks, predicted.metrics)
     draft.publish()
     if asked or not foregone:
-        _print_prediction(predicted, executed, console)
+        _print_prediction(predicted, result, console)
 
 
-def _written(executed: Executed, plotting: PlottingProcess, draft: Draft) -> Plotted:
+def _written(result: ScenarioResult, plotting: PlottingProcess, draft: Draft) -> Plotted:
     """The figures, once their files are written; meanwhile the log, because another process plots them."""
-    plant = executed.built.closed_loop.plant
-    size = hull_size(plant.vehicle, executed.dataset).tolist() if isinstance(plant, HybridVehicle) else None
-    write_mcap(log_of_run(executed.dataset), draft.path / "run.mcap", size)
+    plant = result.built.closed_loop.plant
+    size = hull_size(plant.vehicle, result.facts.hull).tolist() if isinstance(plant, HybridVehicle) else None
+    write_mcap(log_of_run(result.dataset), draft.path / "run.mcap", size)
     plotted = plotting.plotted()
     plotted.write(draft.path / "figures")
     return plotted
 
 
-def comparison(predicted: PredictedMetrics, executed: Executed) -> str:
+def comparison(predicted: PredictedMetrics, result: ScenarioResult) -> str:
     """One sentence that compares the run with its prediction."""
     if predicted.metrics is None:
         return f"No prediction: {predicted.why_not}"
-    assert executed.steady is not None  # or there were no prediction
+    assert result.steady is not None  # or there were no prediction
     zero = _NOTHING * max(predicted.metrics.values())
-    compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.measured > zero]
+    compared = [one for one in compare_metrics(predicted.metrics, result.steady) if one.measured > zero]
     departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
     named = ", ".join(f"{one.name} {_by(one.departure)}" for one in departing)
-    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(executed, executed.steady)}"
+    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(result, result.steady)}"
 
 
 def _by(departure: float) -> str:
@@ -130,10 +136,10 @@ def in_results(predicted: PredictedMetrics) -> dict[str, Any]:
     return {"predicted": predicted.metrics} | ({"not_predicted": predicted.why_not} if predicted.why_not else {})
 
 
-def predict(executed: Executed) -> PredictedMetrics:
+def predict(result: ScenarioResult) -> PredictedMetrics:
     """Metrics of the steady window of a run, or the reason why there are none: what takes no time first."""
-    why_not = reason_without_prediction(executed)
-    return PredictedMetrics(None, why_not, foregone=True) if why_not else _linearised(executed.built)
+    why_not = reason_without_prediction(result)
+    return PredictedMetrics(None, why_not, foregone=True) if why_not else _linearised(result.built)
 
 
 @in_its_precision
@@ -146,8 +152,8 @@ def _linearised(built: Built) -> PredictedMetrics:
         return PredictedMetrics(None, f"this loop cannot be linearised: {python_says(error)}")
 
 
-def _because(executed: Executed, steady: dict[str, Any]) -> str:
-    if theory_of(executed.built.of_the_law().closed_loop.controller).at_rest is not None:
+def _because(result: ScenarioResult, steady: Mapping[str, Any]) -> str:
+    if theory_of(result.built.of_the_law().closed_loop.controller).at_rest is not None:
         return ". What the law learns is not in the linear model"
     limited = steady.get("saturated_fraction", 0.0)
     if limited > 0:
@@ -155,9 +161,9 @@ def _because(executed: Executed, steady: dict[str, Any]) -> str:
     return ". Nonlinear effects matter here: large motions, dead zones, or motors far from their mean speed"
 
 
-def _print_prediction(predicted: PredictedMetrics, executed: Executed, console: Console) -> None:
-    if predicted.metrics and executed.steady:
-        known = metrics_of(executed.dataset)
-        compared = [one for one in compare_metrics(predicted.metrics, executed.steady) if one.name in known]
-        console.print(terminal_table(prediction_rows(compared, executed.built.window(), known)))
-    console.print(f"{comparison(predicted, executed)}.", highlight=False, soft_wrap=True)
+def _print_prediction(predicted: PredictedMetrics, result: ScenarioResult, console: Console) -> None:
+    if predicted.metrics and result.steady:
+        known = result.facts.meanings
+        compared = [one for one in compare_metrics(predicted.metrics, result.steady) if one.name in known]
+        console.print(terminal_table(prediction_rows(compared, result.built.window(), known)))
+    console.print(f"{comparison(predicted, result)}.", highlight=False, soft_wrap=True)

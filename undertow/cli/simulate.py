@@ -21,18 +21,11 @@ from undertow.logs.run_log import log_of_run
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.scenario.build import build, own_parts
-from undertow.scenario.execute import Executed, execute, write
-from undertow.scenario.finished_run import (
-    Repetition,
-    certificate_of,
-    compare,
-    losses_of,
-    metrics_of,
-    navigation_of,
-    requirements_of,
-    transitions_of,
-)
 from undertow.scenario.reading import read
+from undertow.simulation.repetition import Repetition, compare
+from undertow.simulation.result_files import write
+from undertow.simulation.run_result import ScenarioResult, lost_thrusters
+from undertow.simulation.run_scenario import run_scenario
 
 if TYPE_CHECKING:
     from undertow.cli.run_presentation import PredictedMetrics
@@ -70,18 +63,18 @@ def simulate(
             from undertow.interop.rerun_file import check_rerun
 
             check_rerun(rerun, folder, overwrite)
-        executed = _run(scenario, console, allow_code, video is not None)
-        write(executed, draft.path)
-        repetition = compare(scenario, executed.dataset) if scenario.suffix == ".nc" else None
+        result = _run(scenario, console, allow_code, video is not None)
+        write(result, draft.path)
+        repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         plotting.plot(folder / "run.nc", pdf)
-        predicting = None if prediction is False else thread.submit(_predicted, executed)
-        _print_results(executed, folder, console)
-        code = max(_ending_code(executed), _repetition_code(repetition, console) if repetition else DONE)
+        predicting = None if prediction is False else thread.submit(_predicted, result)
+        _print_results(result, folder, console)
+        code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
         # What only the rest needs is imported now: users read the results meanwhile.
         from undertow.cli.run_presentation import present
 
-        replay = present(executed, plotting, predicting, bool(prediction), draft, folder, console)
+        replay = present(result, plotting, predicting, bool(prediction), draft, folder, console)
     if video is not None and replay is not None:
         from undertow.report.replay.video import write_video
 
@@ -90,11 +83,11 @@ def simulate(
     if rerun is not None:
         from undertow.interop.rerun_file import write_rerun
 
-        write_rerun(log_of_run(executed.dataset), rerun, None if replay is None else replay.size)
+        write_rerun(log_of_run(result.dataset), rerun, None if replay is None else replay.size)
     return code
 
 
-def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Executed:
+def _run(path: Path, console: Console, allow_code: bool, video: bool) -> ScenarioResult:
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
@@ -107,46 +100,47 @@ def _run(path: Path, console: Console, allow_code: bool, video: bool) -> Execute
     for one in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
         typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
-        return interruptible(lambda: execute(built))
+        return interruptible(lambda: run_scenario(built))
 
 
-def _predicted(executed: Executed) -> "PredictedMetrics":
+def _predicted(result: ScenarioResult) -> "PredictedMetrics":
     """The prediction of a run, in another thread."""
     from undertow.cli.run_presentation import predict
 
-    return predict(executed)
+    return predict(result)
 
 
-def _print_results(executed: Executed, folder: Path, console: Console) -> None:
+def _print_results(result: ScenarioResult, folder: Path, console: Console) -> None:
     """Print metrics, certificate and how the run ended."""
-    if "left_to_xla" in executed.dataset.attrs:
-        why = executed.dataset.attrs["left_to_xla"]
+    facts, window = result.facts, result.facts.window
+    if facts.left_to_xla:
+        why = facts.left_to_xla
         typer.echo(f"Advice: the run used backend xla instead of simd (docs/explanation/simd.md): {why}.", err=True)
-    known, window = metrics_of(executed.dataset), executed.built.window()
-    certificate = certificate_of(executed.dataset)
-    console.print(terminal_table(metrics_rows(executed.steady, executed.whole, window, known)))
-    if certificate is not None:
-        console.print(terminal_table(certificate_rows(certificate, window)))
-    if (transitions := transitions_of(executed.dataset)) is not None:
-        console.print(terminal_table(transition_rows(transitions, losses_of(executed.dataset))))
-    for finding in (navigation_of(executed.dataset) or {"findings": ()})["findings"]:
+    console.print(terminal_table(metrics_rows(facts.steady, facts.whole, window, facts.meanings)))
+    if facts.certificate is not None:
+        console.print(terminal_table(certificate_rows(facts.certificate, window)))
+    if facts.transitions is not None:
+        console.print(terminal_table(transition_rows(facts.transitions, lost_thrusters(result.series))))
+    for finding in (facts.navigation or {"findings": ()})["findings"]:
         typer.echo(f"Advice: {finding}.", err=True)
-    verdict = f"; {executed.success.sentence(known)}" if executed.success else ""
-    console.print(f"Status: {executed.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
-    for name, one in requirements_of(executed.dataset).items():
-        said = "holds" if one["holds"] else "is violated"
-        console.print(f"Requirement {name} {said}: robustness {one['robustness']:.4g}", highlight=False, soft_wrap=True)
-    own = own_parts(executed.built.scenario, executed.built.text.folder).get("controller")
-    if own and (executed.status is not Status.OK or (executed.success and not executed.success.within)):
+    verdict = f"; {facts.success.sentence(facts.meanings)}" if facts.success else ""
+    console.print(f"Status: {result.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
+    for name, verdict in facts.requirements.items():
+        said = "holds" if verdict.holds else "is violated"
+        console.print(
+            f"Requirement {name} {said}: robustness {verdict.robustness:.4g}", highlight=False, soft_wrap=True
+        )
+    own = own_parts(result.built.scenario, result.built.text.folder).get("controller")
+    if own and (result.status is not Status.OK or (result.success and not result.success.within)):
         typer.echo(f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {own}", err=True)
 
 
-def _ending_code(executed: Executed) -> int:
-    if executed.status is Status.OK:
+def _ending_code(result: ScenarioResult) -> int:
+    if result.status is Status.OK:
         return DONE
-    ended, duration = float(executed.outcome.ended), executed.built.scenario.loop.duration
-    ending = f"ended as `{executed.status.word}` at {ended:.4g} s of {duration:g} s"
-    complain(f"the run {ending}. {executed.dataset.attrs['status_sentence']}")
+    ended, duration = float(result.outcome.ended), result.built.scenario.loop.duration
+    ending = f"ended as `{result.status.word}` at {ended:.4g} s of {duration:g} s"
+    complain(f"the run {ending}. {result.facts.sentence}")
     return RUN_FAILED
 
 

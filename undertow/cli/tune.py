@@ -16,9 +16,9 @@ from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
+from undertow.core.json_text import to_json
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.reading import read
 from undertow.tuning.cost import times_other
 from undertow.tuning.objective import Step

@@ -15,8 +15,8 @@ import numpy as np
 from undertow.comparison.candidates import Candidate, file_stem, part_of
 from undertow.core.disk import write_whole
 from undertow.core.errors import BadInput
+from undertow.core.json_text import to_json
 from undertow.scenario.build import build
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import validate

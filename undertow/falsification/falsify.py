@@ -18,10 +18,11 @@ from undertow.falsification.objective import Broken, BudgetSpent, Objective, ToB
 from undertow.falsification.shrink import corners, shrink
 from undertow.scenario.build import Built, build
 from undertow.scenario.consistency import record_period
-from undertow.scenario.execute import Executed, execute
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Falsify
+from undertow.simulation.run_result import ScenarioResult
+from undertow.simulation.run_scenario import run_scenario
 from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.search import descend, search, spread_points
 
@@ -58,7 +59,7 @@ class Falsified(NamedTuple):
     objective: Objective
     violation: Violation | None
     broken: dict[str, float]
-    single_runs: tuple[Executed, ...]
+    single_runs: tuple[ScenarioResult, ...]
     method: str
     differentiated: bool
     finished: bool
@@ -129,17 +130,17 @@ def falsify(
         finished = False
     found = objective.smallest
     say("running the counter-example by itself" if found is not None else "running the nominal scenario by itself")
-    broken, runs = dict[str, float](), (execute(evaluator.nominal),)
+    broken, runs = dict[str, float](), (run_scenario(evaluator.nominal),)
     if found is not None:
         names = [one.name for one in evaluator.requirements]
         broken = dict(zip(names, evaluator.each(found.departure[None], [found.seed])[0].tolist(), strict=True))
         counterexample = evaluator.built(found.departure, found.seed)
         assert counterexample is not None  # it has a robustness
-        runs = (*runs, execute(counterexample))
+        runs = (*runs, run_scenario(counterexample))
     return Falsified(evaluator, objective, found, broken, runs, method, gradient.differentiated, finished, seed)
 
 
-def judged_alone(requirements: Sequence[Requirement], executed: Executed) -> dict[str, float]:
+def judged_alone(requirements: Sequence[Requirement], executed: ScenarioResult) -> dict[str, float]:
     """Robustness of every requirement in one run of a scenario, by name."""
     loop, names = executed.built.scenario.loop, needed_signals(requirements)
     kept = judged(

@@ -4,7 +4,7 @@ Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixe
 neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
-`unavailable` says why. What is unsupported runs by XLA: scenario/execute.py falls back for a run,
+`unavailable` says why. What is unsupported runs by XLA: simulation/run_scenario.py falls back for a run,
 campaign/batch_runner.py for a campaign.
 """
 

@@ -6,14 +6,14 @@ import numpy as np
 from undertow.analysis.linearization.jacobians import without
 from undertow.core.arrays import as_array
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 from undertow.thrusters.quasi_static import AbstractQuasiStaticThruster
 
 _SATURATED = 0.1  # share of the time, from which on a loop without limits says nothing about the run
 _FLAT = 0.05  # slope of the thrust that counts as none, as a share of that at half the supply
 
 
-def reason_without_prediction(executed: Executed) -> str:
+def reason_without_prediction(executed: ScenarioResult) -> str:
     """Why a run has no prediction, as far as that is known in milliseconds; empty where it takes a linearisation."""
     if executed.steady is None:
         return "the run did not reach its steady window"
@@ -23,7 +23,7 @@ def reason_without_prediction(executed: Executed) -> str:
     return _flat_thrust(executed)
 
 
-def _flat_thrust(executed: Executed) -> str:
+def _flat_thrust(executed: ScenarioResult) -> str:
     """A sentence where a thruster without dynamics swings about an input at which its thrust has almost no slope.
 
     With dynamics, a slope comes from the motor. Without, thrust that grows with the square of the voltage has none at

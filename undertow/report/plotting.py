@@ -109,9 +109,7 @@ def serve() -> None:
 
 
 def _plot(run: Path, width: str | None) -> Plotted:
-    import xarray as xr
-
     from undertow.report.run_figures import plotted
+    from undertow.simulation.result_files import read_record
 
-    with xr.open_dataset(run) as dataset:
-        return plotted(dataset.load(), width)
+    return plotted(read_record(run), width)

@@ -2,22 +2,22 @@
 
 import io
 
-import xarray as xr
 from PIL import Image
 
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import files_of, make_all
 from undertow.report.plotting import Plotted
+from undertow.simulation.run_result import RunRecord
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
 LARGE, _COLOURS = 80_000, 48
 
 
-def plotted(run: xr.Dataset, width: str | None = None) -> Plotted:
+def plotted(record: RunRecord, width: str | None = None) -> Plotted:
     """Figures of a run. A failed figure affects neither the others nor the results.
 
     Args:
-        run: dataset of the run.
+        record: of the run.
         width: of PDF files; None for none.
     """
     files: dict[str, bytes] = {}
@@ -28,7 +28,7 @@ def plotted(run: xr.Dataset, width: str | None = None) -> Plotted:
         pictures[name] = _picture(made[f"{name}.svg"], made[f"{name}.png"])
         files.update(made)
 
-    failures = make_all(lambda: run_plots(run), put)
+    failures = make_all(lambda: run_plots(record.series, record.facts), put)
     return Plotted(files, pictures, failures)
 
 

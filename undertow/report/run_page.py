@@ -1,15 +1,10 @@
 """The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import xarray as xr
-
-from undertow.analysis.success import Success
 from undertow.core.disk import write_whole
-from undertow.loop.closed_loop import ClosedLoop
 from undertow.report.figures.recorded import input_names
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
@@ -25,15 +20,9 @@ from undertow.report.run_tables import (
     navigation_rows,
     transition_rows,
 )
-from undertow.scenario.finished_run import (
-    certificate_of,
-    faults_of,
-    losses_of,
-    metrics_of,
-    navigation_of,
-    transitions_of,
-    window_of,
-)
+from undertow.scenario.reading import dump
+from undertow.simulation.run_facts import RunFacts
+from undertow.simulation.run_result import RunRecord, RunResult, lost_thrusters
 
 _DIGITS = 4
 
@@ -55,17 +44,16 @@ class Shown(NamedTuple):
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(run: xr.Dataset, loop: ClosedLoop, plotted: Callable[[], Plotted]) -> Shown:
+def shown(result: RunResult, plotted: Callable[[], Plotted]) -> Shown:
     """What the page and the video of a run show. A failed part affects neither the others nor the results.
 
     Args:
-        run: dataset of the run.
-        loop: the closed loop that was run.
+        result: of the run.
         plotted: gives its figures; called last, as another process may still be plotting.
     """
     failures: list[str] = []
     try:
-        replay = replay_of(run, loop)
+        replay = replay_of(result.series, result.loop, result.facts.seed, result.facts.hull)
     except Exception as error:  # a user's part may run and yet not be differentiable
         replay = None
         failures.append(not_made(error))
@@ -73,12 +61,12 @@ def shown(run: xr.Dataset, loop: ClosedLoop, plotted: Callable[[], Plotted]) -> 
     return Shown(figures.pictures, replay, [*figures.failures, *failures])
 
 
-def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
+def write_run_page(path: Path, run: RunRecord, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
     """Write the page of a run.
 
     Args:
         path: of the page.
-        run: dataset of the run.
+        run: its record.
         shown: what it looks like.
         predicted: predicted metrics of the steady window, where there are any.
 
@@ -90,25 +78,24 @@ def write_run_page(path: Path, run: xr.Dataset, shown: Shown, predicted: Mapping
 
 
 def _page(
-    run: xr.Dataset, figures: Mapping[str, str | bytes], replay: Html, predicted: Mapping[str, float] | None
+    run: RunRecord, figures: Mapping[str, str | bytes], replay: Html, predicted: Mapping[str, float] | None
 ) -> str:
-    title, window = str(run.attrs.get("title", "a closed loop")), window_of(run)
-    metrics = json.loads(run.attrs["metrics"])
-    measured = metrics_rows(metrics["steady"], metrics["whole"], window, metrics_of(run), predicted)
-    certificate = certificate_of(run)
+    facts = run.facts
+    measured = metrics_rows(facts.steady, facts.whole, facts.window, facts.meanings, predicted)
+    certificate = facts.certificate
     sections = [replay, section("metrics", measured.title, _table(measured), _meanings(measured))]
-    if faults := faults_of(run):
-        sections.append(section("faults", "Faults", _table(fault_rows(faults, input_names(run)))))
-    if (transitions := transitions_of(run)) is not None:
-        supervision = transition_rows(transitions, losses_of(run))
+    if facts.faults:
+        sections.append(section("faults", "Faults", _table(fault_rows(facts.faults, input_names(run.series)))))
+    if facts.transitions is not None:
+        supervision = transition_rows(facts.transitions, lost_thrusters(run.series))
         below = [tag("p", prose(one)) for one in supervision.sentences]
         sections.append(section("supervision", supervision.title, _table(supervision), *below))
-    if (navigated := navigation_of(run)) is not None:
-        assumed = navigation_rows(navigated)
+    if facts.navigation is not None:
+        assumed = navigation_rows(facts.navigation)
         below = [tag("p", prose(one)) for one in assumed.sentences]
         sections.append(section("navigation", assumed.title, _table(assumed), *below))
     if certificate is not None:
-        hypotheses = certificate_rows(certificate, window)
+        hypotheses = certificate_rows(certificate, facts.window)
         below = [tag("p", prose(one)) for one in hypotheses.sentences]
         sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
         if "memory" in certificate:
@@ -122,11 +109,11 @@ def _page(
     if plotted:
         sections.append(section("figures", "Figures", *plotted))
     return document(
-        title,
-        tag("h1", prose(title)),
-        tag("p", prose(_status(run)), class_="lead"),
+        facts.title,
+        tag("h1", prose(facts.title)),
+        tag("p", prose(_status(facts)), class_="lead"),
         *sections,
-        section("configuration", "Configuration", *_configuration(run)),
+        section("configuration", "Configuration", *_configuration(facts)),
         looks=replay_looks() if replay else "",
     )
 
@@ -152,24 +139,22 @@ def _meanings(rows: RunTable) -> Html:
     return tag("details", tag("summary", "What the metrics mean"), listed)
 
 
-def _status(run: xr.Dataset) -> str:
+def _status(facts: RunFacts) -> str:
     """How the run ended, and whether control succeeded."""
-    word, ended = str(run.attrs["status"]).replace("_", " "), float(run.attrs["ended"])
-    said = f"Status: {word} at {ended:.4g} s. {run.attrs['status_sentence']}"
-    judged = json.loads(run.attrs.get("success", "null"))
-    if judged is None:
-        return said
-    verdict = Success(**judged).sentence(metrics_of(run))
-    return f"{said} {verdict[:1].upper()}{verdict[1:]}."
+    ending = f"Status: {facts.status.word.replace('_', ' ')} at {facts.ended:.4g} s. {facts.sentence}"
+    if facts.success is None:
+        return ending
+    verdict = facts.success.sentence(facts.meanings)
+    return f"{ending} {verdict[:1].upper()}{verdict[1:]}."
 
 
-def _configuration(run: xr.Dataset) -> Sequence[Html]:
+def _configuration(facts: RunFacts) -> Sequence[Html]:
     """Versions and seed, and the scenario where there is one."""
-    versions = [
-        f"{key.removeprefix('version_')} {value}" for key, value in run.attrs.items() if key.startswith("version_")
-    ]
-    facts = f"seed {run.attrs.get('seed')}; {', '.join(versions)}; {run.attrs.get('machine', '')}"
-    if not run.attrs.get("scenario"):
-        return [tag("p", facts, class_="small")]
-    scenario = tag("details", tag("summary", "The complete scenario"), tag("pre", run.attrs["scenario"]))
-    return [tag("p", facts, class_="small"), scenario]
+    versions = ", ".join(
+        f"{name.removeprefix('version_')} {value}" for name, value in facts.versions.items() if name != "machine"
+    )
+    origin = tag("p", f"seed {facts.seed}; {versions}; {facts.versions.get('machine', '')}", class_="small")
+    if not facts.scenario:
+        return [origin]
+    scenario = tag("details", tag("summary", "The complete scenario"), tag("pre", dump(facts.scenario)))
+    return [origin, scenario]

@@ -8,7 +8,7 @@ from undertow.analysis.motor_loop import motor_matrix, rightmost
 from undertow.core.status import Status
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import CONTROLLERS, FIDELITIES, law_of, motor_of, scenario
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
 # Propeller speeds at which the loop is linearised, rad/s: Section 3.9 of the theory, 6 to 90 N of thrust.
 _SPEEDS = (2.0, 10.0, 20.0, 40.0, 60.0)
@@ -29,13 +29,13 @@ def scenarios() -> dict[str, dict[str, Any]]:
     }
 
 
-def example(runs: Mapping[str, Executed], number: int) -> dict[str, Any]:
+def example(runs: Mapping[str, ScenarioResult], number: int) -> dict[str, Any]:
     """Metrics of Example 1 (fidelity `ideal`) or 2 (fidelity `static`) for both controllers."""
     fidelity = FIDELITIES[number - 1]
     return {name: _metrics(runs[f"{fidelity}_{name}"]) for name in CONTROLLERS}
 
 
-def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
+def table2(runs: Mapping[str, ScenarioResult]) -> dict[str, Any]:
     """Table 2 in numbers: both controllers with the modelling error or the state as fuzzy input."""
     table = {}
     for name in CONTROLLERS:
@@ -44,7 +44,7 @@ def table2(runs: Mapping[str, Executed]) -> dict[str, Any]:
     return table
 
 
-def fidelity(runs: Mapping[str, Executed]) -> dict[str, Any]:
+def fidelity(runs: Mapping[str, ScenarioResult]) -> dict[str, Any]:
     """Both controllers at Table 1 gains at every fidelity level: how each run ended, when and why."""
     found = {}
     for level in FIDELITIES:
@@ -53,7 +53,7 @@ def fidelity(runs: Mapping[str, Executed]) -> dict[str, Any]:
     return found
 
 
-def _metrics(run: Executed) -> dict[str, Any]:
+def _metrics(run: ScenarioResult) -> dict[str, Any]:
     failed = run.status is not Status.OK
     return {
         "status": run.status.word,
@@ -64,7 +64,7 @@ def _metrics(run: Executed) -> dict[str, Any]:
     }
 
 
-def _why(run: Executed, fidelity: str) -> str:
+def _why(run: ScenarioResult, fidelity: str) -> str:
     if fidelity == "ideal":
         return "Thrust follows voltage without lag, as the theory assumes."
     if fidelity == "static":

@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from undertow.core.disk import write_whole
+from undertow.core.json_text import to_json
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.robust_variant import chapter
 from undertow.reproduction.running import begin_all, begin_batches, write_all
 from undertow.reproduction.setup import CONTROLLERS
 from undertow.reproduction.side_by_side import Tasks
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
-from undertow.scenario.execute import Executed
-from undertow.scenario.finished_run import to_json
 from undertow.scenario.provenance import versions
+from undertow.simulation.run_result import ScenarioResult
 
 _RUNNING = 0.9  # share of the work that the runs take; the rest is plotting
 
@@ -25,7 +25,7 @@ class Reproduction(NamedTuple):
     """Results of `undertow reproduce` before they are plotted."""
 
     results: dict[str, Any]  # contents of results.json
-    runs: dict[str, Executed]
+    runs: dict[str, ScenarioResult]
     response: ThrusterResponse
 
     def datasets(self, fidelity: str) -> dict[str, xr.Dataset]:

@@ -20,10 +20,12 @@ from undertow.loop.simd_batch import BatchRunner, Plan, Run, Unsupported, outcom
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
-from undertow.scenario.execute import Executed, execute, finished, gathered_of, save
-from undertow.scenario.finished_run import shortened
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.scenario.reading import dump
+from undertow.simulation.repetition import shortened
+from undertow.simulation.result_files import save
+from undertow.simulation.run_result import ScenarioResult
+from undertow.simulation.run_scenario import finished, gathered_of, run_scenario
 
 Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
@@ -32,7 +34,7 @@ _KEPT = ("position", "reference", "input", "uncertainty", "estimate")
 _Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
 
 
-def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, Executed]]:
+def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, ScenarioResult]]:
     """Begin to run named scenarios with everything that is recorded of them, those of equal programs in one batch.
 
     Writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
@@ -56,7 +58,7 @@ def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], 
         own = {name: built[name] for name in runs}
         pieces.append(tasks.begin(f"ran {_words(runs)}", _executed, plan, runs, own, folder))
 
-    def finished() -> dict[str, Executed]:
+    def finished() -> dict[str, ScenarioResult]:
         found = {name: one for piece in pieces for name, one in piece.result().items()}
         return {name: found[name] for name in scenarios}
 
@@ -155,12 +157,12 @@ def _whole(built: Built) -> tuple[Run, Plan]:
     return run, planned(built, Series(signals=list(signals), every=loop.record))
 
 
-def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
     """Runs, written to `runs/`."""
-    return {name: _saved(name, execute(one), folder) for name, one in built.items()}
+    return {name: _saved(name, run_scenario(one), folder) for name, one in built.items()}
 
 
-def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path) -> dict[str, Executed]:
+def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
     """Runs of one program, written to `runs/`; one by one where the batch compiler lacks an operation."""
     with on_processor():
         try:
@@ -172,11 +174,11 @@ def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path)
             outcome = ended[name]
             if plan.continuous:
                 outcome = jax.device_get(continuous.explained(run.loop, run.key, outcome, plan.dt))
-            found[name] = _saved(name, finished(built[name], outcome, {}, run.accumulators), folder)
+            found[name] = _saved(name, finished(built[name], outcome, "", run.accumulators), folder)
         return found
 
 
-def _saved(name: str, one: Executed, folder: Path) -> Executed:
+def _saved(name: str, one: ScenarioResult, folder: Path) -> ScenarioResult:
     save(shortened(one.dataset, _KEPT), folder / "runs" / f"{name}.nc")
     return one
 

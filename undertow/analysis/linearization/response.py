@@ -1,7 +1,7 @@
 """Metrics of a run, predicted by driving the linearised loop with the loads along the reference."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -83,7 +83,7 @@ def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.nda
     return loop._replace(entries=loop.entries | {_START: away[:, None]})
 
 
-def compare_metrics(predicted: dict[str, float], measured: dict) -> list[Comparison]:
+def compare_metrics(predicted: Mapping[str, float], measured: Mapping[str, Any]) -> list[Comparison]:
     """Predicted metrics beside the measured ones of the same names."""
     return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
 

@@ -1,7 +1,7 @@
 """Figure of the certificate of a run: Lyapunov function, its rate, the weights, and when limits or projection acted."""
 
-import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,10 +23,15 @@ _SPANS = {"input at a limit": ("#e07b00", 0.22, 1.0), "weight at its bound (proj
 _DECADES = 4
 
 
-def certificate(run: xr.Dataset, title: str) -> Figure:
+def certificate(run: xr.Dataset, title: str, bound: float) -> Figure:
     """V and its parts, dV/dt, and the largest weight with its bound, where the controller has weights.
 
     Spans with active limits are shaded.
+
+    Args:
+        run: recorded series.
+        title: of the figure.
+        bound: largest size that a weight may have; infinite where it may have any.
     """
     lived = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
     time, values_of = lived["time"].values, lambda name: lived[name].values
@@ -54,7 +59,6 @@ def certificate(run: xr.Dataset, title: str) -> Figure:
     style.label(panels[1], "" if rows > 2 else "time, s", "dV/dt, m$^2$/s$^3$", "rate of the Lyapunov function")
     if rows > 2:
         weights = [("largest |$\\theta$|", values_of("weights_peak"), style.SOLID)]
-        bound = _bound(run)
         if np.isfinite(bound):
             weights.append(("bound", np.full(len(time), bound), style.TRUTH))
         _plot(panels[2], time, weights)
@@ -128,7 +132,7 @@ def _shade(panel: Axes, time: np.ndarray, now: np.ndarray, name: str) -> None:
     )
 
 
-def _bound(run: xr.Dataset) -> float:
-    """Largest theta_max of any axis; infinite where there is none."""
-    bounds = json.loads(run.attrs["certificate"]).get("weights_bound", [None])
+def weights_bound(certificate: Mapping[str, Any] | None) -> float:
+    """Largest theta_max of any axis of a certificate; infinite where there is none."""
+    bounds = (certificate or {}).get("weights_bound", [None])
     return max(np.inf if bound is None else bound for bound in bounds)

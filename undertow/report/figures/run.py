@@ -7,26 +7,31 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
-from undertow.report.figures.certificate import certificate
+from undertow.report.figures.certificate import certificate, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.figures.paper import settled
+from undertow.simulation.run_facts import RunFacts
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2
 
 
-def run_figures(run: xr.Dataset) -> dict[str, Figure]:
+def run_figures(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Figure]:
     """Figures `tracking`, `error`, `estimate` and `effort` of one run.
 
     A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`. Faults are marked.
+
+    Args:
+        run: recorded series.
+        facts: of the run; None where nothing is known of faults and of the bound of weights.
     """
-    return {name: make() for name, make in run_plots(run).items()}
+    return {name: make() for name, make in run_plots(run, facts).items()}
 
 
-def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
-    """Functions that make the figures of a run, by name."""
+def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Callable[[], Figure]]:
+    """Functions that make the figures of a run, by name; see `run_figures`."""
     outputs = recorded.axis_names(run)
     inputs = recorded.input_names(run)
     shown = recorded.in_degrees(run)
@@ -42,7 +47,7 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
     places, errors = recorded.places(shown), recorded.per_axis(shown, "|error|")
     rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
-    marks = fault_marks(run)
+    marks = fault_marks(run, facts)
 
     def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:
         marked = lambda: [block._replace(marks=marks) for block in blocks()]
@@ -59,7 +64,8 @@ def run_plots(run: xr.Dataset) -> dict[str, Callable[[], Figure]]:
         "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, settled(run))]),
     }
     if "lyapunov" in run:
-        figures["certificate"] = lambda: certificate(run, _titled(run, "Certificate"))
+        bound = weights_bound(None if facts is None else facts.certificate)
+        figures["certificate"] = lambda: certificate(run, _titled(run, "Certificate"), bound)
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
     figures["measurement"] = plot("Measurement error", outputs, lambda: _apart(run))

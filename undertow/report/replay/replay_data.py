@@ -6,8 +6,7 @@ The script turns these axes into those of the screen.
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -22,7 +21,6 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
-from undertow.scenario.reading import parse
 from undertow.vehicles.facts import facts_of
 from undertow.vehicles.vehicle import Vehicle
 
@@ -90,12 +88,16 @@ def can_be_shown(plant: AbstractPlant) -> bool:
     return isinstance(plant, HybridVehicle)
 
 
-def replay_of(run: xr.Dataset, loop: ClosedLoop, label: str = "") -> Replay | None:
+def replay_of(
+    run: xr.Dataset, loop: ClosedLoop, seed: int, hull: Sequence[float] | None, label: str = ""
+) -> Replay | None:
     """What a replay shows of a run; None for a plant that is no vehicle with thrusters, or a single record.
 
     Args:
-        run: dataset of the run.
+        run: recorded series.
         loop: the closed loop that was run.
+        seed: of the run.
+        hull: length, width and height of the vehicle, m; None where they are not known.
         label: name of the run, for a replay of several.
     """
     plant = loop.plant
@@ -104,14 +106,16 @@ def replay_of(run: xr.Dataset, loop: ClosedLoop, label: str = "") -> Replay | No
     lived = run.isel(time=slice(0, max(2, int((run["time"].values <= run.attrs.get("ended", np.inf)).sum()))))
     lived = lived.map(_finite)
     with runtime.on_processor(), runtime.in_precision(str(lived["position"].dtype)):
-        return _replay_of(lived, loop, plant, label)
+        return _replay_of(lived, loop, plant, seed, hull_size(plant.vehicle, hull), label)
 
 
-def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: str) -> Replay:
+def _replay_of(
+    run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, seed: int, size: np.ndarray, label: str
+) -> Replay:
     time, frames = run["time"].values, _frames(run["time"].values)
     shown = run.isel(time=frames)
     position, reference = shown["position"].values, shown["reference"].values
-    around = environment(loop, int(run.attrs.get("seed", 0)), shown["time"].values, position, shown["velocity"].values)
+    around = environment(loop, seed, shown["time"].values, position, shown["velocity"].values)
     step = float(time[1] - time[0])
     thrust = _finite_values(thrust_along(plant.thruster, run["input"].values, step)[frames])
     if around.thrust_share is not None:
@@ -143,7 +147,7 @@ def _replay_of(run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, label: s
         label=label,
         status=str(run.attrs.get("status", "")),
         time=shown["time"].values,
-        size=hull_size(vehicle, run),
+        size=size,
         thrusters=Thrusters(vehicle.thruster_names(), positions, np.asarray(vehicle.thruster_directions), limits),
         limited=limited,
         body_axes=bool(loop.controller.model.coordinates.axes),
@@ -209,14 +213,11 @@ def _limits(plant: HybridVehicle, thrust: np.ndarray) -> tuple[np.ndarray, bool]
     return np.tile([-most, most], (plant.inputs(), 1)), False
 
 
-def hull_size(vehicle: Vehicle, run: xr.Dataset) -> np.ndarray:
-    """Length, width and height, m: those of the vehicle's file, or of the even box of the same mass and inertia."""
+def hull_size(vehicle: Vehicle, known: Sequence[float] | None) -> np.ndarray:
+    """Length, width and height, m: the known ones, or those of the even box of the same mass and inertia."""
+    if known is not None:
+        return np.asarray(known, dtype=float)
     facts = facts_of(vehicle)
-    plant = parse(run.attrs.get("scenario") or "{}", "scenario", Path(), "scenario").data.get("plant") or {}
-    given = plant.get("vehicle") if isinstance(plant, Mapping) else None
-    contents = given.get("contents", {}) if isinstance(given, Mapping) else {}
-    if "size" in contents:
-        return np.asarray(contents["size"], dtype=float)
     about = np.diag(facts.inertia)
     sides = np.sqrt(np.maximum(6 * (about.sum() - 2 * about) / facts.mass, 0.0))
     return np.maximum(sides, _THINNEST * max(float(sides.max()), facts.scale))

@@ -14,7 +14,7 @@ from undertow.loop.outcome import Outcome
 from undertow.report.replay.replay_data import COLOURS, FRAMES, Replay, replay_of
 from undertow.report.replay.replay_section import not_made
 from undertow.scenario.build import Built
-from undertow.scenario.reading import dump
+from undertow.simulation.run_facts import hull_of
 
 MOST = len(COLOURS)  # vehicles in one scene, each in a colour of its own
 
@@ -46,7 +46,13 @@ def _together(trials: Mapping[str, Built], recorded: Series) -> dict[str, Replay
     several = list(trials.values())
     result = ProgramCache(lambda: several).run([batch_of(built, recorded) for built in several], recorded)
     replays = {
-        label: replay_of(_dataset(built, result, place, recorded), built.closed_loop, label)
+        label: replay_of(
+            _dataset(built, result, place, recorded),
+            built.closed_loop,
+            built.scenario.seed,
+            hull_of(built.resolved),
+            label,
+        )
         for place, (label, built) in enumerate(trials.items())
     }
     return {label: replay for label, replay in replays.items() if replay is not None}
@@ -64,5 +70,4 @@ def _dataset(built: Built, result: BatchResult, place: int, recorded: Series) ->
     time: Any = planned(built, recorded).times()
     signals = {name: values[place] for name, values in result.series.items()}
     ending: tuple[Any, ...] = (result.status[place], result.ended[place], 0)  # input 0: which one failed is not kept
-    dataset = to_dataset(Outcome(time, signals, (), (), *ending), loop)
-    return dataset.assign_attrs(seed=built.scenario.seed, scenario=dump(built.resolved))
+    return to_dataset(Outcome(time, signals, (), (), *ending), loop)

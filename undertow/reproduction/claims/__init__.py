@@ -18,7 +18,7 @@ from undertow.reproduction.claims import thrusters as thrusters
 from undertow.reproduction.claims import tracking as tracking
 from undertow.reproduction.claims.finding import CLAIMS, Scenarios
 from undertow.reproduction.running import BatchResult
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
 
 def scenarios(quick: bool) -> Scenarios:
@@ -31,7 +31,7 @@ def batched(quick: bool) -> Scenarios:
     return {name: one for claim in CLAIMS for name, one in claim.batched(quick).items()}
 
 
-def audit(runs: Mapping[str, Executed], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
+def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
     """Verdicts with evidence, as in results.json.
 
     Args:

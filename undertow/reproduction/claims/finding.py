@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from undertow.core.status import Status
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import equal_gain_ratio
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
-Runs = Mapping[str, Executed]
+Runs = Mapping[str, ScenarioResult]
 Scenarios = dict[str, dict[str, Any]]
 
 
@@ -53,7 +53,7 @@ def claim(
 EQUAL_GAIN = "rafc_equal_gain"
 
 
-def steady(run: Executed) -> dict[str, Any]:
+def steady(run: ScenarioResult) -> dict[str, Any]:
     """Steady metrics of a run that reached its end.
 
     Raises:
@@ -64,7 +64,7 @@ def steady(run: Executed) -> dict[str, Any]:
     return with_all_outputs(run.steady)
 
 
-def tracking_error(run: Executed) -> float | None:
+def tracking_error(run: ScenarioResult) -> float | None:
     """Steady tracking rms, m and rad; None for a run that ended early."""
     return steady(run)["tracking_rms"] if run.status is Status.OK else None
 

@@ -11,7 +11,7 @@ from undertow.plants.magnetic_levitation import LevitationRig, MagneticLevitatio
 from undertow.reproduction.claims.finding import Finding, Runs, claim, tracking_error
 from undertow.reproduction.horizons import Long
 from undertow.reproduction.setup import scenario
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
 _SIMULATED = "pendulum 10 s, ball 5 s"
 
@@ -87,7 +87,7 @@ def _levitation(fidelity: str, gap: int) -> dict:
     )
 
 
-def _lag(run: Executed) -> float:
+def _lag(run: ScenarioResult) -> float:
     """Time constant of the upper coil where the ball starts, s."""
     rig = cast(MagneticLevitation, run.built.closed_loop.plant).rig
     start = run.built.scenario.initial.position
@@ -97,7 +97,7 @@ def _lag(run: Executed) -> float:
 _lags = eqx.filter_jit(LevitationRig.lag)  # one program, not seven small ones
 
 
-def _shown(run: Executed, unit: str) -> str:
+def _shown(run: ScenarioResult, unit: str) -> str:
     error = tracking_error(run)
     return (
         f"ends at {float(run.outcome.ended):.2f} s ({run.status.word.replace('_', ' ')})"

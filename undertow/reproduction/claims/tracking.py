@@ -7,7 +7,7 @@ from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_t
 from undertow.reproduction.horizons import Long, name_of
 from undertow.reproduction.lag_map import windings
 from undertow.reproduction.setup import FIDELITIES, law_of
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
 _SMALL = 1e-3  # m, rad; rms
 
@@ -74,7 +74,7 @@ def chattering(runs: Runs, long: Long) -> Finding:
     return Finding(verdict, text, "ideal_rcafc", "level ideal, U1, 20 s", numbers)
 
 
-def perfect_variation(run: Executed) -> float:
+def perfect_variation(run: ScenarioResult) -> float:
     """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
     loop, model = run.built.closed_loop, law_of(run).model
     late = run.dataset["reference"].sel(time=slice(*run.built.window()))

@@ -10,9 +10,9 @@ from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
 from undertow.reproduction.running import begin_all
 from undertow.reproduction.side_by_side import Tasks
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
-Chapter = tuple[dict[str, Any], dict[str, Executed]]
+Chapter = tuple[dict[str, Any], dict[str, ScenarioResult]]
 
 
 def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:

@@ -10,7 +10,7 @@ from undertow.bench.workload import W2
 from undertow.core.status import Status
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.setup import FIDELITIES, HAND_TUNED, RAFC, RCAFC, scenario
-from undertow.scenario.execute import Executed
+from undertow.simulation.run_result import ScenarioResult
 
 LAWS = {
     "rcafc": ("RCAFC, Table 1", {"kind": "paper", "composite": RCAFC}),
@@ -129,7 +129,7 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     return {run.key: run.scenario for run in runs(quick)}
 
 
-def table(executed: Mapping[str, Executed], quick: bool) -> list[dict[str, Any]]:
+def table(executed: Mapping[str, ScenarioResult], quick: bool) -> list[dict[str, Any]]:
     """One row per setting and law: ending and steady metrics."""
     return [
         {**run._asdict(), "scenario": f"scenarios/{run.key}.yaml", **_row(executed[run.key])} for run in runs(quick)
@@ -167,7 +167,7 @@ def _of_station(place: str, law: str) -> ComparedRun:
     return ComparedRun(place, words, law, name, one)
 
 
-def _row(run: Executed) -> dict[str, Any]:
+def _row(run: ScenarioResult) -> dict[str, Any]:
     return {
         "status": run.status.word,
         "diverged_at": None if run.status is Status.OK else float(run.outcome.ended),
@@ -178,13 +178,13 @@ def _row(run: Executed) -> dict[str, Any]:
     }
 
 
-def _late_rms(run: Executed, series: xr.DataArray) -> float | None:
+def _late_rms(run: ScenarioResult, series: xr.DataArray) -> float | None:
     """Rms of the first three outputs over the steady window, m for a vehicle."""
     late = series.sel(time=slice(*run.built.window())).values[:, :3]
     return float(np.sqrt((late**2).mean())) if run.steady else None
 
 
-def _largest_after(run: Executed, start: float) -> float | None:
+def _largest_after(run: ScenarioResult, start: float) -> float | None:
     """Largest tracking error from a time (s) on, which shows the effect of an overload."""
     late = run.dataset["error"].sel(time=slice(start, None)).values
     return float(np.abs(late).max()) if late.size and run.status is Status.OK else None
