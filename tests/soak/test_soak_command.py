@@ -44,7 +44,7 @@ def test_a_never_event_is_reported_with_its_files_and_exit_code_1(here, capsys, 
     assert (kept / "s.yaml").read_bytes() == b"a: \xff" and (kept / "folder").is_dir()
     assert '["check", "s.yaml"]' in (kept / "command.txt").read_text()
     assert soaking.identities(here / "s" / "soak.json") == ["inputs/scenario/1/2"]
-    assert "1 never-events occurred" in (here / "s" / "soak.html").read_text()
+    assert "1 never-event occurred" in (here / "s" / "soak.html").read_text()
 
 
 def test_a_failure_is_repeated_alone(here, capsys, monkeypatch):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from undertow.report.page import Html, bullets, document, section, table, tag
+from undertow.report.page import Html, bullets, document, join, section, table, tag
 
 _SHOWN = 100  # failures in the page; all of them are in soak.json
 
@@ -11,7 +11,7 @@ _SHOWN = 100  # failures in the page; all of them are in soak.json
 def soak_page(summary: Mapping[str, Any]) -> str:
     """The whole page as text, from the data of soak.json."""
     failed = len(summary["failures"])
-    verdict = "No never-event occurred." if not failed else f"{failed} never-events occurred."
+    verdict = f"{failed or 'No'} never-event{'s' if failed > 1 else ''} occurred."
     facts = f"undertow {summary['version']}, Python {summary['python']}, {summary['machine']}, seed {summary['seed']}."
     made = [_SECTIONS[part](found) for part, found in summary["parts"].items()]
     return document(
@@ -31,7 +31,8 @@ def _events(summary: Mapping[str, Any]) -> Html:
 
 def _failures(failures: Sequence[Mapping[str, Any]]) -> list[Html]:
     rows = [(one["identity"], one["event"], one["says"]) for one in failures[:_SHOWN]]
-    hint = "To repeat one alone, run `undertow soak --replay IDENTITY`. Its files are in the folder failures/."
+    command = tag("code", "undertow soak --replay IDENTITY")
+    hint = join("To repeat one alone, run ", command, ". Its files are in the folder failures/.")
     return [tag("p", hint), table(("identity", "event", "what happened"), rows, wide=True)]
 
 
