@@ -206,7 +206,7 @@ def test_earlier_result_is_refused(refused, tmp_path):
 def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     """It is a warning; the other figures are drawn, and the exit code is that of the run."""
 
-    def plots(run):
+    def plots(*_):
         return {"tracking": lambda: 1 / 0, "error": Figure}
 
     monkeypatch.setattr("undertow.report.run_figures.run_plots", plots)
@@ -230,7 +230,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
 
 @pytest.mark.full
 def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_path, monkeypatch):
-    def interrupted(run):
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("undertow.report.run_figures.run_plots", interrupted)

@@ -35,8 +35,10 @@ class RunFacts(NamedTuple):
         scenario: the scenario with every default filled in; empty for a run of a closed loop made of objects.
         success: whether control succeeded; None without a criterion.
         requirements: verdict by each requirement of the scenario.
-        certificate: of the stability proof, see `certify`; None for a law without one.
-        navigation: what the navigation filter assumed, see `navigation_consistency`; None without one that says.
+        certificate: of the stability proof, see `certify`, with None for numbers that are not finite; None for a law
+            without one.
+        navigation: what the navigation filter assumed, see `navigation_consistency`, likewise; None without one that
+            says.
         transitions: of the supervisor; None where nothing was supervised.
         code: hashes of the user's code files, see `code_hashes`.
         left_to_xla: why the SIMD backend could not be used; "" where it was, or was not asked for.

@@ -16,6 +16,7 @@ from undertow.analysis.success import Success, judged
 from undertow.analysis.temporal.requirements import Requirement, Verdict, contiguous, needed_signals
 from undertow.analysis.temporal.requirements import judged as verdicts
 from undertow.core.contracts import AbstractController
+from undertow.core.json_text import finite_numbers
 from undertow.core.metric import AbstractMetric
 from undertow.core.status import Status
 from undertow.faults.of_computation import law_of_computed
@@ -170,8 +171,8 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         scenario=origin.scenario,
         success=None if lasted_but_unseen else judged(settings.criterion, steady),
         requirements=_verdicts(outcome, settings, steady or {}),
-        certificate=None if certified is None else certified.summary,
-        navigation=navigation_consistency(loop, series, steady),
+        certificate=None if certified is None else finite_numbers(certified.summary),
+        navigation=finite_numbers(navigation_consistency(loop, series, steady)),
         transitions=None if supervised is None else transitions(supervised.log),
         code=origin.code,
         left_to_xla=origin.left_to_xla,
