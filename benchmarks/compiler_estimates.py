@@ -25,7 +25,7 @@ import numpy as np
 from simdjit import Loop, estimate
 from undertow.bench import workload
 from undertow.core import runtime
-from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
+from undertow.loop.vmap_batch import XlaBatchRunner
 
 RUNS, STEPS = 64, 200
 
@@ -61,7 +61,7 @@ def of_scenario(data: dict[str, Any]) -> dict[str, Any]:
             program, compiling = timed(lambda: workload.batch(one))
         finally:
             estimate.reason_for_xla = reason
-        other, waited = timed(lambda: VmapBatchRunner(one.run, one.plan, width=RUNS))
+        other, waited = timed(lambda: XlaBatchRunner(one.run, one.plan, width=RUNS))
         arrays = jax.tree.map(jnp.asarray, numbers)
         operations, traced, _ = seen[0]
         return figures(

@@ -31,7 +31,7 @@ import numpy as np
 from simdjit import Loop, Unsupported
 from undertow.bench import workload
 from undertow.core import runtime
-from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
+from undertow.loop.vmap_batch import XlaBatchRunner
 from undertow.scenario.reading import parse
 
 VEHICLE = Path(__file__).parents[1] / "examples" / "my_rov.yaml"  # BlueROV2 Heavy
@@ -96,7 +96,7 @@ def of_scenario(data: dict[str, Any]) -> dict[str, float | str]:
         compiling = time.process_time() - begun
         by_simdjit = shortest(lambda: program.run(numbers))
         begun = time.process_time()
-        other, arrays = VmapBatchRunner(one.run, one.plan, width=RUNS), jax.tree.map(jnp.asarray, numbers)
+        other, arrays = XlaBatchRunner(one.run, one.plan, width=RUNS), jax.tree.map(jnp.asarray, numbers)
         by_xla = shortest(lambda: other.run(arrays))
         waited = time.process_time() - begun - REPETITIONS * by_xla
     each = 1e9 / (one.steps * RUNS)

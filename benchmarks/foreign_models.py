@@ -18,17 +18,19 @@ import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from learning import errors_of
 
 from undertow.analysis.metrics import Metrics
 from undertow.core.runtime import double_outside_runs
-from undertow.loop import simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.loop_runs import RunPlan, numbers_of, with_numbers
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 
 SETS = ("vonbenzon2022", "wu2018", "px4", "ng2024", "gazebo_box_drag")
 DURATION, START, RECORD = 80.0, 40.0, 0.1  # s
@@ -89,20 +91,17 @@ def scenario_of(task: str, plant: str, model: str, law: str, rate: int, readings
 def run_all(loops: Sequence[ClosedLoop], dt: float, seeds: Sequence[int], substeps: int = 1) -> Errors:
     """Runs of loops of one kind, as one SIMD batch, with some integration steps of the plant per `dt`, s."""
     metrics = (Metrics(START, DURATION, loops[0].plant.output_units),)
-    runs = [
-        simd_batch.Run(loop, metrics, loop.outputs_at_start(None, None), jax.random.PRNGKey(seed))
-        for loop, seed in zip(loops, seeds, strict=True)
-    ]
+    plan = RunPlan(round(DURATION / dt), dt, round(RECORD / dt), ("position", "reference"), substeps=substeps)
+    runs = [prepare_loop(loop, plan, seed, metrics) for loop, seed in zip(loops, seeds, strict=True)]
     # Vehicles name their sources, so that the trees differ in what is no number; the arrays are those of one kind,
     # but for gains: one number for all axes, or one per axis.
-    arrays, rest = zip(*(eqx.partition(run, eqx.is_array) for run in runs), strict=True)
-    leaves = zip(*map(jax.tree.leaves, arrays), strict=True)
-    stacked = [np.stack(np.broadcast_arrays(*map(np.asarray, same))) for same in leaves]
-    numbers = jax.tree.unflatten(jax.tree.structure(arrays[0]), stacked)
-    one = eqx.combine(jax.tree.map(lambda leaf: leaf[0], numbers), rest[0])
-    constant = [bool((same == same[:1]).all()) for same in stacked]
-    plan = simd_batch.Plan(round(DURATION / dt), dt, round(RECORD / dt), ("position", "reference"), substeps=substeps)
-    outcome = simd_batch.BatchRunner(one, plan, constant, runs=len(runs)).run(numbers)
+    shapes = [
+        np.broadcast_shapes(*map(np.shape, same)) for same in zip(*(numbers_of(one.run) for one in runs), strict=True)
+    ]
+    alike = [
+        [jnp.broadcast_to(leaf, shape) for leaf, shape in zip(numbers_of(one.run), shapes, strict=True)] for one in runs
+    ]
+    outcome = run_together([runs[0]._replace(run=with_numbers(runs[0].run, numbers)) for numbers in alike])
     state = jax.tree.map(np.asarray, outcome.accumulated[0])
     time = np.asarray(outcome.time)[0]
     late = time >= START

@@ -34,10 +34,13 @@ from undertow.core.contracts import AbstractReference, Target
 from undertow.loop import simd_batch
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.dataset import to_dataset
+from undertow.loop.loop_runs import RunPlan
 from undertow.references.lawn_mower import lawn_mower
 from undertow.references.lissajous import lissajous
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 
 jax.config.update("jax_enable_x64", True)
 
@@ -158,16 +161,11 @@ def run_seeds(
 ) -> Found:
     """Runs of one loop with different seeds, as one SIMD batch; errors over start < t <= stop, s."""
     metrics = Metrics(start, stop, loop.plant.output_units)
-    steps, keys = round(duration * rate), [jax.random.PRNGKey(seed) for seed in seeds]
     names = ("position", "reference", "measured_position", "memory_weights", "memory_variance", *INERTIA)
     signals = tuple(name for name in names if name in loop.signals())
-    plan = simd_batch.Plan(steps, 1 / rate, rate // 10, signals)
-    one = simd_batch.Run(loop, (metrics,), loop.outputs_at_start(None, None), keys[0])
-    arrays = eqx.filter(one, eqx.is_array)
-    constant = [True] * (len(jax.tree.leaves(arrays)) - 1) + [len(keys) == 1]
-    batch = simd_batch.BatchRunner(one, plan, constant, runs=len(keys))
-    many = jax.tree.map(lambda leaf: np.stack([np.asarray(leaf)] * len(keys)), arrays)
-    outcome = batch.run(eqx.tree_at(lambda tree: tree.key, many, np.stack([np.asarray(key) for key in keys])))
+    plan = RunPlan(round(duration * rate), 1 / rate, rate // 10, signals)
+    runs = [prepare_loop(loop, plan, seed, (metrics,)) for seed in seeds]
+    outcome = run_together(runs)
     state = jax.tree.map(np.asarray, outcome.accumulated[0])
     time, series = np.asarray(outcome.time)[0], outcome.signals
     off = np.stack(errors_of(series["reference"], series["position"]), -1)
@@ -177,7 +175,7 @@ def run_seeds(
     return Found(
         np.concatenate([rms(off, start, stop), (state.variation / state.span)[:, None]], 1),
         int(((np.asarray(outcome.status) != 0) | (rms(off, start, stop)[:, 0] > _FAR)).sum()),
-        np.stack(laps, 1) if laps else np.zeros((len(keys), 0, 2)),
+        np.stack(laps, 1) if laps else np.zeros((len(runs), 0, 2)),
         rms(known, start, stop),
         {name: np.asarray(series[name])[:, -1] for name in signals},
     )

@@ -12,14 +12,15 @@ has already reacted.
 import argparse
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 from learning import LAWS, SEA, motions
 from learning_tasks import built
 from scipy.spatial.transform import Rotation
 
-from undertow.loop import simd_batch
+from undertow.loop.loop_runs import RunPlan
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 
 jax.config.update("jax_enable_x64", True)
 
@@ -36,11 +37,8 @@ Series = dict[str, np.ndarray]
 def recorded(case: str, motion: str) -> tuple[Series, float]:
     """Three laps, ten records per second, with the motion of the reference; duration of a lap, s."""
     loop, lap = built(LAWS["linear"], 50, CASES[case], motion), motions()[motion][1]
-    plan = simd_batch.Plan(round(3 * lap * 50), 0.02, 5, ("uncertainty", "input"))
-    one = simd_batch.Run(loop, (), loop.outputs_at_start(None, None), jax.random.PRNGKey(1000))
-    arrays = eqx.filter(one, eqx.is_array)
-    batch = simd_batch.BatchRunner(one, plan, [True] * len(jax.tree.leaves(arrays)), width=1)
-    outcome = batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+    plan = RunPlan(round(3 * lap * 50), 0.02, 5, ("uncertainty", "input"))
+    outcome = run_together([prepare_loop(loop, plan, 1000)])
     time = np.asarray(outcome.time)[0]
     target = jax.vmap(loop.reference.at)(time)
     known = {"time": time, "position": np.array(target.position), "velocity": np.array(target.velocity)}

@@ -31,9 +31,11 @@ from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.simd_batch import BatchRunner, Plan, Run, kept_step
-from undertow.numerics.random_keys import key_of_seed
+from undertow.loop.loop_runs import RunPlan
+from undertow.loop.simd_batch import kept_step
 from undertow.scenario.build import Built, build
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 from undertow.supervision.fault_tolerant_law import FaultTolerantController, fault_tolerant
 
 DT, ONSET, DURATION = 0.01, 20.0, 40.0  # s
@@ -102,16 +104,8 @@ def scenario(vehicle: str, law: str = "robust", reference: Any = None, **changes
 
 def batch(loops: list[ClosedLoop], seeds: list[int], duration: float, signals: tuple[str, ...], every: int = 5):
     """Recorded signals of many runs of one kind, with a leading axis over runs."""
-    runs = [
-        Run(loop, (), loop.outputs_at_start(None, None), key_of_seed(seed))
-        for loop, seed in zip(loops, seeds, strict=True)
-    ]
-    numbers = [eqx.filter(run, eqx.is_array) for run in runs]
-    columns = list(zip(*(jax.tree.leaves(one) for one in numbers), strict=True))
-    same = [all(leaf is column[0] or np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-    program = BatchRunner(runs[0], Plan(round(duration / DT), DT, every, signals), same, runs=len(runs))
-    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *numbers)
-    return program.run(stacked).signals
+    plan = RunPlan(round(duration / DT), DT, every, signals)
+    return run_together([prepare_loop(loop, plan, seed) for loop, seed in zip(loops, seeds, strict=True)]).signals
 
 
 def loop_with(built: Built, law: Any, fault: InputFault) -> ClosedLoop:

@@ -7,7 +7,6 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, nvidia
 from undertow.analysis.metrics import Metrics, results
-from undertow.campaign.batch_runner import ProgramCache
 from undertow.campaign.campaign_schema import validate, whole
 from undertow.campaign.task import INVALID, run_trials, site
 from undertow.campaign.trials import Trials, trials
@@ -15,6 +14,7 @@ from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.programs import ProgramCache
 
 
 def made(data) -> Trials:
@@ -87,7 +87,7 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
 def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
     """The same trials with everything that probes share built in, and with nothing built in."""
     found = columns(campaign(), range(9))
-    monkeypatch.setattr(ProgramCache, "_commons", lambda self: {})
+    monkeypatch.setattr(ProgramCache, "_shared_by_probes", lambda self: {})
     site.cache_clear()
     general = columns(campaign(), range(9))
     site.cache_clear()

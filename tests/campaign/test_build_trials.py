@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from undertow.campaign import build_trials as building
-from undertow.campaign.batch_runner import leaves, run_of
 from undertow.campaign.build_trials import build_trials, valid_trials
 from undertow.campaign.campaign_schema import validate
 from undertow.campaign.trials import trials
 from undertow.core import runtime
+from undertow.loop.loop_runs import numbers_of
 from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import from_data, read
+from undertow.simulation.prepared_run import loop_run
 
 pytestmark = pytest.mark.full
 
@@ -42,10 +43,10 @@ def assert_same_bits(alone, together):
     assert sorted(np.concatenate([found.places for found in together])) == sorted(alone)
     for found in together:
         for i, place in enumerate(found.places):
-            expected = leaves(run_of(alone[place]))
+            expected = numbers_of(loop_run(alone[place]))
             own = [
                 leaf if number is None else number[i]
-                for number, leaf in zip(found.batch.own, leaves(found.batch.first), strict=True)
+                for number, leaf in zip(found.batch.numbers, numbers_of(found.batch.first.run), strict=True)
             ]
             assert [np.asarray(leaf).tobytes() for leaf in own] == [np.asarray(leaf).tobytes() for leaf in expected]
 

@@ -1,14 +1,14 @@
 """Every kind of fault in a closed loop: it alters the run after its onset, and nothing before it."""
 
-import equinox as eqx
-import jax
 import numpy as np
 import pytest
 
 from undertow.core import runtime
 from undertow.faults.kinds import list_kinds
-from undertow.loop import simd_batch
+from undertow.loop.loop_runs import RunPlan
 from undertow.scenario.build import build
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 
 pytestmark = pytest.mark.slow
 
@@ -56,13 +56,8 @@ def both(kind):
     data = SCENARIO | surroundings(kind)
     loops = [build(data | {"faults": [entry_of(kind, onset)]}).closed_loop for onset in (ONSET, NEVER)]
     with runtime.in_precision("float64"):
-        start = loops[0].outputs_at_start(None, None)
-        runs = [simd_batch.Run(loop, (), start, jax.random.PRNGKey(3)) for loop in loops]
-        numbers = [eqx.partition(run, eqx.is_array)[0] for run in runs]
-        together = jax.tree.map(lambda *leaves: np.stack([np.asarray(one) for one in leaves]), *numbers)
-        plan = simd_batch.Plan(round(DURATION / DT), DT, 1, tuple(loops[0].signals()))
-        constant = [bool((leaf[0] == leaf[1]).all()) for leaf in jax.tree.leaves(together)]
-        outcome = simd_batch.BatchRunner(runs[0], plan, constant).run(together)
+        plan = RunPlan(round(DURATION / DT), DT, 1, tuple(loops[0].signals()))
+        outcome = run_together([prepare_loop(loop, plan, 3) for loop in loops])
     assert outcome.status[1] == 0, "the run without the fault does not last"
     return {name: np.asarray(one) for name, one in outcome.signals.items()}, np.asarray(outcome.time[0])
 

@@ -1,5 +1,6 @@
 """A reading that is no number costs a run nothing but itself; a command that is none ends it with its cause."""
 
+import dataclasses
 from functools import cache, partial
 
 import equinox as eqx
@@ -10,6 +11,7 @@ import pytest
 
 from undertow.controllers.pid import pid
 from undertow.controllers.rcaf import rcaf
+from undertow.core import runtime
 from undertow.core.contracts import AbstractContinuousController, AbstractController, AbstractNavigation, Model
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
@@ -17,6 +19,7 @@ from undertow.disturbances.none import none
 from undertow.disturbances.sinusoid import sinusoid
 from undertow.loop import continuous, sampled, simd_batch
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.navigation.observer import observer
 from undertow.navigation.perfect import perfect
 from undertow.plants.double_integrator import double_integrator
@@ -25,6 +28,8 @@ from undertow.references.setpoint import setpoint
 from undertow.sensors import compass, dvl, imu, position_fix
 from undertow.sensors.depth import Depth
 from undertow.sensors.sampling import Sampling
+from undertow.simulation.prepared_run import PreparedRun
+from undertow.simulation.run_many import run_together
 from undertow.thrusters import paper_table3, t200
 from undertow.vehicles import bluerov2_heavy
 
@@ -140,14 +145,11 @@ def test_a_vehicle_in_its_own_axes(law, within):
     goal = setpoint([1.0, 0.5, 1.0, 0.1, 0.2, 1.0])
     loop = ClosedLoop(plant, LAWS[law](plant.model()), goal, none(), navigation)
     start = loop.outputs_at_start(None, np.array([0.3, 0, 0, 0, 0.2, 0.5]))
-    run = simd_batch.Run(loop, (), start, jax.random.PRNGKey(0))
     # Both in one batch, which is compiled once; Euler's method, as only the difference between the two matters.
-    numbers = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), eqx.filter(run, eqx.is_array))
-    last = lambda run: run.loop.navigation.last
-    numbers = eqx.tree_at(last, numbers, np.array([1.0, 1.5]))
-    same = jax.tree.leaves(eqx.tree_at(last, jax.tree.map(lambda leaf: True, numbers), False))
-    plan = simd_batch.Plan(300, DT, 1, ("position", "bad_readings"), "euler", 1)
-    found = simd_batch.BatchRunner(run, plan, same).run(numbers)
+    plan = RunPlan(300, DT, 1, ("position", "bad_readings"), "euler")
+    until = lambda last: dataclasses.replace(loop, navigation=Faulty(np.repeat([0.0, 1.0], [3, 9]), NAN, 1.0, last))
+    runs = [LoopRun(until(last), (), start, jax.random.PRNGKey(0)) for last in (1.0, 1.5)]
+    found = run_together([PreparedRun(run, plan, precision=runtime.current_precision()) for run in runs])
     np.testing.assert_array_equal(found.status, int(Status.OK))
     np.testing.assert_array_equal(found.signals["bad_readings"][:, -1], [0, 50])
     sound, hit = found.signals["position"]

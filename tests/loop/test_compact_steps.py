@@ -8,7 +8,7 @@ import pytest
 import simdjit
 from undertow.bench import workload
 from undertow.bench.workload import W1
-from undertow.loop.simd_batch import BatchRunner
+from undertow.loop.simd_batch import SimdBatchRunner
 from undertow.numerics.integrators import rk4, rk4_compact
 
 
@@ -34,7 +34,7 @@ def test_a_single_run_has_the_bits_of_a_batch(runs):
     one = workload.workload(W1 | {"loop": W1["loop"] | {"duration": 0.2}})
     numbers = workload.several(one.run, 4)
     constant = [False] * len(jax.tree.leaves(numbers))
-    batch = BatchRunner(one.run, one.plan, constant, width=4, runs=runs).run(numbers)
-    alone = BatchRunner(one.run, one.plan, constant, width=1).run(jax.tree.map(lambda leaf: leaf[:1], numbers))
+    batch = SimdBatchRunner(one.run, one.plan, constant, width=4, runs=runs).run(numbers)
+    alone = SimdBatchRunner(one.run, one.plan, constant, width=1).run(jax.tree.map(lambda leaf: leaf[:1], numbers))
     for each, other in zip(jax.tree.leaves(alone.final), jax.tree.leaves(batch.final), strict=True):
         assert np.asarray(each)[0].tobytes() == np.asarray(other)[0].tobytes()

@@ -11,7 +11,8 @@ from loop.test_simd_examples import example
 
 from simdjit import Driver, nvidia
 from undertow.bench.workload import constant
-from undertow.loop.simd_batch import BatchRunner, Plan, Run
+from undertow.loop.loop_runs import LoopRun, RunPlan
+from undertow.loop.simd_batch import SimdBatchRunner
 
 
 @pytest.fixture
@@ -23,8 +24,8 @@ def gpu(monkeypatch):
 def several(name, steps, runs, every=0):
     """A run of an example, how it is run, which numbers are the same, and numbers of runs from different places."""
     loop, how = example(name)
-    run = Run(loop, how["accumulators"], loop.outputs_at_start(None, None), how["key"])
-    plan = Plan(steps, how["dt"], every, ("position", "input"), how["method"], how["substeps"])
+    run = LoopRun(loop, how["accumulators"], loop.outputs_at_start(None, None), how["key"])
+    plan = RunPlan(steps, how["dt"], every, ("position", "input"), how["method"], how["substeps"])
     numbers = eqx.filter(run, eqx.is_array)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (runs, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(runs, *run.start[0].shape))
@@ -46,8 +47,8 @@ def several(name, steps, runs, every=0):
 )
 def test_threads_give_the_bits_of_vectors(gpu, name, steps, runs, every):
     run, plan, same, many = several(name, steps, runs, every)
-    found = BatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
-    wanted = BatchRunner(run, plan, same).run(many)
+    found = SimdBatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
+    wanted = SimdBatchRunner(run, plan, same).run(many)
     jax.tree.map(np.testing.assert_array_equal, found, wanted)
     assert gpu.launches == [(-(-(-(-runs // 32) * 32) // 128), 128)]
     assert not gpu.buffers
@@ -62,7 +63,7 @@ def test_nothing_is_approximate(monkeypatch, generation):
     run, plan, same, _ = several("w1", 5, 1, 5)
     driver = Driver(EmulatedGpu())
     driver.generation = generation
-    BatchRunner(run, plan, same, driver=driver)
+    SimdBatchRunner(run, plan, same, driver=driver)
     (text,) = written
     assert f".target sm_{generation}" in text and ".entry run" in text
     assert not re.findall(r"\b(approx|ftz|mad\.f\d+)\b", text)
@@ -74,5 +75,5 @@ def test_memory_that_is_not_there_is_told_and_the_rest_given_back(gpu):
     run, plan, same, many = several("inverted_pendulum", 10, 64)
     gpu.left = 4000
     with pytest.raises(OSError, match=r"driver refuses cuMemAlloc_v2 \(CUDA error 2\)"):
-        BatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
+        SimdBatchRunner(run, plan, same, driver=Driver(gpu)).run(many)
     assert not gpu.buffers and gpu.left == 4000

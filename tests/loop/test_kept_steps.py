@@ -101,7 +101,7 @@ def test_where_the_batch_compiler_is_missing(monkeypatch):
         lambda: simd_batch.kept_steps(oscillators, NUMBERS, STATE, np.zeros(2), 3, [False, True]),
         lambda: simd_batch.starter(lambda n: n, lambda n: n, NUMBERS, [False, True]),
         lambda: simd_batch.realized_disturbance(None, None),
-        lambda: simd_batch.BatchRunner(None, None, []),
+        lambda: simd_batch.SimdBatchRunner(None, None, []),
     ):
         with pytest.raises(Unsupported, match="cannot be imported"):
             call()

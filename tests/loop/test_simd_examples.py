@@ -12,6 +12,7 @@ from recorded import is_as_recorded
 from undertow.analysis.metrics import Metrics
 from undertow.bench.workload import constant
 from undertow.loop import sampled, simd_batch
+from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
@@ -94,19 +95,19 @@ def test_no_bit_depends_on_neighbours_width_or_what_is_built_in():
     """Eleven runs from different places: in one batch, backwards, one by one, and with nothing built in."""
     loop, how = example("inverted_pendulum")
     start = loop.outputs_at_start(None, None)
-    run = simd_batch.Run(loop, how["accumulators"], start, how["key"])
-    plan = simd_batch.Plan(500, how["dt"], 50, ("position", "input"), how["method"], how["substeps"])
+    run = LoopRun(loop, how["accumulators"], start, how["key"])
+    plan = RunPlan(500, how["dt"], 50, ("position", "input"), how["method"], how["substeps"])
     numbers = eqx.filter(run, eqx.is_array)
     leaves = jax.tree.leaves(numbers)
     many = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (11, *leaf.shape)), numbers)
     places = np.random.default_rng(0).normal(scale=0.05, size=(11, *start[0].shape))
     many = many._replace(start=(places, many.start[1]))
     same = constant(run)
-    batch = simd_batch.BatchRunner(run, plan, same)
+    batch = simd_batch.SimdBatchRunner(run, plan, same)
     found = batch.run(many)
     backwards = batch.run(jax.tree.map(lambda leaf: leaf[::-1], many))
-    general = simd_batch.BatchRunner(run, plan, [False] * len(leaves)).run(many)
-    alone = simd_batch.BatchRunner(run, plan, same, width=1)
+    general = simd_batch.SimdBatchRunner(run, plan, [False] * len(leaves)).run(many)
+    alone = simd_batch.SimdBatchRunner(run, plan, same, width=1)
     for i in range(11):
         single = alone.run(jax.tree.map(lambda leaf, i=i: leaf[i : i + 1], many))
         same = lambda a, b, i=i: np.testing.assert_array_equal(a[0], b[i])

@@ -8,7 +8,7 @@ import pytest
 from undertow.core.status import Status
 from undertow.soak import controls, faults_soak, hours_soak
 from undertow.soak.controls import CONTROLS, run_controls
-from undertow.soak.judged_runs import Judged, judged_groups, judged_runs
+from undertow.soak.judged_runs import Judged, judge, judged_runs
 from undertow.soak.watching import Counts
 
 pytestmark = pytest.mark.soak
@@ -105,7 +105,7 @@ def test_a_faulted_run_has_the_bytes_of_its_scenario():
     place = next(k for k, one in enumerate(several) if one.kinds[0].target == "bus")
     program = several[place]
     runs = [faults_soak.Sampled(place, program.sample(np.random.default_rng(seed)), seed) for seed in range(3)]
-    together = judged_groups([faults_soak.group(program, runs)])
+    together = judge(faults_soak.runs_with_faults(program, runs))
     alone = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
     assert [one.digest for one in together] == [one.digest for one in alone]
     assert len({one.digest for one in together}) == 3

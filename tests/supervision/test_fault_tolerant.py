@@ -2,7 +2,6 @@
 
 import functools
 
-import equinox as eqx
 import jax
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ from undertow.core.contracts import Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.disturbances.adding import Together
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.simd_batch import BatchRunner, Plan, Run
-from undertow.numerics.random_keys import key_of_seed
+from undertow.loop.loop_runs import RunPlan
+from undertow.simulation.prepared_run import prepare_loop
+from undertow.simulation.run_many import run_together
 from undertow.supervision.fault_tolerant_law import fault_tolerant
 
 DT, ONSET, DURATION = 0.02, 15.0, 18.0
@@ -34,13 +34,8 @@ def loops(law, disturbances):
 
 
 def batch(several, signals, every=1):
-    runs = [Run(loop, (), loop.outputs_at_start(None, None), key_of_seed(3)) for loop in several]
-    numbers = [eqx.filter(run, eqx.is_array) for run in runs]
-    columns = zip(*(jax.tree.leaves(one) for one in numbers), strict=True)
-    same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-    plan = Plan(round(DURATION / DT), DT, every, signals)
-    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *numbers)
-    return BatchRunner(runs[0], plan, same, runs=len(runs)).run(stacked)
+    plan = RunPlan(round(DURATION / DT), DT, every, signals)
+    return run_together([prepare_loop(loop, plan, 3) for loop in several])
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from undertow.bench import plain_numpy, workload
 from undertow.bench.workload import W1, W2, Workload
 from undertow.core import runtime
 from undertow.loop import sampled, simd_batch
-from undertow.loop.vmap_batch import BatchRunner as VmapBatchRunner
+from undertow.loop.vmap_batch import XlaBatchRunner
 
 # Runs of a batch, and number of repetitions; the shortest time counts.
 _BATCH, _BATCH_W2 = 64, 16
@@ -146,7 +146,7 @@ def on_gpu(one: Workload, driver: Any, runs: int) -> dict[str, float]:
 
 def vmapped_ns(one: Workload, runs: int) -> float:
     """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
-    program = VmapBatchRunner(one.run, one.plan, width=runs)
+    program = XlaBatchRunner(one.run, one.plan, width=runs)
     numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
     return _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
 

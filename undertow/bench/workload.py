@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.campaign.batch_runner import planned, run_of
-from undertow.loop.simd_batch import BatchRunner, Plan, Run
+from undertow.loop.loop_runs import LoopRun, RunPlan
+from undertow.loop.simd_batch import SimdBatchRunner
 from undertow.scenario.build import build
+from undertow.simulation.prepared_run import prepare
 
 # Table 1 except for gamma_eps and the weight bound: without it the weights drift, and the loop diverges at about 135 s.
 W1: dict[str, Any] = {
@@ -51,8 +52,8 @@ W2: dict[str, Any] = {
 class Workload(NamedTuple):
     """One workload; only metrics are recorded."""
 
-    run: Run
-    plan: Plan
+    run: LoopRun
+    plan: RunPlan
 
     @property
     def steps(self) -> int:
@@ -62,17 +63,17 @@ class Workload(NamedTuple):
 
 def workload(data: Mapping[str, Any]) -> Workload:
     """A scenario of the sampled loop as a workload."""
-    built = build(data)
-    return Workload(run_of(built), planned(built, None))
+    prepared = prepare(build(data))
+    return Workload(prepared.run, prepared.plan)
 
 
-def constant(run: Run) -> list[bool]:
+def constant(run: LoopRun) -> list[bool]:
     """Which numbers are equal in `several`: all except the initial position."""
     same = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
     return jax.tree.leaves(same._replace(start=(False, True)))
 
 
-def several(run: Run, count: int) -> Any:
+def several(run: LoopRun, count: int) -> Any:
     """Numbers of `count` runs with different initial positions."""
     numbers = eqx.filter(run, eqx.is_array)
     stacked = jax.tree.map(lambda leaf: np.broadcast_to(np.asarray(leaf), (count, *leaf.shape)), numbers)
@@ -80,9 +81,9 @@ def several(run: Run, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def batch(one: Workload, width: int = 0, driver: Any = None) -> BatchRunner:
-    """Program of a workload; arguments as of `BatchRunner`."""
-    return BatchRunner(one.run, one.plan, constant(one.run), width, driver)
+def batch(one: Workload, width: int = 0, driver: Any = None) -> SimdBatchRunner:
+    """Program of a workload; arguments as of `SimdBatchRunner`."""
+    return SimdBatchRunner(one.run, one.plan, constant(one.run), width, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:
@@ -91,6 +92,6 @@ def tracking(accumulated: Any) -> np.ndarray:
     return np.sqrt(np.asarray(squares).mean(-1) / np.asarray(samples))
 
 
-def alone(run: Run) -> Any:
+def alone(run: LoopRun) -> Any:
     """Numbers of the run itself."""
     return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], eqx.filter(run, eqx.is_array))

@@ -17,15 +17,17 @@ import numpy as np
 from jax.core import Tracer
 from pydantic import BaseModel
 
-from undertow.campaign.batch_runner import Batch, batch_of, leaves, run_of
 from undertow.campaign.requirements import recorded
+from undertow.campaign.trial_results import prepare_trial
 from undertow.campaign.trials import Trials
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, within
+from undertow.loop.loop_runs import numbers_of
 from undertow.scenario.build import Built, build, build_scenario
 from undertow.scenario.part_cache import PartCache, structure
 from undertow.scenario.reading import Text, key_path
+from undertow.simulation.prepared_run import RunBatch, batch_of, loop_run
 
 # Trials of a kind that are built both ways: where one of them differs in one bit, all are built one by one. The
 # arithmetic of a constructor may be rounded in another way for many trials than for one: XLA divides by a number that
@@ -49,7 +51,7 @@ class Together(NamedTuple):
 
     places: np.ndarray  # in the task
     first: Built  # one of them
-    batch: Batch
+    batch: RunBatch
 
 
 def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
@@ -104,7 +106,7 @@ def build_trials(
             yield found._replace(places=places[found.places])
             places = np.delete(places, found.places)
         for place, built in valid_trials(several, part_cache, trials[places].tolist()):
-            yield Together(places[[place]], built, batch_of(built, recorded(several.campaign, built)))
+            yield Together(places[[place]], built, batch_of(prepare_trial(built, recorded(several.campaign, built))))
 
 
 def _fractions(several: Trials) -> list[str]:
@@ -155,28 +157,28 @@ def _together(
     if not alone:
         return None
     first = alone[min(alone)]
-    batch = batch_of(first, recorded(several.campaign, first))
+    batch = batch_of(prepare_trial(first, recorded(several.campaign, first)))
     try:
-        form = structure(batch.first)
-        numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.own.copy(), [])
+        form = structure(batch.first.run)
+        numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.numbers.copy(), [])
     except Exception:  # whatever a constructor, of a user's own too, does with numbers that are not known
         return None
     numbers[-1] = np.stack([np.zeros_like(several.seeds(trials)), several.seeds(trials)], axis=1)  # the random keys
     good = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
     for place in np.flatnonzero(good[: max(alone) + 1]).tolist():
-        if place not in alone or not _same(batch.first, numbers, place, run_of(alone[place])):
+        if place not in alone or not _same(batch.first.run, numbers, place, loop_run(alone[place])):
             return None
     places = np.flatnonzero(good)
     own = [None if number is None else number[places] for number in numbers]
-    return Together(places, first, batch._replace(own=own, trials=len(places)))
+    return Together(places, first, batch._replace(numbers=own, size=len(places)))
 
 
 def _same(first: Any, numbers: list[np.ndarray | None], place: int, alone: Any) -> bool:
     """Whether a trial has the same bits as when it is built alone."""
     if structure(first) != structure(alone):
         return False
-    here = [leaf if number is None else number[place] for leaf, number in zip(leaves(first), numbers, strict=True)]
-    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in zip(here, leaves(alone), strict=True))
+    here = [leaf if number is None else number[place] for leaf, number in zip(numbers_of(first), numbers, strict=True)]
+    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in zip(here, numbers_of(alone), strict=True))
 
 
 def _traced(
@@ -190,11 +192,11 @@ def _traced(
         for key, value in values.items():
             scenario = with_value(scenario, key_path(key), value)
         with checks.recorded_conditions() as conditions:
-            run = run_of(build_scenario(scenario, first.text, part_cache.copy()))
+            run = loop_run(build_scenario(scenario, first.text, part_cache.copy()))
         if structure(run) != form:
             raise checks.Unknown
-        vary[:] = [isinstance(leaf, Tracer) for leaf in leaves(run)]
-        return [leaf for leaf in leaves(run) if isinstance(leaf, Tracer)], conditions
+        vary[:] = [isinstance(leaf, Tracer) for leaf in numbers_of(run)]
+        return [leaf for leaf in numbers_of(run) if isinstance(leaf, Tracer)], conditions
 
     with runtime.in_precision("float64"):
         found, conditions = jax.vmap(numbers)(dict(varied))

@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from scipy.special import bdtr
 
-from undertow.campaign.batch_runner import XLA
 from undertow.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.campaign.realized import realized_scalars
 from undertow.campaign.requirements import verdict
 from undertow.campaign.store_results import Results
 from undertow.campaign.task import reasons
+from undertow.campaign.trial_results import XLA
 from undertow.campaign.trials import Trials
 
 QUANTILES = (0.05, 0.5, 0.95)

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.campaign.batch_runner import SIMD, XLA, planned
 from undertow.campaign.campaign_schema import Campaign
 from undertow.campaign.labels import is_number, words
 from undertow.campaign.store_layout import SAMPLES
 from undertow.campaign.task import INVALID, NOT_JUDGED
+from undertow.campaign.trial_results import SIMD, XLA, prepare_trial
 from undertow.campaign.trials import Trials, varied_keys
 from undertow.core.metric import Metric
 from undertow.core.status import Status
@@ -91,8 +91,8 @@ def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
     found = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in axes.items()}
     if several.campaign.series is None:
         return found
-    plan = planned(built, several.campaign.series)
-    return found | dataset.coordinates(plan.times(), built.closed_loop.plant)
+    times = prepare_trial(built, several.campaign.series).plan.times()
+    return found | dataset.coordinates(times, built.closed_loop.plant)
 
 
 def _swept(entries: dict[str, Any]) -> np.ndarray:

@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray, PyTree
 
-from undertow.campaign.batch_runner import run_of
 from undertow.campaign.build_trials import build_trial
 from undertow.campaign.trials import Trials
 from undertow.core import runtime
@@ -22,6 +21,7 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import key_path
+from undertow.simulation.prepared_run import loop_run
 
 # Trials that are built again, each in milliseconds. The standard error of a rank correlation is then 0.045.
 MOST = 500
@@ -79,7 +79,7 @@ def _random(built: Built) -> set[str]:
 @in_its_precision
 def _realized(built: Built, other: int = 0, trace: bool = False) -> dict[str, Any]:
     """Short arrays of the realization, by key path; those of another seed where a number is given; or their shapes."""
-    run = run_of(built)
+    run = loop_run(built)
     key = jax.random.fold_in(run.key, other) if other else run.key
     tree = eqx.filter_eval_shape(_start, run.loop, run.start, key) if trace else _compiled(run.loop, run.start, key)
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]

@@ -6,20 +6,23 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from undertow.analysis.metrics import gathered_meanings
-from undertow.campaign.batch_runner import Batch, ProgramCache
 from undertow.campaign.build_trials import Kind, build_data, build_trial, build_trials, valid_trials
 from undertow.campaign.campaign_schema import read_text
 from undertow.campaign.requirements import formula_metrics, recorded, robustness
 from undertow.campaign.store_layout import Layout
+from undertow.campaign.trial_results import prepare_trial, run_prepared
 from undertow.campaign.trials import Trials, trials, varied_keys
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built
 from undertow.scenario.part_cache import PartCache
+from undertow.simulation.prepared_run import RunBatch
+from undertow.simulation.programs import ProgramCache
 
 # Status of a trial whose scenario cannot be built, in addition to those of `undertow.core.status`.
 INVALID = -1
@@ -53,7 +56,8 @@ def site(text: str, folder: str) -> Site:
     rows = several.probes()
     probes = functools.cache(lambda: {rows[place]: built for place, built in valid_trials(several, part_cache, rows)})
     others = functools.cache(lambda: list(_alternatives(several, part_cache)))
-    return Site(several, part_cache, ProgramCache(lambda: list(probes().values())), {}, probes, others)
+    programs = ProgramCache(lambda: [prepare_trial(built, None) for built in probes().values()], gpu=True)
+    return Site(several, part_cache, programs, {}, probes, others)
 
 
 def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
@@ -76,7 +80,7 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     criteria: list[Mapping[str, float]] = []
     firsts: list[Built] = []
 
-    def batches() -> Iterator[Batch]:
+    def batches() -> Iterator[RunBatch]:
         for found in build_trials(here.trials, here.part_cache, trials, sampled, here.traceable):
             where.extend(found.places.tolist())
             firsts.extend([found.first] * len(found.places))
@@ -86,7 +90,10 @@ def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
 
     campaign = here.trials.campaign
     asked = recorded(campaign, next(iter(here.probes().values()))) if campaign.formulas else campaign.series
-    result = here.programs.run(batches(), asked)
+    result = run_prepared(batches(), here.programs)
+    if result is None:  # no trials: the arrays of one trial, cut to length zero
+        one_trial = run_prepared([prepare_trial(next(iter(here.probes().values())), asked)], here.programs)
+        result = jax.tree.map(lambda values: values[:0], one_trial)
     robust = robustness(campaign, firsts, result.series, result.status, result.ended)
     scatter = functools.partial(_scatter, len(rows), where)
     columns["status"] = scatter(result.status, INVALID)

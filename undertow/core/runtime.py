@@ -64,10 +64,15 @@ def says_single(function: Callable[Arguments, Result]) -> Callable[Arguments, Re
     return called
 
 
+def current_precision() -> str:
+    """Precision in which this thread computes: float64 or float32."""
+    double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
+    return "float64" if double else "float32"
+
+
 def workers(count: int) -> ThreadPoolExecutor:
     """Threads that compute in the precision of the calling thread."""
-    double = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
-    precision, kept = "float64" if double else "float32", threading.local()
+    precision, kept = current_precision(), threading.local()
 
     def begin() -> None:
         kept.context = in_precision(precision)  # which ends when nothing refers to it

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
-from undertow.campaign.batch_runner import ProgramCache, batch_of
 from undertow.campaign.campaign_schema import Series
+from undertow.campaign.trial_results import prepare_trial, run_prepared
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.falsification.box import Box, scenario_at
@@ -15,6 +15,8 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.consistency import record_period
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
+from undertow.simulation.prepared_run import PreparedRun
+from undertow.simulation.programs import ProgramCache
 
 # Runs that are computed at once: their records are in memory together.
 _AT_ONCE = 128
@@ -41,13 +43,13 @@ class Evaluator:
         self.period = record_period(loop)
         self._names = needed_signals(requirements)
         self._series = Series(signals=list(self._names), every=loop.record) if self._names else None
-        self._programs = ProgramCache(self._probes)
+        self._programs = ProgramCache(lambda: self._probes(), gpu=True)
 
-    def _probes(self) -> list[Built]:
+    def _probes(self) -> list[PreparedRun]:
         chance = np.random.default_rng(0)
         inside = self.box.lower + chance.random((_PROBES, len(self.box.axes))) * (self.box.upper - self.box.lower)
-        found = [self.built(departure) for departure in inside]
-        return [self.nominal, *(one for one in found if one is not None)]
+        valid = [built for departure in inside if (built := self.built(departure)) is not None]
+        return [prepare_trial(built, self._series) for built in (self.nominal, *valid)]
 
     def built(self, departure: Float[np.ndarray, " k"], seed: int | None = None) -> Built | None:
         """The scenario at a departure, with its own seed unless another is given; None where it cannot be built."""
@@ -79,7 +81,8 @@ class Evaluator:
         if not builts:
             return found
         with runtime.on_processor():
-            result = self._programs.run((batch_of(built, self._series) for _, built in builts), self._series)
+            result = run_prepared((prepare_trial(built, self._series) for _, built in builts), self._programs)
+        assert result is not None
         for row, (i, built) in enumerate(builts):
             signals = contiguous({name: result.series[name][row] for name in self._names}, self._names)
             metrics = {name: float(values[row]) for name, values in result.metrics.items()}

@@ -11,7 +11,6 @@ from jaxtyping import Float
 from undertow.analysis.linearization.jacobians import without
 from undertow.analysis.temporal.formula import smooth
 from undertow.analysis.temporal.requirements import smooth_robustness
-from undertow.campaign.batch_runner import run_of
 from undertow.campaign.build_trials import with_value
 from undertow.core import checks, runtime
 from undertow.falsification.evaluator import Evaluator
@@ -19,6 +18,7 @@ from undertow.loop import sampled
 from undertow.scenario.build import build_scenario
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import key_path
+from undertow.simulation.prepared_run import loop_run
 
 _SHARPNESS = 40.0  # of the smooth robustness, whose unit is the share of a bound
 _STEPS = ("resolution", "dead_zone")  # parameters that make a smooth function piecewise constant
@@ -87,7 +87,7 @@ class Gradient:
         for place, axis in enumerate(self._box.axes):
             scenario = with_value(scenario, key_path(axis.key), axis.value(departure[place], jnp))
         with checks.recorded_conditions():  # inside the bounds; the exact runs show whether they are met
-            run = run_of(build_scenario(scenario, nominal.text, PartCache()))
+            run = loop_run(build_scenario(scenario, nominal.text, PartCache()))
         outcome = sampled.simulate(
             without(run.loop, _STEPS),
             duration=settings.duration,

@@ -5,23 +5,23 @@ neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
 `unavailable` says why. What is unsupported runs by XLA: simulation/run_scenario.py falls back for a run,
-campaign/batch_runner.py for a campaign.
+loop/batch_runner.py for many.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, PRNGKeyArray
+from jaxtyping import PRNGKeyArray
 
-from undertow.core.contracts import Outputs
 from undertow.core.status import Status
 from undertow.loop import continuous, sampled
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
 from undertow.loop.outcome import Outcome
 from undertow.loop.recording import instant
 from undertow.numerics.integrators import COMPACT_METHODS, METHODS
@@ -104,7 +104,7 @@ def kept_steps(
 
 
 def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence[bool]) -> Callable[[Any], Any]:
-    """The start of runs as `BatchRunner` makes it: from numbers with a leading axis over runs to results with one.
+    """The start of runs as `SimdBatchRunner` makes it: from numbers with a leading axis over runs to results with one.
 
     Args:
         prepare: numbers -> everything random and what else does not change, as in a run.
@@ -125,46 +125,11 @@ def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence
     return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
 
 
-class Run(NamedTuple):
-    """What may differ between runs of one kind: the arrays of these trees; the rest is the same for all."""
-
-    loop: ClosedLoop
-    accumulators: tuple[sampled.AbstractAccumulator, ...]
-    start: tuple[Outputs, Outputs]
-    key: PRNGKeyArray
-
-
 # Numbers of an array; of a larger one, such as the commands of a long log, the program would take a minute to compile.
 _LARGEST = 4_000
 
 
-class Plan(NamedTuple):
-    """Time grid, recording and integration of a run.
-
-    Attributes:
-        steps: how many.
-        dt: sampling time, s.
-        every: steps per record; 0 for none.
-        signals: names of those that are recorded.
-        method, substeps: integration of the plant within one control step.
-        continuous: whether plant and controller are integrated together, with `steps` of the classical Runge-Kutta
-            method; nothing is accumulated.
-    """
-
-    steps: int
-    dt: float
-    every: int
-    signals: tuple[str, ...]
-    method: str = "rk4"
-    substeps: int = 1
-    continuous: bool = False
-
-    def times(self) -> Float[np.ndarray, " records"]:
-        """Times of the records, s."""
-        return np.arange(0, self.steps + 1, self.every) * self.dt
-
-
-class BatchRunner:
+class SimdBatchRunner:
     """Runs of one kind, compiled once.
 
     Args:
@@ -184,8 +149,8 @@ class BatchRunner:
 
     def __init__(
         self,
-        run: Run,
-        plan: Plan,
+        run: LoopRun,
+        plan: RunPlan,
         constant: list[bool],
         width: int = 0,
         driver: "Driver | None" = None,
@@ -265,7 +230,7 @@ def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
         loop, key = eqx.combine(numbers, rest)
         return loop.realize(key).disturbance_realization
 
-    constant = [_decides(leaf) for leaf in jax.tree.leaves(numbers)]
+    constant = [decides_structure(leaf) for leaf in jax.tree.leaves(numbers)]
     kept, nothing = lambda known, carry, k: carry, lambda known, carry, k: jnp.zeros(())
     program = Loop(realize, lambda known: known, kept, nothing, numbers, constant, 1, None, cache_folder() / "native")
     carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
@@ -292,8 +257,8 @@ def simulate(
     """
     steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
     start = loop.outputs_at_start(position, velocity)
-    run = Run(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
-    return _alone(run, Plan(steps, dt, record_every, tuple(loop.signals()), method, substeps))
+    run = LoopRun(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
+    return _alone(run, RunPlan(steps, dt, record_every, tuple(loop.signals()), method, substeps))
 
 
 def integrate(
@@ -315,30 +280,12 @@ def integrate(
     loop, _ = loop.starting_at(position), continuous.records_of(duration, record_step)
     steps, every, dt = continuous.grid_of(duration, record_step, dt)
     start = loop.outputs_at_start(position, velocity)
-    run = Run(loop, (), start, jax.random.PRNGKey(0) if key is None else key)
-    outcome = _alone(run, Plan(steps, dt, every, tuple(loop.signals()), continuous=True))
+    run = LoopRun(loop, (), start, jax.random.PRNGKey(0) if key is None else key)
+    outcome = _alone(run, RunPlan(steps, dt, every, tuple(loop.signals()), continuous=True))
     return continuous.explained(loop, run.key, outcome, dt)
 
 
-def _alone(run: Run, plan: Plan) -> Outcome:
+def _alone(run: LoopRun, plan: RunPlan) -> Outcome:
     arrays = eqx.filter(run, eqx.is_array)
-    batch = BatchRunner(run, plan, [_decides(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
+    batch = SimdBatchRunner(run, plan, [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
     return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)
-
-
-def outcome_of(several: Outcome, run: int) -> Outcome:
-    """The outcome of one run of a batch."""
-    return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, several)
-
-
-def _decides(leaf: Any) -> bool:
-    """Whether an array of a single run is built into its program, because its values decide what is left out there.
-
-    Those are arrays of zeros and ones, and of counts and switches. All others are read by the program, so that it
-    serves every run of its kind: after a change of one number nothing is compiled again. The bits of a run are the same
-    either way, and so is its speed within a tenth.
-    """
-    values = np.asarray(leaf)
-    if values.dtype == np.uint32:  # keys of random numbers
-        return False
-    return not np.issubdtype(values.dtype, np.floating) or bool(np.isin(values, (0, 1)).all())

@@ -9,15 +9,15 @@ import jax
 import numpy as np
 
 from undertow.loop import sampled
+from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.loop.outcome import Outcome
-from undertow.loop.simd_batch import Plan, Run
 
 # The last bits of a result depend on the width of the program, but not on the other runs in it: every program has
 # this width, however few runs there are, so that no result depends on how they are divided into tasks.
 _WIDTH = 64
 
 
-class BatchRunner:
+class XlaBatchRunner:
     """Runs of one kind, compiled once; `run` takes their arrays with a leading axis over runs.
 
     Args:
@@ -26,7 +26,7 @@ class BatchRunner:
         width: runs at once; the usual number unless given.
     """
 
-    def __init__(self, run: Run, plan: Plan, width: int = 0):
+    def __init__(self, run: LoopRun, plan: RunPlan, width: int = 0):
         numbers, rest = eqx.partition(run, eqx.is_array)
         self.run: Callable[[Any], Outcome] = _batched(partial(_one, rest, plan), numbers, width or _WIDTH)
 
@@ -47,7 +47,7 @@ def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callab
     return run
 
 
-def _one(rest: Any, plan: Plan, numbers: Any) -> Outcome:
+def _one(rest: Any, plan: RunPlan, numbers: Any) -> Outcome:
     loop, accumulators, (position, velocity), key = eqx.combine(numbers, rest)
     outcome = sampled.simulate(
         loop,

@@ -14,7 +14,7 @@ from undertow.analysis.drift import gain_bound, gain_of
 from undertow.analysis.motor_loop import lag_matrix, stable_gains
 from undertow.reproduction.horizons import BOUND
 from undertow.reproduction.lag_map import lag_thruster
-from undertow.reproduction.running import BatchResult, begin_batches, write_all
+from undertow.reproduction.running import BatchedRun, begin_batches, write_all
 from undertow.reproduction.setup import law_of, scenario
 from undertow.reproduction.side_by_side import Tasks
 
@@ -47,14 +47,14 @@ def scenarios() -> dict[str, dict[str, Any]]:
     return found
 
 
-def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchResult]]:
+def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchedRun]]:
     """Begin both runs, and return what waits for them; `scenarios/` is written in a folder."""
     named = scenarios()
     write_all(named, folder)
     return begin_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"), tasks)
 
 
-def shown(found: Mapping[str, BatchResult]) -> dict[str, Any]:
+def shown(found: Mapping[str, BatchedRun]) -> dict[str, Any]:
     """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop needs.
 
     Args:
@@ -67,7 +67,7 @@ def shown(found: Mapping[str, BatchResult]) -> dict[str, Any]:
     return {"lag": LAG, "needed": between and between[0], "bounded_gain": bounded, "runs": runs}
 
 
-def _curves(run: BatchResult) -> dict[str, Any]:
+def _curves(run: BatchedRun) -> dict[str, Any]:
     """Every series at the ends of the bins."""
     gain = gain_of(law_of(run), run.series["weights"])
     ends = np.arange(_BIN, len(run.time), _BIN)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from undertow.analysis.success import DEFAULT, judged
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.reproduction.setup import FIDELITIES, RAFC, RCAFC, equal_gain, scenario
 
 LONG, QUICK = 2000.0, 200.0  # s
@@ -27,7 +27,7 @@ _SWEEP = (30.0, 10.0, 5.0)
 
 _KEPT = 60  # points of a curve in results.json
 
-Long = Mapping[str, BatchResult]
+Long = Mapping[str, BatchedRun]
 
 
 def duration(quick: bool) -> float:
@@ -55,7 +55,7 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     return [described(name, facts, long[name]) for name, (facts, _) in _runs(quick).items()]
 
 
-def described(name: str, facts: dict[str, Any], run: BatchResult) -> dict[str, Any]:
+def described(name: str, facts: dict[str, Any], run: BatchedRun) -> dict[str, Any]:
     """A row of results.json: description of a run, its ending, metrics by window, growth of its weights."""
     over = lambda metric: [None if found is None else found[metric] for found in run.windows]
     peaks = run.series["weights_peak"]

@@ -4,7 +4,7 @@ from typing import Any
 
 from undertow.analysis.motor_loop import lag_matrix, motor_matrix, stable_gains
 from undertow.reproduction.horizons import Long, described, duration, sampled
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.reproduction.setup import law_of, motor_of, same_loop_gain, scenario
 
 _THRUST_PER_VOLT = 17.107  # N/V, alpha of Eq. (15)
@@ -41,7 +41,7 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def windings(long: Long) -> dict[float, BatchResult]:
+def windings(long: Long) -> dict[float, BatchedRun]:
     """Available runs of the law of Table 1 with five sets, by inductance of the winding, H."""
     named = {value: _name("winding", value, "five") for value in _WINDINGS}
     return {value: long[name] for value, name in named.items() if name in long}

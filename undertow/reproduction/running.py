@@ -1,29 +1,30 @@
 """Running named scenarios in batches of one program: with everything that is recorded, or for metrics alone."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 
 from undertow.analysis.metrics import Gathered, accumulators, results
-from undertow.campaign.batch_runner import leaves, planned, run_of
-from undertow.campaign.campaign_schema import Series
 from undertow.core.disk import write_whole
-from undertow.core.runtime import double_outside_runs, on_processor
+from undertow.core.runtime import on_processor
 from undertow.core.status import Status
 from undertow.loop import continuous
 from undertow.loop.outcome import Outcome
-from undertow.loop.simd_batch import BatchRunner, Plan, Run, Unsupported, outcome_of, simd_width
+from undertow.loop.simd_batch import Unsupported
+from undertow.numerics.random_keys import key_of_seed
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
-from undertow.scenario.part_cache import PartCache, structure
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
+from undertow.simulation.prepared_run import PreparedRun, prepare
+from undertow.simulation.programs import ProgramCache, RunGroup
 from undertow.simulation.repetition import shortened
 from undertow.simulation.result_files import save
+from undertow.simulation.run_many import BatchResult, run_group
 from undertow.simulation.run_result import ScenarioResult
 from undertow.simulation.run_scenario import finished, gathered_of, run_scenario
 
@@ -31,7 +32,6 @@ Scenarios = Mapping[str, dict[str, Any]]
 Window = tuple[float, float]  # s
 # What `runs/` keeps of a run: the series of the paper's figures. Repeated from its file, the others come back.
 _KEPT = ("position", "reference", "input", "uncertainty", "estimate")
-_Runs = dict[str, tuple[Run, int]]  # by name, with their numbers of steps
 
 
 def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, ScenarioResult]]:
@@ -50,17 +50,17 @@ def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], 
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
     # The adaptive integrator takes longest to compile, once for all of them: it begins before others are built.
-    alone = {name: one for name, one in scenarios.items() if one["loop"].get("method") == "adaptive"}
-    pieces = [tasks.begin(f"ran {_words(alone)}", _one_by_one, _built(alone), folder)] if alone else []
-    built = _built({name: one for name, one in scenarios.items() if name not in alone})
-    groups = _groups(built, _whole)
-    for plan, runs in groups:
-        own = {name: built[name] for name in runs}
-        pieces.append(tasks.begin(f"ran {_words(runs)}", _executed, plan, runs, own, folder))
+    adaptive = {name: one for name, one in scenarios.items() if one["loop"].get("method") == "adaptive"}
+    pieces = [tasks.begin(f"ran {_words(adaptive)}", _one_by_one, _built(adaptive), folder)] if adaptive else []
+    built = _built({name: one for name, one in scenarios.items() if name not in adaptive})
+    names = list(built)
+    for group in ProgramCache().groups(_recorded(one) for one in built.values()):
+        own = {names[place]: built[names[place]] for place in group.places}
+        pieces.append(tasks.begin(f"ran {_words(own)}", _executed, group, own, folder))
 
     def finished() -> dict[str, ScenarioResult]:
-        found = {name: one for piece in pieces for name, one in piece.result().items()}
-        return {name: found[name] for name in scenarios}
+        results = {name: result for piece in pieces for name, result in piece.result().items()}
+        return {name: results[name] for name in scenarios}
 
     return finished
 
@@ -72,7 +72,7 @@ def write_all(scenarios: Scenarios, folder: Path) -> None:
         write_whole(folder / "scenarios" / f"{name}.yaml", dump(scenario))
 
 
-class BatchResult(NamedTuple):
+class BatchedRun(NamedTuple):
     """One run of a batch."""
 
     built: Built
@@ -90,7 +90,7 @@ class BatchResult(NamedTuple):
 
 def run_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
-) -> dict[str, BatchResult]:
+) -> dict[str, BatchedRun]:
     """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `begin_batches`."""
     with side_by_side(1) as pool:
         return begin_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
@@ -98,7 +98,7 @@ def run_batches(
 
 def begin_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], tasks: Tasks
-) -> Callable[[], dict[str, BatchResult]]:
+) -> Callable[[], dict[str, BatchedRun]]:
     """Begin to run sampled scenarios, one task for each program.
 
     Args:
@@ -109,17 +109,20 @@ def begin_batches(
         tasks: where the batches are tasks.
 
     Returns:
-        Function that waits for the results; it raises Unsupported where the batch compiler lacks an operation.
+        Function that waits for the results.
     """
     built = _built(scenarios)
-    asked = Series(signals=list(signals), every=every)
-    run = lambda one: run_of(one)._replace(accumulators=_gathered(one, windows))
-    groups = _groups(built, lambda one: (run(one), planned(one, asked)))
-    pieces = [tasks.begin(f"ran {_words(runs)}", _together, plan, runs) for plan, runs in groups]
+    names = list(built)
+    runs = [prepare(one, signals, every, _gathered(one, windows)) for one in built.values()]
+    pieces = []
+    for group in ProgramCache().groups(runs):
+        words = _words([names[place] for place in group.places])
+        pieces.append(tasks.begin(f"ran {words}", run_group, group))
 
-    def finished() -> dict[str, BatchResult]:
-        ended = {name: one for piece in pieces for name, one in piece.result().items()}
-        return {name: _ran(one, ended[name], windows) for name, one in built.items()}
+    def finished() -> dict[str, BatchedRun]:
+        batches = [batch for piece in pieces for batch in piece.result()]
+        outcomes = {names[place]: outcome for batch in batches for place, outcome in batch.each()}
+        return {name: _ran(one, outcomes[name], windows) for name, one in built.items()}
 
     return finished
 
@@ -128,7 +131,7 @@ def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
     return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
 
 
-def _words(runs: Mapping[str, Any]) -> str:
+def _words(runs: Collection[str]) -> str:
     """Names of the runs of a batch, in short."""
     return next(iter(runs)) + (f" and {len(runs) - 1} like it" if len(runs) > 1 else "")
 
@@ -138,23 +141,9 @@ def _built(scenarios: Scenarios) -> dict[str, Built]:
     return {name: build(scenario, part_cache=part_cache) for name, scenario in scenarios.items()}
 
 
-def _groups(built: Mapping[str, Built], how: Callable[[Built], tuple[Run, Plan]]) -> list[tuple[Plan, _Runs]]:
-    """Runs of equal programs, with their plan; they may differ in the number of steps."""
-    groups: dict[Any, _Runs] = {}
-    for name, one in built.items():
-        run, plan = how(one)
-        groups.setdefault((structure(run), plan._replace(steps=0)), {})[name] = (run, plan.steps)
-    return [(plan, runs) for (_, plan), runs in groups.items()]
-
-
-def _whole(built: Built) -> tuple[Run, Plan]:
-    """A run as `execute` does it: everything is recorded."""
-    run, loop = run_of(built)._replace(accumulators=gathered_of(built)), built.scenario.loop
-    signals = tuple(built.closed_loop.signals())
-    if loop.kind == "continuous":
-        steps, every, dt = continuous.grid_of(loop.duration, loop.record, loop.dt)
-        return run, Plan(steps, dt, every, signals, continuous=True)
-    return run, planned(built, Series(signals=list(signals), every=loop.record))
+def _recorded(built: Built) -> PreparedRun:
+    """A run as `run_scenario` does it: everything is recorded."""
+    return prepare(built, list(built.closed_loop.signals()), built.scenario.loop.record, gathered_of(built))
 
 
 def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
@@ -162,20 +151,27 @@ def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioR
     return {name: _saved(name, run_scenario(one), folder) for name, one in built.items()}
 
 
-def _executed(plan: Plan, runs: _Runs, built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
+def _executed(group: RunGroup, built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
     """Runs of one program, written to `runs/`; one by one where the batch compiler lacks an operation."""
+    try:
+        batches = run_group(group)
+    except Unsupported:
+        return _one_by_one(built, folder)
+    names = {int(place): name for place, name in zip(group.places, built, strict=True)}
+    found = {}
+    for batch in batches:
+        for place, outcome in batch.each():
+            one = built[names[place]]
+            found[names[place]] = _saved(names[place], _finished(one, outcome, batch), folder)
+    return found
+
+
+def _finished(built: Built, outcome: Outcome, batch: BatchResult) -> ScenarioResult:
     with on_processor():
-        try:
-            ended = _together(plan, runs)
-        except Unsupported:
-            return _one_by_one(built, folder)
-        found = {}
-        for name, (run, _) in runs.items():
-            outcome = ended[name]
-            if plan.continuous:
-                outcome = jax.device_get(continuous.explained(run.loop, run.key, outcome, plan.dt))
-            found[name] = _saved(name, finished(built[name], outcome, "", run.accumulators), folder)
-        return found
+        if batch.first.plan.continuous:
+            key, dt = key_of_seed(built.scenario.seed), batch.first.plan.dt
+            outcome = jax.device_get(continuous.explained(built.closed_loop, key, outcome, dt))
+        return finished(built, outcome, batch.left_to_xla, gathered_of(built))
 
 
 def _saved(name: str, one: ScenarioResult, folder: Path) -> ScenarioResult:
@@ -183,32 +179,11 @@ def _saved(name: str, one: ScenarioResult, folder: Path) -> ScenarioResult:
     return one
 
 
-@double_outside_runs
-def _together(plan: Plan, runs: _Runs) -> dict[str, Outcome]:
-    """Runs of one program, by name with their numbers of steps; those of one length in one batch."""
-    first = next(iter(runs.values()))[0]
-    numbers = {name: leaves(run) for name, (run, _) in runs.items()}
-    constant = [
-        all(np.array_equal(column[0], other) for other in column[1:]) for column in zip(*numbers.values(), strict=True)
-    ]
-    lengths = {steps: [name for name in runs if runs[name][1] == steps] for _, steps in runs.values()}
-    # For one run a program of width one is faster than one of width eight.
-    width = min(simd_width(64), 1 << (max(map(len, lengths.values())) - 1).bit_length())
-    batch = BatchRunner(first, plan._replace(steps=max(lengths)), constant, width, runs=len(runs))
-    tree, found = jax.tree.structure(eqx.filter(first, eqx.is_array)), {}
-    for steps, names in lengths.items():
-        stacked = [np.stack(column) for column in zip(*(numbers[name] for name in names), strict=True)]
-        outcome = batch.run(jax.tree.unflatten(tree, stacked), steps)
-        for i, name in enumerate(names):
-            found[name] = outcome_of(outcome, i)
-    return found
-
-
-def _ran(built: Built, outcome: Outcome, windows: Sequence[Window]) -> BatchResult:
+def _ran(built: Built, outcome: Outcome, windows: Sequence[Window]) -> BatchedRun:
     status, end = Status(int(outcome.status)), float(outcome.ended)
     each = zip(_gathered(built, windows), outcome.accumulated, windows, strict=True)
     metrics = [with_all_outputs(results((one,), (state,))) if end >= stop else None for one, state, (_, stop) in each]
     time = np.asarray(outcome.time)
     kept = time <= end
     series = {name: np.asarray(values)[kept] for name, values in outcome.signals.items()}
-    return BatchResult(built, status, end, metrics, series, time[kept])
+    return BatchedRun(built, status, end, metrics, series, time[kept])

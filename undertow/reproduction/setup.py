@@ -9,7 +9,7 @@ from undertow.controllers.presets.paper import paper
 from undertow.core.runtime import in_precision
 from undertow.plants.double_integrator import double_integrator
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.simulation.run_result import ScenarioResult
 from undertow.thrusters.fidelity import ElectromechanicalThruster
 from undertow.thrusters.motor import DCMotor
@@ -107,16 +107,16 @@ def _basis_norm_squared(fuzzy_input: str, sets: int) -> float:
         return float(law.fuzzy.basis_norm_squared())
 
 
-def law_of(run: ScenarioResult | BatchResult) -> RCAF:
+def law_of(run: ScenarioResult | BatchedRun) -> RCAF:
     """The law that ran."""
     return cast(RCAF, run.built.closed_loop.controller)
 
 
-def plant_of(run: ScenarioResult | BatchResult) -> HybridVehicle:
+def plant_of(run: ScenarioResult | BatchedRun) -> HybridVehicle:
     """The vehicle that was run."""
     return cast(HybridVehicle, run.built.closed_loop.plant)
 
 
-def motor_of(run: ScenarioResult | BatchResult) -> DCMotor:
+def motor_of(run: ScenarioResult | BatchedRun) -> DCMotor:
     """The motor of its thrusters."""
     return cast(ElectromechanicalThruster, plant_of(run).thruster).motor

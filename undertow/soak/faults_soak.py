@@ -1,5 +1,6 @@
 """Runs with random faults under supervision: whatever fails, an input that is not allowed never reaches the plant."""
 
+import dataclasses
 import inspect
 import time
 from collections import Counter
@@ -7,17 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.core import catalogue
+from undertow.core import catalogue, runtime
+from undertow.faults.injected import InputFault
 from undertow.faults.kinds import Kind, list_kinds
+from undertow.faults.occurrence import Occurrence
 from undertow.faults.sampling import random_fault
 from undertow.faults.targets import targets_of
+from undertow.loop.loop_runs import LoopRun
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import build
-from undertow.soak.judged_runs import Group, Judged, judged_groups, judged_runs, prepared
+from undertow.simulation.prepared_run import PreparedRun
+from undertow.soak.judged_runs import Judged, judge, judged_runs, watched
 from undertow.soak.verdict import Failure
 
 # Of so many runs one is repeated by itself, built from its scenario, and so many at most.
@@ -164,7 +168,7 @@ def run_faulted(
         own = [run for run in runs if run.program == place]
         if not own or time.monotonic() > until:
             continue
-        found = judged_groups([group(program, own)], watch=partial(_shown, watch, done, len(failures)))
+        found = judge(runs_with_faults(program, own), watch=partial(_shown, watch, done, len(failures)))
         for run, one in zip(own, found, strict=True):
             failures += [Failure(event, f"faults/{seed}/{run.seed}", says) for event, says in one.events()]
             endings[one.status.word] += 1
@@ -182,39 +186,41 @@ def _shown(watch: Callable[[int, int], None], before: int, failed: int, done: in
     watch(before + done, failed)
 
 
-def group(program: Program, runs: Sequence[Sampled]) -> Group:
-    """The runs of a program, which is built once; the numbers of their faults are then written into its arrays."""
-    run, plan, precision = prepared(build(program.scenario({}, 0)), windows=1)
-    usual = [np.asarray(leaf) for leaf in jax.tree.leaves(eqx.filter(run, eqx.is_array))]
-    at = [_places(usual, place) for place in range(len(program.kinds))]
-    numbers = []
-    for one in runs:
-        leaves = list(usual)
-        leaves[-1] = np.asarray(key_of_seed(one.seed))
-        for place, entry in one.faults.items():
-            for first in at[place]:
-                _write(leaves, first, entry)
-        numbers.append(leaves)
-    return Group(run, plan, precision, list(range(len(runs))), numbers)
+def runs_with_faults(program: Program, runs: Sequence[Sampled]) -> list[PreparedRun]:
+    """The runs of a program, which is built once; the numbers of their faults are then set in its parts."""
+    prepared = watched(build(program.scenario({}, 0)), windows=1)
+    with runtime.in_precision(prepared.precision):
+        return [prepared._replace(run=_with_faults(prepared.run, one)) for one in runs]
 
 
-def _places(leaves: Sequence[np.ndarray], place: int) -> list[int]:
-    """Numbers of the arrays with the onset of a fault, which stands in one or two places."""
-    onset = _NEVER + place
-    return [k for k, leaf in enumerate(leaves) if leaf.shape == (2,) and leaf.dtype.kind == "f" and leaf[0] == onset]
+def _with_faults(run: LoopRun, sampled: Sampled) -> LoopRun:
+    entries = {_NEVER + place: entry for place, entry in sampled.faults.items()}
+
+    def changed(part: Any) -> Any:
+        if isinstance(part, Occurrence):
+            entry = entries.get(float(part.onset[0]))
+            return part if entry is None else _occurrence_with(part, entry)
+        if isinstance(part, InputFault):
+            entry = entries.get(float(part.occurrence.onset[0]))
+            return part if entry is None else _input_fault_with(part, entry)
+        return part
+
+    with_faults = jax.tree.map(changed, run, is_leaf=lambda part: isinstance(part, Occurrence | InputFault))
+    return with_faults._replace(key=key_of_seed(sampled.seed))
 
 
-def _write(leaves: list[np.ndarray], first: int, entry: Mapping[str, Any]) -> None:
-    """Write a fault into the arrays of its `Occurrence`: onset, duration, severity; its thruster stands after them."""
-    alike = lambda place, value: np.full_like(leaves[place], value)
-    leaves[first] = alike(first, entry["onset"])
-    if "duration" in entry:
-        leaves[first + 1] = alike(first + 1, entry["duration"])
-    if "severity" in entry:
-        leaves[first + 2] = alike(first + 2, entry["severity"])
+def _occurrence_with(occurrence: Occurrence, entry: Mapping[str, Any]) -> Occurrence:
+    numbers = {name: entry[name] for name in ("onset", "duration", "severity") if name in entry}
+    alike = {name: np.full_like(getattr(occurrence, name), number) for name, number in numbers.items()}
+    return dataclasses.replace(occurrence, **alike)
+
+
+def _input_fault_with(fault: InputFault, entry: Mapping[str, Any]) -> InputFault:
+    fault = dataclasses.replace(fault, occurrence=_occurrence_with(fault.occurrence, entry))
     name, _, number = entry["target"].partition(" ")
-    if name in _NUMBERED and first + 3 < len(leaves) and leaves[first + 3].sum() == 1:
-        leaves[first + 3] = np.eye(leaves[first + 3].shape[0], dtype=leaves[first + 3].dtype)[int(number) - 1]
+    if name not in _NUMBERED:
+        return fault
+    return dataclasses.replace(fault, chosen=np.eye(fault.chosen.shape[0])[int(number) - 1])
 
 
 def _other_bytes(program: Program, runs: Sequence[Sampled], found: Mapping[int, Judged], seed: int) -> list[Failure]:

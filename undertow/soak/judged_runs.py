@@ -3,25 +3,20 @@
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.authority import limits_of
 from undertow.core.status import Status
-from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.outcome import Outcome
-from undertow.loop.simd_batch import Plan, Run
-from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
-from undertow.scenario.part_cache import PartCache, structure
+from undertow.scenario.part_cache import PartCache
+from undertow.simulation.prepared_run import PreparedRun, prepare
+from undertow.simulation.run_many import run_many
 from undertow.soak.watching import Counts, Watch
 from undertow.supervision.conditions import state_of
 from undertow.supervision.supervised_controller import state_in
@@ -77,16 +72,6 @@ class Judged(NamedTuple):
         return np.sqrt(np.where(samples > 0, self.counts.squares, np.nan) / np.maximum(samples, 1))
 
 
-class Group(NamedTuple):
-    """Runs of one program: the first of them, their plan, precision, places among all, and the arrays of each."""
-
-    first: Run
-    plan: Plan
-    precision: str
-    members: list[int]
-    numbers: list[list[np.ndarray]]
-
-
 def judged_runs(
     scenarios: Sequence[Mapping[str, Any]],
     windows: int = 1,
@@ -105,78 +90,33 @@ def judged_runs(
         BadInput: a scenario is invalid.
     """
     cache = PartCache()
-    return judged_groups(_grouped([prepared(build(one, cache), windows) for one in scenarios]), watch, workers)
+    return judge([watched(build(scenario, cache), windows) for scenario in scenarios], watch, workers)
 
 
-def judged_groups(
-    groups: Sequence[Group], watch: Callable[[int], None] = lambda done: None, workers: int = 2
+def judge(
+    runs: Sequence[PreparedRun], watch: Callable[[int], None] = lambda done: None, workers: int = 2
 ) -> list[Judged]:
-    """The same for runs that are built already, in groups of one program each."""
-    found: list[Judged | None] = [None] * sum(len(group.members) for group in groups)
-    outer = max(1, min(workers, len(groups)))
-    done = 0
-    with ThreadPoolExecutor(outer) as threads:
-        for group, several in threads.map(partial(_all_of, workers=workers // outer), groups):
-            for place, one in zip(group.members, several, strict=True):
-                found[place] = one
-            done += len(several)
-            watch(done)
-    return [one for one in found if one is not None]
-
-
-def _all_of(group: "Group", workers: int) -> tuple["Group", list[Judged]]:
-    """All runs of a group, by so many threads."""
-    count = len(group.members)
-    with runtime.in_precision(group.precision), runtime.on_processor():
-        program, shared = _program(group)
-        cuts = np.array_split(np.arange(count), min(count, max(workers, math.ceil(count / _AT_ONCE))))
-        with runtime.workers(workers) as threads:
-            parts = threads.map(partial(_run, group, program, shared), cuts)
-            return group, [one for several in parts for one in several]
+    """The same for runs of `watched`."""
+    judged: dict[int, Judged] = {}
+    at_once = min(_AT_ONCE, math.ceil(len(runs) / workers)) if runs else 1
+    for batch in run_many(runs, workers=workers, at_once=at_once, watch=watch):
+        for place, outcome in batch.each():
+            judged[place] = _judged(outcome, runs[place].plan.steps, batch.backend)
+    return [judged[place] for place in range(len(runs))]
 
 
 @in_its_precision
-def prepared(built: Built, windows: int) -> tuple[Run, Plan, str]:
-    """A run of a scenario that is watched, its plan and its precision."""
+def watched(built: Built, windows: int) -> PreparedRun:
+    """A run of a scenario in which never-events are counted."""
     loop, plant = built.scenario.loop, built.closed_loop.plant
     start = built.closed_loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
     x = plant.initial_state(*map(jnp.asarray, start))
     least, largest, length = map(as_array, (*map(np.asarray, limits_of(plant, x)), loop.duration / windows))
-    watching = (Watch(least, largest, length, windows),)
-    run = Run(built.closed_loop, watching, start, key_of_seed(built.scenario.seed))
-    plan = Plan(round(loop.duration / loop.dt), loop.dt, 0, (), loop.method, loop.substeps)
-    return run, plan, built.scenario.precision
+    return prepare(built, accumulators=(Watch(least, largest, length, windows),))
 
 
-def _grouped(prepared: Sequence[tuple[Run, Plan, str]]) -> list[Group]:
-    groups: dict[Any, Group] = {}
-    for number, (run, plan, precision) in enumerate(prepared):
-        group = groups.setdefault((structure(run), plan, precision), Group(run, plan, precision, [], []))
-        group.members.append(number)
-        group.numbers.append([np.asarray(leaf) for leaf in jax.tree.leaves(run) if eqx.is_array(leaf)])
-    return list(groups.values())
-
-
-def _program(group: Group) -> tuple[Any, list[bool]]:
-    """Program of a group, and which of its numbers are equal in all runs."""
-    columns = list(zip(*group.numbers, strict=True))
-    shared = [len(column) > 1 and all(np.array_equal(column[0], one) for one in column[1:]) for column in columns]
-    try:
-        return simd_batch.BatchRunner(group.first, group.plan, shared, runs=len(group.members)), shared
-    except simd_batch.Unsupported:
-        return vmap_batch.BatchRunner(group.first, group.plan), shared
-
-
-def _run(group: Group, program: Any, shared: Sequence[bool], part: np.ndarray) -> list[Judged]:
-    tree = jax.tree.structure(eqx.filter(group.first, eqx.is_array))
-    columns = zip(*(group.numbers[place] for place in part), strict=True)
-    outcome = program.run(jax.tree.unflatten(tree, [np.stack(column) for column in columns]))
-    backend = "simd" if isinstance(program, simd_batch.BatchRunner) else "xla"
-    return [_judged(outcome, place, group.plan.steps, backend) for place in range(len(part))]
-
-
-def _judged(several: Outcome, place: int, steps: int, backend: str) -> Judged:
-    one = jax.tree.map(lambda leaf: np.asarray(leaf)[place], several._replace(time=(), signals=()))
+def _judged(outcome: Outcome, steps: int, backend: str) -> Judged:
+    one: Any = outcome._replace(time=(), signals=())
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(one)]
     digest = hashlib.sha256(b"".join(leaf.tobytes() for leaf in leaves)).hexdigest()[:16]
     final = [np.asarray(leaf) for leaf in jax.tree.leaves(one.final)]

@@ -1,8 +1,6 @@
 """Evaluation of gains: many gains on many trials at once, and the gradient of their cost by differences."""
 
-import contextlib
 import dataclasses
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -24,10 +22,12 @@ from undertow.core.contracts import (
     Water,
 )
 from undertow.core.param import Param, param
-from undertow.loop import simd_batch, vmap_batch
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.simd_batch import Plan, Run
+from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.scenario.schema import Loop, Weights
+from undertow.simulation.prepared_run import PreparedRun, RunBatch
+from undertow.simulation.programs import ProgramCache
+from undertow.simulation.run_many import BatchResult, in_order, run_many
 from undertow.tuning.cost import CostSums, Shares, shares
 from undertow.tuning.training_runs import Trials, joined
 
@@ -80,23 +80,22 @@ class TrainingLoop(NamedTuple):
         loop = self.loop
         return dataclasses.replace(loop, plant=plant, controller=law, disturbance=Scaled(loop.disturbance, size))
 
-    def run(self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""]) -> Run:
+    def run(self, law: AbstractController, plant: AbstractPlant, key: Array, size: Float[Array, ""]) -> LoopRun:
         """One run."""
         loop = self.with_parts(plant, law, size)
-        return Run(loop, (self.sums,), loop.outputs_at_start(*self.start), key)
+        return LoopRun(loop, (self.sums,), loop.outputs_at_start(*self.start), key)
 
-    def plan(self) -> Plan:
+    def plan(self) -> RunPlan:
         """Steps and integration of every run; nothing is recorded."""
         settings = self.settings
         steps = round(self.duration / settings.dt)
-        return Plan(steps, settings.dt, 0, (), settings.method, settings.substeps)
+        return RunPlan(steps, settings.dt, 0, (), settings.method, settings.substeps)
 
 
 class Evaluation:
     """The program of the runs of one training loop, made when it is first needed.
 
-    It is a SIMD batch, or one by XLA where that has no rule for a part. Numbers that are equal in all examples are
-    constants of a SIMD batch, which compiles sooner with them; where another one differs, it is compiled anew.
+    Numbers that are equal in all examples are expected to be so in all runs (see `ProgramCache`).
 
     Args:
         training_loop: what stays the same.
@@ -112,17 +111,16 @@ class Evaluation:
         examples: Sequence[AbstractController],
         trials: Sequence[Trials],
     ):
-        self._training_loop, self._training, self._plan = training_loop, trials[0], training_loop.plan()
-        self._pool, self._lock = runtime.workers(_WORKERS), threading.Lock()
+        self._training_loop, self._training = training_loop, trials[0]
         self._law_numbers, self._law_rest = eqx.partition(examples[0], eqx.is_array)
         self._make = jax.jit(lambda point: eqx.filter(make(point), eqx.is_array))
         first = self._training.part(np.array([0]))
         plant = jax.tree.map(lambda leaf: leaf[0] if eqx.is_array(leaf) else leaf, first.plants)
-        self._first = training_loop.run(examples[0], plant, first.keys[0], first.sizes[0])
-        self._tree = jax.tree.structure(eqx.filter(self._first, eqx.is_array))
-        columns = jax.tree.leaves(self._stacked(examples, joined(trials)))
-        self._constants = [column[0] if (column == column[0]).all() else None for column in columns]
-        self._program: simd_batch.BatchRunner | vmap_batch.BatchRunner | None = None
+        run = training_loop.run(examples[0], plant, first.keys[0], first.sizes[0])
+        backend = training_loop.settings.backend
+        self._first = PreparedRun(run, training_loop.plan(), backend, runtime.current_precision())
+        self._examples = self._batch(examples, joined(trials))
+        self._programs = ProgramCache(lambda: [self._examples], xla_width=self._width)
 
     def law(self, point: np.ndarray) -> AbstractController:
         """The controller of a point, unchecked."""
@@ -134,18 +132,15 @@ class Evaluation:
 
     def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
         """Parts of the cost, arrays (laws, trials), on both cores."""
-        columns = jax.tree.leaves(self._stacked(laws, trials))
-        program, runs = self._program_of(columns), len(laws) * trials.number
-        pieces = [slice(begin, begin + self._width) for begin in range(0, runs, self._width)]
-        parts = self._pool.map(lambda piece: self._some(program, [column[piece] for column in columns]), pieces)
-        whole = jax.tree.map(lambda *several: np.concatenate(several), *parts)
-        return jax.tree.map(lambda part: part.reshape(len(laws), trials.number), whole)
+        batch = self._batch(laws, trials)
+        results = list(run_many([batch], programs=self._programs, workers=_WORKERS, at_once=self._width))
+        parts = in_order(results, [self._shares(result) for result in results])
+        return jax.tree.map(lambda part: part.reshape(len(laws), trials.number), parts)
 
     def compile(self) -> None:
         """Make the program now."""
-        with self._lock:
-            if self._program is None:
-                self._program = self._compiled()
+        (group,) = self._programs.groups([self._examples])
+        self._programs.runner(group)
 
     def total(self, parts: Shares) -> np.ndarray:
         """Cost of every run."""
@@ -163,13 +158,13 @@ class Evaluation:
         """Runs that are computed together."""
         return AT_ONCE * self._training.number
 
-    def _some(self, program: simd_batch.BatchRunner | vmap_batch.BatchRunner, columns: list[np.ndarray]) -> Shares:
-        outcome = program.run(jax.tree.unflatten(self._tree, columns))
-        parts = shares(outcome.accumulated[0], jnp.asarray(outcome.ended), self._training_loop.duration)
+    def _shares(self, result: BatchResult) -> Shares:
+        ended = jnp.asarray(result.outcome.ended)
+        parts = shares(result.outcome.accumulated[0], ended, self._training_loop.duration)
         return jax.tree.map(np.asarray, parts)
 
-    def _stacked(self, laws: Sequence[AbstractController], trials: Trials) -> Run:
-        """The numbers of every law on every trial, with a leading axis over these runs."""
+    def _batch(self, laws: Sequence[AbstractController], trials: Trials) -> RunBatch:
+        """Runs of every law on every trial."""
         runs = len(laws) * trials.number
         of_laws = lambda *leaves: np.repeat(np.stack(leaves), trials.number, axis=0)
         of_trials = lambda leaf: np.concatenate([np.asarray(leaf)] * len(laws))
@@ -180,29 +175,11 @@ class Evaluation:
             of_trials(trials.sizes),
             of_trials(trials.keys),
         )
-        same = jax.tree.map(of_all, eqx.filter(self._first, eqx.is_array))
+        same = jax.tree.map(of_all, eqx.filter(self._first.run, eqx.is_array))
         places = lambda run: (run.loop.plant, run.loop.controller, run.loop.disturbance.size, run.key)
-        return eqx.tree_at(places, same, varying)
+        return RunBatch(self._first, jax.tree.leaves(eqx.tree_at(places, same, varying)), runs)
 
     def _numbers(self, law: AbstractController) -> Any:
         """Numbers of a controller in the shapes of the tuned ones: one gain for all axes becomes one per axis."""
         spread = lambda number, like: np.broadcast_to(np.asarray(number), like.shape)
         return jax.tree.map(spread, eqx.filter(law, eqx.is_array), self._law_numbers)
-
-    def _program_of(self, columns: Sequence[np.ndarray]) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
-        """The program; a new one where a constant of the present one differs in these runs."""
-        pairs = zip(self._constants, columns, strict=True)
-        constants = [shared if shared is None or (column == shared).all() else None for shared, column in pairs]
-        with self._lock:
-            others = any(a is not b for a, b in zip(constants, self._constants, strict=True))
-            if self._program is None or others:
-                self._constants = constants
-                self._program = self._compiled()
-            return self._program
-
-    def _compiled(self) -> simd_batch.BatchRunner | vmap_batch.BatchRunner:
-        if self._training_loop.settings.backend == "simd":
-            with contextlib.suppress(simd_batch.Unsupported):
-                constant = [shared is not None for shared in self._constants]
-                return simd_batch.BatchRunner(self._first, self._plan, constant)
-        return vmap_batch.BatchRunner(self._first, self._plan, self._width)

@@ -17,7 +17,7 @@ from undertow.reproduction.claims import robustness as robustness
 from undertow.reproduction.claims import thrusters as thrusters
 from undertow.reproduction.claims import tracking as tracking
 from undertow.reproduction.claims.finding import CLAIMS, Scenarios
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.simulation.run_result import ScenarioResult
 
 
@@ -31,7 +31,7 @@ def batched(quick: bool) -> Scenarios:
     return {name: one for claim in CLAIMS for name, one in claim.batched(quick).items()}
 
 
-def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchResult]) -> list[dict[str, Any]]:
+def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchedRun]) -> list[dict[str, Any]]:
     """Verdicts with evidence, as in results.json.
 
     Args:

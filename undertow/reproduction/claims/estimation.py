@@ -4,7 +4,7 @@ from typing import Any
 
 from undertow.reproduction.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim, steady
 from undertow.reproduction.horizons import BOUND, Long, sampled
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.reproduction.setup import RAFC, RCAFC, equal_gain, scenario
 
 LIMITS = (150.0, 100.0, 60.0)  # V
@@ -74,12 +74,12 @@ def _noisy(law: str) -> str:
     return f"c02_{law}_noise"
 
 
-def _steady(run: BatchResult, metric: str) -> float | None:
+def _steady(run: BatchedRun, metric: str) -> float | None:
     found = run.windows[0]
     return None if found is None else found[metric]
 
 
-def _shown(run: BatchResult) -> str:
+def _shown(run: BatchedRun) -> str:
     error = _steady(run, "tracking_rms")
     return f"an early end at {run.ended:.1f} s" if error is None else f"{error:.2g}"
 

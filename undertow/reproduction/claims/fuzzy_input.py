@@ -4,7 +4,7 @@ from typing import Any
 
 from undertow.reproduction.claims.finding import Finding, Runs, claim, steady
 from undertow.reproduction.horizons import Long, sampled
-from undertow.reproduction.running import BatchResult
+from undertow.reproduction.running import BatchedRun
 from undertow.reproduction.setup import FIDELITIES, same_loop_gain, scenario
 
 # Law -> words, options; all with the same gamma |xi|^2.
@@ -73,12 +73,12 @@ def _name(level: str, law: str) -> str:
     return f"c05_{level}_{law}"
 
 
-def _metrics(run: BatchResult) -> dict[str, float] | None:
+def _metrics(run: BatchedRun) -> dict[str, float] | None:
     found = run.windows[0]
     return found and {metric: found[metric] for metric in ("tracking_rms", "estimation_rms", "input_variation")}
 
 
-def _shown(run: BatchResult) -> str:
+def _shown(run: BatchedRun) -> str:
     found = _metrics(run)
     if found is None:
         return f"ends at {run.ended:.2g} s"
