@@ -30,7 +30,6 @@ from undertow.campaign import task
 from undertow.campaign.build_trials import build_trial, build_trials
 from undertow.campaign.campaign_summary import summary
 from undertow.campaign.columns import labels
-from undertow.campaign.executors import by_dask, cluster, in_threads
 from undertow.campaign.fingerprint import Identity
 from undertow.campaign.prepare import prepare
 from undertow.campaign.run_campaign import STORE, run_campaign
@@ -40,6 +39,7 @@ from undertow.campaign.store_results import load
 from undertow.report.campaign_page import write_campaign
 from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
+from undertow.simulation.executors import by_dask, cluster, in_threads
 
 VARY = {"initial.position[0]": {"normal": [0.0, 0.1]}, "controller.composite": {"uniform": [10.0, 30.0]}}
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}

@@ -26,7 +26,7 @@ def short_study(monkeypatch):
 
     monkeypatch.setattr(study, "reproduce", short)
     monkeypatch.setattr(report, "write", write)
-    monkeypatch.setattr(command, "side_by_side", contextlib.nullcontext)
+    monkeypatch.setattr(command, "worker_processes", lambda preload: contextlib.nullcontext())
 
 
 def test_progress_verdicts_and_place_of_the_report(undertow, tmp_path, short_study):

@@ -69,7 +69,7 @@ IN_PLACE = {
     "undertow/export/fmu.py": "a temporary folder for the compiler",
     "undertow/logs/csv_file.py": "`Log.save` gives it a new file",
     "undertow/logs/mcap_writer.py": "`Log.save` gives it a new file; a log that is being written has a new name",
-    "undertow/tuning/checkpoint.py": "lines are added; one that is incomplete is left out",
+    "undertow/simulation/checkpoint.py": "lines are added; one that is incomplete is left out",
     "undertow/cli/soak.py": "a draft of the results folder",
     "undertow/cli/tune.py": "a draft of the results folder",
     "undertow/cli/falsify.py": "a draft of the results folder",

@@ -32,8 +32,8 @@ from undertow.interop.rerun_file import write_rerun
 from undertow.interop.ros2.write_bag import write_rosbag2
 from undertow.logs.log import Log, Series
 from undertow.logs.read import read_log
+from undertow.simulation.checkpoint import Checkpoint
 from undertow.simulation.result_files import save
-from undertow.tuning.checkpoint import Checkpoint
 
 _RESCUED = "out/out-rescued-1/"
 HOW = {"full": errno.ENOSPC, "error": errno.EIO, "killed": -1}

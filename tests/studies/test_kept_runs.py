@@ -4,8 +4,8 @@ import pytest
 import xarray as xr
 
 from undertow.reproduction.running import begin_all
-from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.reading import read
+from undertow.simulation.processes import Tasks, worker_processes
 from undertow.simulation.repetition import compare
 from undertow.simulation.run_scenario import run_scenario
 
@@ -23,7 +23,7 @@ AXIS = {
 
 
 def test_a_kept_run_is_repeated_bit_for_bit(tmp_path):
-    with side_by_side(1) as pool:
+    with worker_processes(1) as pool:
         ran = begin_all({"axis": AXIS}, tmp_path, Tasks(pool, lambda words, share: None))()["axis"]
     file = tmp_path / "runs" / "axis.nc"
     series = {"position", "reference", "input", "uncertainty", "estimate"}

@@ -8,7 +8,7 @@ import pytest
 
 from undertow.core import disk
 from undertow.core.errors import BadInput
-from undertow.tuning.checkpoint import Checkpoint, OutOfTime
+from undertow.simulation.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.objective import Objective
 from undertow.tuning.search import descend, evolve, search
 from undertow.tuning.stability import Certificate, no_certificate

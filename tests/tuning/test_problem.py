@@ -20,8 +20,8 @@ from undertow.plants import hybrid_vehicle
 from undertow.references import setpoint
 from undertow.scenario.reading import from_data
 from undertow.sensors import depth, dvl, imu
+from undertow.simulation.checkpoint import Checkpoint
 from undertow.thrusters import t200
-from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.cost import shares
 from undertow.tuning.evaluator import Evaluation, Scaled
 from undertow.tuning.objective import Objective

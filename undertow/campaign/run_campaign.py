@@ -9,11 +9,11 @@ import numpy as np
 
 from undertow.campaign import task as tasks
 from undertow.campaign.columns import METRICS, coordinates, labels
-from undertow.campaign.executors import Executor
 from undertow.campaign.fingerprint import identity
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.store import Store
 from undertow.campaign.store_layout import layout
+from undertow.simulation.executors import Executor
 
 STORE = "trials.zarr"
 

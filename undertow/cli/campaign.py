@@ -10,7 +10,6 @@ from rich.table import Table
 from undertow.analysis.metrics import for_people
 from undertow.campaign.build_trials import build_trial
 from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.executors import check_cluster
 from undertow.campaign.prepare import Prepared, prepare
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import Results, load
@@ -25,6 +24,7 @@ from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.part_cache import PartCache
+from undertow.simulation.executors import check_cluster
 
 
 def campaign(

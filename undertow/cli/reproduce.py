@@ -8,7 +8,7 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
-from undertow.reproduction.side_by_side import side_by_side
+from undertow.simulation.processes import worker_processes
 
 _WRITTEN = ("report.html", "ablations.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
@@ -21,7 +21,7 @@ def reproduce(out: Path, quick: bool, pdf: str | None) -> None:
         output_folder(out, out) as folder,
         results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
         shares(console) as progress,
-        side_by_side() as pool,
+        worker_processes(preload="undertow.reproduction.reproduce") as pool,
     ):
         # Imported while the other processes import the same.
         from undertow.report.reproduction.report import write

@@ -11,7 +11,6 @@ from typing import Protocol, TypeVar
 import typer
 from rich.console import Console
 
-from undertow.campaign.executors import chosen
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
 from undertow.campaign.store_results import load
@@ -24,6 +23,7 @@ from undertow.core.disk import alone
 from undertow.core.errors import BadInput
 from undertow.scenario.build import Built
 from undertow.scenario.reading import dump
+from undertow.simulation.executors import make_executor
 
 
 class _Advised(Protocol):
@@ -127,7 +127,7 @@ def run_trials(
     """
     if replaced is not None:
         _clear(folder, replaced)
-    with chosen(where, workers) as executor, _live(console, replaced is None) as watch:
+    with make_executor(where, workers) as executor, _live(console, replaced is None) as watch:
         interruptible(lambda: run_campaign(prepared, folder, executor, watch))
 
 

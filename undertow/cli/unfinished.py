@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from undertow.tuning.checkpoint import has_answers
+from undertow.simulation.checkpoint import has_answers
 
 
 def unfinished(first: Path, name: str) -> Path:

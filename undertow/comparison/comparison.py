@@ -118,11 +118,11 @@ def compare(
     Raises:
         BadInput: anything wrong with the scenario, the controllers or the number of trials.
     """
-    from undertow.campaign.executors import chosen
     from undertow.campaign.run_campaign import run_campaign
     from undertow.campaign.store_results import load
     from undertow.comparison.equal_budgets import equal_budgets
     from undertow.comparison.prepare import prepare_comparison
+    from undertow.simulation.executors import make_executor
 
     given: Any = scenario
     if isinstance(scenario, str | Path):
@@ -136,6 +136,6 @@ def compare(
         ready = prepare_comparison(given, controllers, trials, allow_code, tuner)
     for sentence in ready.advice:
         warnings.warn(sentence, stacklevel=2)
-    with tempfile.TemporaryDirectory() as folder, chosen(None, workers or os.cpu_count() or 1) as executor:
+    with tempfile.TemporaryDirectory() as folder, make_executor(None, workers or os.cpu_count() or 1) as executor:
         run_campaign(ready.prepared, Path(folder), executor, lambda tally: None)
         return read_comparison(Path(folder), load(Path(folder)), ready)

@@ -21,9 +21,9 @@ from undertow.scenario.consistency import record_period
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
 from undertow.scenario.schema import Falsify
+from undertow.simulation.checkpoint import Checkpoint
 from undertow.simulation.run_result import ScenarioResult
 from undertow.simulation.run_scenario import run_scenario
-from undertow.tuning.checkpoint import Checkpoint
 from undertow.tuning.search import descend, search, spread_points
 
 METHODS = ("gradient", "search")

@@ -16,7 +16,7 @@ from undertow.reproduction.horizons import BOUND
 from undertow.reproduction.lag_map import lag_thruster
 from undertow.reproduction.running import BatchedRun, begin_batches, write_all
 from undertow.reproduction.setup import law_of, scenario
-from undertow.reproduction.side_by_side import Tasks
+from undertow.simulation.processes import Tasks
 
 LAG = 0.05  # s
 _SECONDS = 20.0

@@ -13,9 +13,9 @@ from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.robust_variant import chapter
 from undertow.reproduction.running import begin_all, begin_batches, write_all
 from undertow.reproduction.setup import CONTROLLERS
-from undertow.reproduction.side_by_side import Tasks
 from undertow.reproduction.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.provenance import versions
+from undertow.simulation.processes import Tasks
 from undertow.simulation.run_result import ScenarioResult
 
 _RUNNING = 0.9  # share of the work that the runs take; the rest is plotting
@@ -40,7 +40,7 @@ def reproduce(folder: Path, quick: bool, progress: Callable[[str, float], None],
         folder: an existing, empty folder.
         quick: fewer points in the sweeps and a long horizon of 200 s, not 2,000 s; the same accuracy.
         progress: called with a message and the share done.
-        pool: executor of `side_by_side`; nothing waits before all that can be run has begun.
+        pool: executor of `worker_processes`; nothing waits before all that can be run has begun.
     """
     tasks = Tasks(pool, lambda words, share: progress(words, _RUNNING * share))
     named = examples.scenarios() | claims.scenarios(quick)

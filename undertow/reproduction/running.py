@@ -16,11 +16,11 @@ from undertow.loop.outcome import Outcome
 from undertow.loop.simd_batch import Unsupported
 from undertow.numerics.random_keys import key_of_seed
 from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.side_by_side import Tasks, side_by_side
 from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
 from undertow.simulation.prepared_run import PreparedRun, prepare
+from undertow.simulation.processes import Tasks, worker_processes
 from undertow.simulation.programs import ProgramCache, RunGroup
 from undertow.simulation.repetition import shortened
 from undertow.simulation.result_files import save
@@ -92,7 +92,7 @@ def run_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchedRun]:
     """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `begin_batches`."""
-    with side_by_side(1) as pool:
+    with worker_processes(1) as pool:
         return begin_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
 
 

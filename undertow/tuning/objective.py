@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from undertow.tuning.checkpoint import Checkpoint, OutOfTime
+from undertow.simulation.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.stability import Certificate
 
 Points = Float[np.ndarray, "p k"]

@@ -15,7 +15,7 @@ from undertow.core.errors import BadInput, within
 from undertow.scenario.build import in_its_precision
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
-from undertow.tuning.checkpoint import Checkpoint, OutOfTime
+from undertow.simulation.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.cost import Shares
 from undertow.tuning.evaluator import AT_ONCE, Evaluation
 from undertow.tuning.objective import Objective, Step, Watch

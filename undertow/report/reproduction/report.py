@@ -42,7 +42,7 @@ def write_report(
         figures: by name: fig02, fig06, ..., fig13, fidelity, sweep; others are shown after the paper's.
         folder: where to write, created if missing.
         pdf: width of PDF files; None for none.
-        pool: executor of `side_by_side` that writes the figures; None to write them here.
+        pool: executor of `worker_processes` that writes the figures; None to write them here.
 
     Returns:
         The first page.

@@ -9,7 +9,7 @@ from undertow.reproduction.ablations.verdicts import ABLATIONS
 from undertow.reproduction.robust_variant import fidelity
 from undertow.reproduction.robust_variant.conclusions import conclusions
 from undertow.reproduction.running import begin_all
-from undertow.reproduction.side_by_side import Tasks
+from undertow.simulation.processes import Tasks
 from undertow.simulation.run_result import ScenarioResult
 
 Chapter = tuple[dict[str, Any], dict[str, ScenarioResult]]

@@ -5,6 +5,7 @@ interpreter of its own. Imports no JAX, so that the others start with the comman
 """
 
 import contextlib
+import importlib
 import os
 import pickle
 import queue
@@ -32,11 +33,11 @@ class _Lost(Exception):
 class _Process:
     """A process that computes one task after another."""
 
-    def __init__(self) -> None:
+    def __init__(self, preload: str):
         # The same search path, but without the current folder in front, where a file may have the name of a module.
         # Ctrl-C ends this process, which ends the other one.
         self._ended = False
-        command = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
+        command = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve({preload!r})"
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(
             [sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True
@@ -119,17 +120,18 @@ class Tasks:
 
 
 @contextlib.contextmanager
-def side_by_side(count: int | None = None) -> Iterator[Executor]:
+def worker_processes(count: int | None = None, preload: str = "undertow.simulation.run_many") -> Iterator[Executor]:
     """Executor of tasks, whose functions are those of modules; an error cancels what has not begun.
 
     Args:
         count: number of processes, this one included; the number of usable cores, up to 4, unless given.
+        preload: module that the others import before there is anything to do.
     """
     count = min(_MOST, _cores()) if count is None else count
     processes: list[_Process] = []
     with contextlib.suppress(OSError):  # then there are fewer
         while sys.executable and len(processes) < count - 1:
-            processes.append(_Process())
+            processes.append(_Process(preload))
     pool = _Pool(processes)
     try:
         yield pool
@@ -147,8 +149,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def serve() -> None:
-    """Compute the tasks that standard input names, and write their results to standard output.
+def serve(preload: str) -> None:
+    """Import a module, compute the tasks that standard input names, and write their results to standard output.
 
     Whatever else is printed goes to standard error.
     """
@@ -157,7 +159,7 @@ def serve() -> None:
     if not os.environ.get("UNDERTOW_TRACEBACK"):
         warnings.simplefilter("ignore")
     prepare()
-    from undertow.reproduction import reproduce as reproduce  # before there is anything to do
+    importlib.import_module(preload)
 
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:

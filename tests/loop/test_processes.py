@@ -9,8 +9,8 @@ import time
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.reproduction import side_by_side as module
-from undertow.reproduction.side_by_side import Tasks, side_by_side
+from undertow.simulation import processes as module
+from undertow.simulation.processes import Tasks, worker_processes
 
 pytestmark = pytest.mark.full
 
@@ -31,7 +31,7 @@ def refuse():
 
 
 def test_two_processes_compute_and_raise_and_one_goes_on_alone():
-    with side_by_side(2) as pool:
+    with worker_processes(2) as pool:
         numbers = set(both(pool, os.getpid))
         assert len(numbers) == 2 and os.getpid() in numbers
         assert both(pool, math.factorial, 20) == [2432902008176640000] * 2
@@ -46,13 +46,13 @@ def test_two_processes_compute_and_raise_and_one_goes_on_alone():
 
 def test_one_process_is_this_one(monkeypatch):
     monkeypatch.setattr(module, "_cores", lambda: 1)
-    with side_by_side() as pool:
+    with worker_processes() as pool:
         assert both(pool, os.getpid) == [os.getpid()] * 2
 
 
 def test_an_error_cancels_what_has_not_begun():
     held, futures = threading.Event(), []
-    with pytest.raises(KeyboardInterrupt), side_by_side(1) as pool:
+    with pytest.raises(KeyboardInterrupt), worker_processes(1) as pool:
         futures += [pool.submit(held.wait, 60), pool.submit(math.sqrt, 4.0)]
         raise KeyboardInterrupt
     held.set()
@@ -61,7 +61,7 @@ def test_an_error_cancels_what_has_not_begun():
 
 def test_progress_counts_the_tasks_that_are_done():
     said = []
-    with side_by_side(1) as pool:
+    with worker_processes(1) as pool:
         held = threading.Event()
         tasks = Tasks(pool, lambda words, share: said.append((words, share)))
         begun = [tasks.begin("waited", held.wait, 60), tasks.begin("a root", math.sqrt, 4.0)]

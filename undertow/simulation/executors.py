@@ -31,7 +31,7 @@ _TURN = 2e-4
 
 
 @contextlib.contextmanager
-def chosen(where: str | None, count: int) -> Iterator[Executor]:
+def make_executor(where: str | None, count: int) -> Iterator[Executor]:
     """The executor for a cluster (see `cluster`), or threads where none is named."""
     if where is None:
         yield functools.partial(in_threads, threads=count)
@@ -166,7 +166,7 @@ def _started(kind: str, workers: int) -> Any:
     if kind == "local":
         from distributed import LocalCluster
 
-        from undertow.campaign import local_worker
+        from undertow.simulation import local_worker
 
         return LocalCluster(
             n_workers=workers,
