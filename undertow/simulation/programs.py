@@ -211,7 +211,7 @@ def _numbers_of_first(batch: RunBatch) -> list[Any]:
 def _equal(shared: Any, leaf: Any, own: np.ndarray | None) -> bool:
     """Whether all runs of a batch have a number."""
     if own is not None:
-        return bool((own == shared).all())
+        return bool((own == np.asarray(shared)).all())
     return leaf is shared or np.array_equal(leaf, shared)
 
 
