@@ -157,15 +157,15 @@ class Attacked:
         vehicle.restart()
         onset, frozen = round(ONSET / DT), {}
         for step in range(onset + round(duration / DT)):
-            state = vehicle.state
+            motion_now = vehicle.motion
             if step == onset:
                 vehicle.count_anew()
             given = {
-                "position": state.position,
-                "attitude": state.attitude,
-                "velocity": state.body_velocity[:3],
-                "rate": state.body_velocity[3:],
-                "applied": vehicle.stepped.input,
+                "position": motion_now.position,
+                "attitude": motion_now.attitude,
+                "velocity": motion_now.velocity[:3],
+                "rate": motion_now.velocity[3:],
+                "applied": vehicle.vehicle.output.applied,
             }
             for one in wrong if step >= onset else ():
                 given[one.quantity] = _wrong(one, step - onset, given[one.quantity], frozen)

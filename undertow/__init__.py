@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from undertow import vehicles as vehicles
     from undertow.autopilot.autopilot import Autopilot as Autopilot
     from undertow.autopilot.navigation_filter import NavigationFilter as NavigationFilter
+    from undertow.autopilot.vehicle import Vehicle as Vehicle
     from undertow.comparison.comparison import Comparison as Comparison
     from undertow.comparison.comparison import compare as compare
     from undertow.controllers.rcaf import rcaf as rcaf
@@ -49,6 +50,7 @@ _HOMES = {
     "HybridVehicle": "undertow.plants.hybrid_vehicle",
     "NavigationFilter": "undertow.autopilot.navigation_filter",
     "Run": "undertow.run",
+    "Vehicle": "undertow.autopilot.vehicle",
     "attitudes_of_quaternions": "undertow.logs.frames",
     "body_vectors": "undertow.logs.frames",
     "compare": "undertow.comparison.comparison",

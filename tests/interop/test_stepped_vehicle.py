@@ -38,7 +38,7 @@ def test_every_bit_is_that_of_a_simulation(vehicle):
     run = ut.simulate_scenario(DRIVEN).dataset
     pulses = pulses_of(run)[:-1]
     np.testing.assert_array_equal(motions(vehicle, pulses, 0.01), recorded(run))
-    np.testing.assert_array_equal(vehicle.input, run["input"].values[-2])
+    np.testing.assert_array_equal(vehicle.vehicle.output.applied, run["input"].values[-2])
     vehicle.restart()
     np.testing.assert_array_equal(motions(vehicle, pulses, 0.01), recorded(run))
 
@@ -117,20 +117,22 @@ def test_the_battery_obeys_kirchhoff(written):
     pulses = np.array([1900.0, 1100, 1700, 1300, 1800, 1200, 1650, 1500])
     for _ in range(100):
         vehicle.step(pulses, 0.01)
-    x = vehicle._advance.state
+    x = vehicle.vehicle.state
     state, battery = vehicle.state(), vehicle.plant.power.battery
     assert battery is not None
     bus, current = state.battery
     assert bus == pytest.approx(float(battery.open_circuit_voltage(x.power.charge)) - 0.05 * current, rel=1e-9)
-    power = float(vehicle.plant.thruster.electrical_power(x.thrusters, vehicle.input).sum())
+    power = float(vehicle.plant.thruster.electrical_power(x.thrusters, vehicle.vehicle.output.applied).sum())
     assert power == pytest.approx(bus * current, rel=1e-9) and current > 5
     held = vehicle.state()
     vehicle.step(pulses, 1e-9)  # the voltages of the present bus, no longer of that of a frame ago
-    np.testing.assert_allclose(vehicle.input, (pulses - 1500) / 400 * held.battery[0], rtol=0, atol=1e-2)
+    np.testing.assert_allclose(
+        vehicle.vehicle.output.applied, (pulses - 1500) / 400 * held.battery[0], rtol=0, atol=1e-2
+    )
 
 
 def test_pulses_that_are_not_one_for_each_thruster(vehicle):
-    with pytest.raises(BadInput, match=r"`pulses` must have shape \(8,\), but is of shape \(6,\)"):
+    with pytest.raises(BadInput, match=r"`command` must have shape \(8,\), but is of shape \(6,\)"):
         vehicle.step([1500] * 6, 0.01)
     assert vehicle.time == 0
 
@@ -157,9 +159,10 @@ def test_a_continuous_scenario_is_stepped_too(vehicle, written):
 
 def test_a_state_that_is_not_finite_is_noticed_and_not_kept(vehicle):
     before = vehicle.state()
-    assert not vehicle.hold(np.full(8, np.nan), 0.01)
+    vehicle.vehicle.state.nu[...] = [1e200, 0, 0, 0, 0, 0]
+    assert not vehicle.step(STILL, 0.01)
     assert vehicle.status is Status.NOT_FINITE
-    np.testing.assert_array_equal(vehicle._advance.state.nu, vehicle._first.nu)
+    np.testing.assert_array_equal(vehicle.vehicle.state.nu, [1e200, 0, 0, 0, 0, 0])
     np.testing.assert_array_equal(vehicle.state().position, before.position)
 
 

@@ -7,11 +7,10 @@ import pytest
 
 import undertow as ut
 from undertow.autopilot.navigation_filter import NavigationFilter
-from undertow.autopilot.numbers import step_of
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.loop.stepped import put
+from undertow.loop.stepped import put, step_of
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

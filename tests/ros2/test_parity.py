@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.autopilot.vehicle import Vehicle
 from undertow.core.status import Status
 from undertow.interop.ros2 import from_messages, read_rosbag2, to_messages
 from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity, motion_of
 from undertow.interop.ros2.link import Link
 from undertow.interop.ros2.node import Reporter
-from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
 from undertow.interop.ros2.to_messages import odometry_of, stamp_of
 from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
 from undertow.interop.ros2.write_bag import BagWriter
@@ -48,7 +48,7 @@ def controller(scenario):
 
 @pytest.fixture(scope="module")
 def vehicle(scenario):
-    return SimulatedVehicle(build(read(scenario)))
+    return Vehicle(build(read(scenario)), attitude="quaternion")
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_all_bits_but_the_rounding_of_attitudes(controller, vehicle, simulated, 
 
 def as_odometry(observed):
     """What a law gets of a motion after its way through a message: axes and attitudes are turned there and back."""
-    motion = PoseAndVelocity(observed.position, observed.quaternion, observed.velocity)
+    motion = PoseAndVelocity(observed.position, observed.attitude, observed.velocity)
     arrived = motion_of(odometry_of(motion, stamp_of(0), Frames()), Frames(), "/odom")
     return arrived.position, arrived.velocity, arrived.quaternion
 
@@ -102,7 +102,7 @@ def test_a_run_over_ros_is_that_of_a_simulation(controller, vehicle, simulated, 
     ENU attitudes round by some 1e-16, which is all that differs from a simulation; after 2 s it has grown to 2e-9 V.
     """
     found = lock_step(controller, vehicle, domain, tmp_path / "bag")
-    autopilot, observed = ut.Autopilot(scenario, attitude="quaternion"), vehicle.start()
+    autopilot, observed = ut.Autopilot(scenario, attitude="quaternion"), vehicle.restart()
     positions, commands = [observed.position], [np.clip(autopilot.start(*as_odometry(observed)), -16, 16)]
     for _ in found["/thrusters"][1:]:
         observed = vehicle.step(commands[-1])
@@ -123,8 +123,8 @@ def test_noise_and_substeps_are_those_of_a_simulation():
         "loop": {"duration": 1, "dt": 0.01, "record": 0.01, "substeps": 3},
     }
     record = ut.simulate_scenario(scenario).dataset
-    vehicle = SimulatedVehicle(build(scenario))
-    observed = [vehicle.start(), *map(vehicle.step, record["commanded_input"].values[:-1])]
+    vehicle = Vehicle(build(scenario), attitude="quaternion")
+    observed = [vehicle.restart(), *map(vehicle.step, record["commanded_input"].values[:-1])]
     measured = np.array([one.position for one in observed])
     np.testing.assert_array_equal(measured, record["measured_position"].values[:, :3])
     np.testing.assert_array_equal([one.applied for one in observed[1:]], record["input"].values[:-1])
@@ -135,9 +135,9 @@ def test_an_imu_measures_what_the_motion_says(vehicle, simulated):
     """Specific force: the change of the true velocity over a step, less gravity, in body axes of the middle of the step."""
     from scipy.spatial.transform import Rotation
 
-    observed = [vehicle.start(), *map(vehicle.step, simulated["commanded_input"].values[:-1])]
+    observed = [vehicle.restart(), *map(vehicle.step, simulated["commanded_input"].values[:-1])]
     rate = np.diff(simulated["velocity"].values[:, :3], axis=0) / 0.01
-    turned = Rotation.from_quat([one.quaternion for one in observed[1:]], scalar_first=True)
+    turned = Rotation.from_quat([one.attitude for one in observed[1:]], scalar_first=True)
     at_end = turned.inv().apply(rate - [0, 0, 9.81])
     expected = at_end + 0.005 * np.cross([one.velocity[3:] for one in observed[1:]], at_end)
     np.testing.assert_allclose([one.specific_force for one in observed[1:]], expected, atol=1e-9)

@@ -7,13 +7,14 @@ import pytest
 from peer import Running, Said, until
 
 import undertow as ut
+from undertow.autopilot.vehicle import Vehicle
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.ros2 import messages as ros
+from undertow.interop.ros2.checked_scenario import check_vehicle
 from undertow.interop.ros2.from_messages import Frames, motion_of, nanoseconds_of
 from undertow.interop.ros2.link import Link
 from undertow.interop.ros2.node import Reporter
-from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
 from undertow.interop.ros2.to_messages import thrusters_of
 from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
 from undertow.scenario.build import build
@@ -32,7 +33,7 @@ VOLTS = np.linspace(-20, 20, 8)
 
 @pytest.fixture(scope="module")
 def vehicle():
-    return SimulatedVehicle(build(SCENARIO))
+    return Vehicle(build(SCENARIO), attitude="quaternion")
 
 
 class Controller:
@@ -76,7 +77,7 @@ def test_lock_step_waits_for_each_command(setup, vehicle):
         other.thrusters.publish(thrusters_of(VOLTS, "thrusters [V]"))
     running.join(10)
     assert running.result is Status.OK
-    expected = [vehicle.start().position, *(vehicle.step(VOLTS).position for _ in range(10))]
+    expected = [vehicle.restart().position, *(vehicle.step(VOLTS).position for _ in range(10))]
     np.testing.assert_array_equal(positions(seen), expected)
     stamps = [nanoseconds_of(one.header.stamp) for one in seen]
     assert stamps == [50_000_000 * k for k in range(11)]
@@ -94,7 +95,7 @@ def test_a_command_before_the_odometry_is_no_answer_to_it(setup, vehicle):
         seen += until(other.odometry.take)
         other.thrusters.publish(thrusters_of(VOLTS, ""))
     running.join(10)
-    vehicle.start()
+    vehicle.restart()
     np.testing.assert_array_equal(positions(seen)[1], vehicle.step(VOLTS).position)
     assert said.warnings == ["Warning: a command came before its odometry: it is ignored"]
 
@@ -103,7 +104,7 @@ def test_without_a_controller_it_drifts_with_the_current(setup, vehicle):
     node, other, said = setup(pace="fast", duration=0.4)
     assert node.run() is Status.OK
     found = positions(until(other.odometry.take))
-    expected = [vehicle.start().position, *(vehicle.step(np.zeros(8)).position for _ in range(8))]
+    expected = [vehicle.restart().position, *(vehicle.step(np.zeros(8)).position for _ in range(8))]
     np.testing.assert_array_equal(found, expected)
     assert found[-1, 0] > 0 and not said.warnings
 
@@ -111,7 +112,7 @@ def test_without_a_controller_it_drifts_with_the_current(setup, vehicle):
 def test_a_vehicle_that_leaves_the_envelope_ends_the_run(domain):
     """A kilometre from the origin numbers are taken for an error, as in a simulation."""
     away = {"initial": {"position": [999.9, 0, 0, 0, 0, 0], "velocity": [5, 0, 0, 0, 0, 0]}}
-    vehicle = SimulatedVehicle(build(SCENARIO | away))
+    vehicle = Vehicle(build(SCENARIO | away), attitude="quaternion")
     with Link(domain, True) as link:
         node = VehicleNode(vehicle, link, VehicleSettings("fast"), Reporter(Said()))
         status = node.run()
@@ -181,6 +182,6 @@ def test_what_a_vehicle_node_cannot_be_made_of(vehicle, domain):
             with pytest.raises(BadInput, match=said):
                 VehicleNode(vehicle, link, VehicleSettings(**settings), Reporter(Said()))
     with pytest.raises(BadInput, match=r"`loop\.kind` must be sampled"):
-        SimulatedVehicle(build(SCENARIO | {"loop": {"kind": "continuous", "dt": 0.01, "record": 0.01}}))
+        check_vehicle(build(SCENARIO | {"loop": {"kind": "continuous", "dt": 0.01, "record": 0.01}}))
     with pytest.raises(BadInput, match=r"`command` must have shape \(8,\)"):
         vehicle.step(np.zeros(3))

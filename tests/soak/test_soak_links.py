@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from undertow.autopilot.measured_motion import Motion
 from undertow.cli.kept_commands import kept
-from undertow.interop.stepped_vehicle import State
 from undertow.soak.links.command_process import CommandProcess
 from undertow.soak.links.link_run import LinkRunner
 from undertow.soak.links.peer import AbstractPeer, Measured, altered
@@ -19,7 +19,7 @@ from undertow.soak.links_soak import attack_links
 
 pytestmark = pytest.mark.soak
 
-STILL = State(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(6), np.zeros(3), (), ())
+STILL = Motion(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(6))
 
 
 def test_plans_are_sampled_from_their_identity():
@@ -177,12 +177,12 @@ class PretendedPeer(AbstractPeer):
 class PretendedVehicle:
     """It stays where it is, and counts as the true one does."""
 
-    class stepped:
+    class vehicle:
         thrusters = 8
 
     def restart(self):
         self.volt_seconds = self.longest_full = self.furthest = 0.0
-        self.failed, self.state = False, STILL
+        self.failed, self.motion = False, STILL
 
     def hold(self, volts, dt):
         self.longest_full += dt * bool(abs(volts).max() >= 15)

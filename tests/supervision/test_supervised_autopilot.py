@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.interop.stepped_vehicle import SteppedVehicle
 from undertow.scenario.reading import dump
 from undertow.supervision.supervised_controller import state_in
 
@@ -95,13 +94,13 @@ def test_a_report_that_stands_still_does_not_set_thrusters_against_each_other(tm
     """Of eight thrusters two combinations move nothing, so that no motion contradicts the report."""
     path = tmp_path / "vehicle.yaml"
     path.write_text(dump(SCENARIO | {"controller": "robust"}))
-    vehicle, autopilot = SteppedVehicle(path), ut.Autopilot(path, attitude="quaternion")
-    report, outputs, state = np.array([-8.0, -6.0, -8.0, -8.0, -8.0, -6.0, 2.0, -2.5]), [], vehicle.state()
-    outputs.append(autopilot.start(state.position, state.body_velocity, state.attitude))
+    vehicle, autopilot = (kind(path, attitude="quaternion") for kind in (ut.Vehicle, ut.Autopilot))
+    report = np.array([-8.0, -6.0, -8.0, -8.0, -8.0, -6.0, 2.0, -2.5])
+    motion = vehicle.output.truth
+    outputs = [autopilot.start(motion.position, motion.velocity, motion.attitude)]
     for _ in range(150):
-        vehicle.hold(outputs[-1], 0.02)
-        state = vehicle.state()
-        outputs.append(autopilot.step(state.position, state.body_velocity, state.attitude, applied=report))
+        motion = vehicle.step(outputs[-1], 0.02).truth
+        outputs.append(autopilot.step(motion.position, motion.velocity, motion.attitude, applied=report))
     assert autopilot.state == ("DEGRADED", "applied_contradicted")
     assert np.abs(outputs[100:]).max() < 5.0
 

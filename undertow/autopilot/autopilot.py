@@ -13,18 +13,18 @@ import numpy as np
 from undertow.autopilot.clock import Clock
 from undertow.autopilot.functions import Functions
 from undertow.autopilot.measured_motion import Format, Motion
-from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.output import output_of
 from undertow.autopilot.saved_state import packed, unpacked
 from undertow.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.authority import authority_of
+from undertow.core.checks import numbers
 from undertow.core.contracts import AbstractGatedController, Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.stepped import Uncopied, put
+from undertow.loop.stepped import Uncopied, put, step_of
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time
@@ -518,9 +518,12 @@ def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tupl
         built = build(at_sampling_time(text, sampling_time))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
-    loop = built.closed_loop if placed else built.without_faults().closed_loop
-    given = loop if placed else dataclasses.replace(loop, reference=built.reference)
-    return given, built.scenario.precision, built.scenario.loop.dt
+    loop = built.closed_loop
+    if not placed:
+        # Its faults do not act here, but their announcements are part of a measurement.
+        healthy = built.without_faults().closed_loop
+        loop = dataclasses.replace(healthy, reference=built.reference, faults=loop.faults)
+    return loop, built.scenario.precision, built.scenario.loop.dt
 
 
 def _largest_estimate(loop: ClosedLoop) -> Any:

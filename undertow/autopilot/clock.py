@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from undertow.autopilot.numbers import numbers
+from undertow.core.checks import numbers
 
 # Sampling times from which on a step is late, and is missed.
 LATE, MISSED = 1.5, 5.0

@@ -98,6 +98,21 @@ class Motion(NamedTuple):
         return form.measurement(self, actuator)
 
 
+def motion_in(form: Format | None, measurement: Measurement) -> Motion:
+    """A measurement as a motion in a format: what `Motion.measurement` turns back."""
+    position, velocity, body = measurement.position, measurement.velocity, measurement.body
+    if form is None or body is None:
+        return Motion(position, jnp.zeros(0), velocity)
+    world = jnp.concatenate([matvec(body.rotation, body.nu[:3]), matvec(body.rotation, body.nu[3:])])
+    attitudes = {
+        "euler": position[3:],
+        "quaternion": body.attitude,
+        "both": jnp.concatenate([position[3:], body.attitude]),
+    }
+    velocities = {"body": body.nu, "world": world, "rates": velocity, "both": jnp.concatenate([velocity, body.nu])}
+    return Motion(position[:3], attitudes[form.attitude], velocities[form.velocity])
+
+
 def _unit(quaternion: Float[Array, "4"]) -> Float[Array, "4"]:
     """The quaternion with length 1: as it is where that is so already."""
     square = (quaternion**2).sum()

@@ -10,13 +10,13 @@ import numpy as np
 
 from undertow.autopilot.clock import Clock
 from undertow.autopilot.filter_functions import EstimatedMotion, FilterFunctions
-from undertow.autopilot.numbers import numbers, step_of
 from undertow.autopilot.saved_state import packed, unpacked
 from undertow.autopilot.step_log import StepLog, filter_signals
 from undertow.core import checks, runtime
+from undertow.core.checks import numbers
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
-from undertow.loop.stepped import Uncopied, put
+from undertow.loop.stepped import Uncopied, put, step_of
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time

@@ -120,7 +120,8 @@ def _compiled_controller(scenario: Path, options: Options, names: Any, frames: A
 
 
 def _compiled_vehicle(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
-    from undertow.interop.ros2.simulated_vehicle import SimulatedVehicle
+    from undertow.autopilot.vehicle import Vehicle
+    from undertow.interop.ros2.checked_scenario import check_vehicle
     from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
     from undertow.scenario.build import build
     from undertow.scenario.reading import read
@@ -130,7 +131,13 @@ def _compiled_vehicle(scenario: Path, options: Options, names: Any, frames: Any,
     period = None if options.rate is None else 1 / options.rate
     pace, duration = options.pace or "real-time", options.duration
     settings = VehicleSettings(pace, duration, options.max_age, topics=names, frames=frames)
-    vehicle = interruptible(lambda: SimulatedVehicle(build(read(scenario, allow_code=options.allow_code)), period))
+
+    def made() -> Vehicle:
+        built = build(read(scenario, allow_code=options.allow_code))
+        check_vehicle(built)
+        return Vehicle(built, sampling_time=period, attitude="quaternion")
+
+    vehicle = interruptible(made)
 
     def run(link: Any) -> int:
         node = VehicleNode(vehicle, link, settings, reporter)

@@ -96,6 +96,23 @@ def finite(name: str, value: Any, unit: str = "") -> None:
     _each(name, value, lambda x: abs(x) < np.inf, "be a finite number", unit)
 
 
+def numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """A value as numbers of a shape.
+
+    Raises:
+        BadInput: it has another one, or holds something else.
+    """
+    try:
+        if np.asarray(value).dtype.kind in "SU":  # NumPy takes "10" for a number
+            raise TypeError
+        found = np.asarray(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise BadInput(name, "be numbers" if shape else "be a number", repr(value)) from None
+    if found.shape != shape:
+        raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
+    return found
+
+
 def length(name: str, value: Any, expected: int, what: str) -> None:
     """Check that a value is one-dimensional with `expected` entries."""
     shape = np.shape(value)

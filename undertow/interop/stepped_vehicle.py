@@ -8,30 +8,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.autopilot.numbers import numbers, step_of
+from undertow.autopilot.vehicle import Vehicle
 from undertow.core import runtime
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Inputs
 from undertow.core.errors import BadInput
-from undertow.core.expected_measurement import all_finite
 from undertow.core.status import Status
 from undertow.disturbances.surface import UnderSurface, stated_depths, surface
-from undertow.interop.pulse_driven import pulse_driven
 from undertow.loop.closed_loop import ClosedLoop, Realization
-from undertow.loop.stepped import Uncopied, put, realized
-from undertow.numerics.integrators import COMPACT_METHODS
+from undertow.loop.stepped import put, step_of
 from undertow.numerics.linear_algebra import matvec
-from undertow.numerics.random_keys import key_of_seed
 from undertow.plants.hybrid_vehicle import HybridVehicle, VehicleState
-from undertow.power.esc import ESC, esc
+from undertow.plants.pulse_driven import pulse_driven
+from undertow.power.esc import esc
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
 # Gravity that ArduPilot and PX4 subtract from what accelerometers measure, m/s^2.
 STANDARD_GRAVITY = 9.80665
-
-# A vehicle that stands upright goes on: nothing here needs Euler angles.
-_GOING_ON = (Status.OK, Status.PITCH_SINGULAR)
 
 
 class State(NamedTuple):
@@ -46,19 +40,10 @@ class State(NamedTuple):
     battery: Any  # voltage of the bus, V, and current, A; () without a battery
 
 
-class _Given(NamedTuple):
-    """Inputs of a step of the integrator."""
+class SteppedVehicle:
+    """The vehicle of a scenario behind an autopilot: pulses in, motion and electrical side out, frame by frame.
 
-    t: Any  # s
-    h: Any  # s
-    applied: Any  # input of the plant
-
-
-class SteppedVehicle(Uncopied):
-    """The plant of a scenario with its disturbances, integrated as `undertow simulate` does it, frame by frame.
-
-    It is compiled when it is made. A step of the length of the scenario's sampling time has the bits of a simulation.
-    A longer one is divided into parts that are no longer than those of the scenario.
+    It is compiled when it is made.
 
     Args:
         scenario: a .yaml file or an earlier run.nc.
@@ -67,11 +52,9 @@ class SteppedVehicle(Uncopied):
         otherwise: the depth, m, where neither states one; None for water without a surface.
 
     Attributes:
+        vehicle: that is stepped.
         plant: of the scenario.
-        thrusters: how many.
         esc: speed controllers; usual ones where the scenario has none.
-        sampling_time: of the scenario, s.
-        time: s since the start.
         depth: of the scenario's origin below the surface, m; None without a surface.
 
     Raises:
@@ -83,49 +66,28 @@ class SteppedVehicle(Uncopied):
         self, scenario: str | Path, allow_code: bool = False, depth: float | None = None, otherwise: float | None = None
     ):
         built = build(read(Path(scenario), allow_code=allow_code))
-        settings, plant = built.scenario.loop, pulse_driven(built.closed_loop.plant, battery_suffices=True)
-        self.plant, self.esc = plant, plant.power.esc or esc()
-        self.thrusters, self.sampling_time = plant.inputs(), float(settings.dt)
-        self._longest = self.sampling_time / settings.substeps
-        integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
-        with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
-            loop, key = _under_surface(built.closed_loop, depth, otherwise), key_of_seed(built.scenario.seed)
-            self.depth = next(iter(stated_depths(loop.disturbance)), None)
-            start = loop.outputs_at_start(*map(_numbers, built.scenario.initial))
-            realization, x = _begun(loop, key, start)
-            self._compile(realization, x, integrate)
-        self.restart()
+        self.plant = pulse_driven(built.closed_loop.plant, battery_suffices=True)
+        loop = _under_surface(built.closed_loop, depth, otherwise)
+        self.depth = next(iter(stated_depths(loop.disturbance)), None)
+        self.vehicle = Vehicle(built._replace(closed_loop=loop), attitude="quaternion", command="pulses")
+        self.esc = self.vehicle.esc or esc()
+        with runtime.on_processor(), runtime.in_precision(self.vehicle.precision):
+            zero, none = jnp.zeros(()), jnp.zeros(self.plant.inputs())
 
-    def _compile(self, realization: Realization, x: VehicleState, integrate: Any) -> None:
-        self._first = jax.tree.map(np.array, x)
-        zero, none = jnp.zeros(()), jnp.zeros(self.thrusters)
+            def look(of: Realization, _, given: tuple[Any, VehicleState, Inputs]):
+                return (), _state_of(of, *given)
 
-        def advance(of: Realization, x: VehicleState, given: _Given):
-            new = integrate(lambda t, x: of.motion(t, x, given.applied), given.t, x, given.h)
-            code = of.loop.plant.status(new)
-            going_on = jnp.stack([code == int(status) for status in _GOING_ON]).any() & all_finite(new)
-            return jax.tree.map(lambda n, o: jnp.where(going_on, n, o), new, x), (going_on, code)
-
-        def applied(of: tuple[HybridVehicle, ESC], _, given: tuple[VehicleState, Inputs]):
-            return (), applied_voltage(*of, *given)
-
-        def look(of: Realization, _, given: tuple[Any, VehicleState, Inputs]):
-            return (), _state_of(of, *given)
-
-        self._advance = step_of(advance, realization, x, _Given(zero, zero, none))
-        self._apply = step_of(applied, (self.plant, self.esc), (), (x, none))
-        self._look = step_of(look, realization, (), (zero, x, none))
+            realization, x = self.vehicle.realization, self.vehicle.state
+            self._look = step_of(look, realization, (), (zero, x, none))
 
     def restart(self) -> None:
         """Go back to the start of the scenario: the same state, and the same disturbances."""
-        put(self._advance.state, self._first)
-        self._input = np.zeros(self.thrusters)
-        self._since, self._frames, self._dt = 0.0, 0, self.sampling_time
+        self.vehicle.restart()
 
     @property
     def time(self) -> float:
-        """s since the start; a multiple of the length of a frame where all were alike, as in a simulation."""
-        return self._since + self._frames * self._dt
+        """s since the start."""
+        return self.vehicle.time
 
     def step(self, pulses: Any, dt: float) -> bool:
         """Hold pulses for a time.
@@ -141,39 +103,19 @@ class SteppedVehicle(Uncopied):
         Raises:
             BadInput: not one pulse for each thruster.
         """
-        put(self._apply.inputs, (self._advance.state, numbers("pulses", pulses, (self.thrusters,))))
-        self._apply()
-        return self.hold(self._apply.outputs, dt)
-
-    def hold(self, applied: Any, dt: float) -> bool:
-        """As `step`, with the input of the plant in place of pulses: volts."""
-        self._input = numbers("applied", applied, (self.thrusters,)).copy()
-        parts = max(1, round(np.ceil(dt / self._longest - 1e-6)))
-        going_on, given, start = True, self._advance.inputs, self.time
-        given.applied[...], given.h[...] = self._input, dt / parts
-        for part in range(parts):
-            given.t[...] = start + part * (dt / parts)
-            self._advance()
-            going_on = going_on and bool(self._advance.outputs[0])
-        if dt != self._dt:
-            self._since, self._frames, self._dt = start, 0, dt
-        self._frames += 1
-        return going_on
+        self.vehicle.step(pulses, dt)
+        return self.vehicle.going_on
 
     @property
     def status(self) -> Status:
         """Status of the last step."""
-        code = Status(int(self._advance.outputs[1]))
-        return Status.NOT_FINITE if code in _GOING_ON and not self._advance.outputs[0] else code
-
-    @property
-    def input(self) -> np.ndarray:
-        """Input that was applied last, V."""
-        return self._input.copy()
+        return self.vehicle.output.status
 
     def state(self) -> State:
         """Motion and electrical side now, with the last input still applied."""
-        put(self._look.inputs, (self.time, self._advance.state, self._input))
+        applied = self.vehicle.output.applied
+        still = np.zeros(self.plant.inputs())
+        put(self._look.inputs, (self.time, self.vehicle.state, still if applied is None else applied))
         self._look()
         return jax.tree.map(np.array, self._look.outputs)
 
@@ -190,29 +132,6 @@ def _under_surface(loop: ClosedLoop, depth: float | None, otherwise: float | Non
     return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(chosen)))
 
 
-def _begun(loop: ClosedLoop, key: Any, start: Any) -> tuple[Realization, VehicleState]:
-    """The loop with its disturbances sampled, and the state at t = 0, by the compiler that takes the steps."""
-
-    first = step_of(lambda loop, _, start: ((), loop.plant.initial_state(*start)), loop, (), start)
-    first()
-    return realized(loop, key), jax.tree.map(jnp.array, first.outputs)
-
-
-def applied_voltage(plant: HybridVehicle, speed_controllers: ESC, x: VehicleState, pulses: Inputs) -> Inputs:
-    """Voltages, V, at which speed controllers drive the thrusters.
-
-    With a battery, the voltage of the bus is the one that its load leaves: the load follows from the voltage, and so
-    the largest voltage is sought that the battery can give.
-    """
-    thruster, battery = plant.thruster, plant.power.battery
-    if battery is None:
-        bus = jnp.asarray(thruster.supply)
-    else:
-        load = lambda bus: thruster.electrical_power(x.thrusters, speed_controllers.voltage(pulses, bus)).sum()
-        bus = battery.limit(x.power.charge, load, battery.open_circuit_voltage(x.power.charge))
-    return jnp.clip(speed_controllers.voltage(pulses, bus), *thruster.limits())
-
-
 def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> State:
     plant = of.loop.plant
     assert isinstance(plant, HybridVehicle)
@@ -227,7 +146,3 @@ def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> State:
         electrical = jnp.stack([battery.bus_voltage(charge, taken), battery.current(charge, taken)])
     propellers = () if report is None else report.speed
     return State(x.position, x.attitude, pose.velocity, x.nu, force, propellers, electrical)
-
-
-def _numbers(pair: tuple[str, Any]) -> Any:
-    return None if pair[1] is None else np.asarray(pair[1], dtype=float)

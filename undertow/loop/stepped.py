@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -59,6 +60,14 @@ class Step(Uncopied):
     def __call__(self) -> None:
         """Take the step: the outputs and the new state follow from the inputs, the numbers and the old state."""
         self._step()
+
+
+def step_of(function: Callable, part: Any, state: Any, inputs: Any) -> Step:
+    """A compiled step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
+    of_part, rest = eqx.partition(part, eqx.is_array)
+    return Step(
+        lambda of_part, state, inputs: function(eqx.combine(of_part, rest), state, inputs), of_part, state, inputs
+    )
 
 
 class _ByXla:

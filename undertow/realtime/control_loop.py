@@ -17,8 +17,8 @@ import jax
 import numpy as np
 
 from undertow.autopilot.autopilot import Autopilot
-from undertow.autopilot.numbers import numbers
 from undertow.core import checks
+from undertow.core.checks import numbers
 from undertow.realtime.link import AbstractLink, LinkMeasurement
 from undertow.realtime.loop_clock import AbstractLoopClock
 from undertow.realtime.statistics import LoopStatistics

@@ -166,7 +166,7 @@ def _runner(link: str, command: CommandProcess, folder: Path, seed: int) -> Runn
     else:
         from undertow.soak.links.mavlink_peer import MavlinkPeer
 
-        peer = MavlinkPeer(vehicle.stepped, _OUTPUTS[link])
+        peer = MavlinkPeer(vehicle.vehicle, _OUTPUTS[link])
     return LinkRunner(command, peer, vehicle, scenario, log, stops_itself=link == "ros2").run
 
 

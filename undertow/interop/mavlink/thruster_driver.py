@@ -6,13 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.autopilot.autopilot import Autopilot
-from undertow.autopilot.numbers import step_of
 from undertow.core import runtime
 from undertow.core.contracts import Inputs
 from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_of
-from undertow.interop.pulse_driven import pulse_driven
 from undertow.interop.thruster_channels import channels_of_vehicle
+from undertow.loop.stepped import step_of
 from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.plants.pulse_driven import pulse_driven
 from undertow.power.esc import ESC, esc
 
 

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from undertow.autopilot.numbers import numbers, step_of
 from undertow.core import checks, runtime
+from undertow.core.checks import numbers
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
 from undertow.interop.python_control.signals import (
@@ -29,6 +29,7 @@ from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import going
 from undertow.loop.recording import instant
+from undertow.loop.stepped import step_of
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build

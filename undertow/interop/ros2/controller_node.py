@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from undertow.autopilot.autopilot import Autopilot
-from undertow.autopilot.numbers import step_of
 from undertow.autopilot.output import Output, output_of
 from undertow.core import checks, runtime
 from undertow.core.errors import BadInput
 from undertow.interop.ros2 import messages as ros
+from undertow.interop.ros2.checked_scenario import check_vehicle
 from undertow.interop.ros2.from_messages import (
     SECOND,
     Frames,
@@ -36,9 +36,8 @@ from undertow.interop.ros2.from_messages import (
 )
 from undertow.interop.ros2.link import Link, why_nothing
 from undertow.interop.ros2.node import WAIT, Reporter, Topics
-from undertow.interop.ros2.simulated_vehicle import check_vehicle
 from undertow.interop.ros2.to_messages import stamp_of, thrusters_of, wrench_of
-from undertow.loop.stepped import put
+from undertow.loop.stepped import put, step_of
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time, read_for_link
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from undertow.autopilot.vehicle import Vehicle, VehicleOutput
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
@@ -18,7 +19,6 @@ from undertow.interop.ros2 import messages as ros
 from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity, thruster_label, thrusters_from
 from undertow.interop.ros2.link import Link, why_nothing
 from undertow.interop.ros2.node import WAIT, Reporter, Topics
-from undertow.interop.ros2.simulated_vehicle import Observed, SimulatedVehicle
 from undertow.interop.ros2.to_messages import imu_of, odometry_of, stamp_of
 
 PACES = ("real-time", "lock-step", "fast")
@@ -58,14 +58,14 @@ class VehicleNode:
         BadInput: something given cannot be used.
     """
 
-    def __init__(self, vehicle: SimulatedVehicle, link: Link, settings: VehicleSettings, reporter: Reporter):
+    def __init__(self, vehicle: Vehicle, link: Link, settings: VehicleSettings, reporter: Reporter):
         checks.choice("pace", settings.pace, PACES)
         for name in ("max_age", "patience"):
             checks.positive(name, getattr(settings, name), "s", finite=False)
         self._vehicle = vehicle
         self._steps = self._steps_of(vehicle.duration if settings.duration is None else settings.duration)
         self._settings, self._link, self._reporter = settings, link, reporter
-        self._label = thruster_label(vehicle.input_unit)
+        self._label = thruster_label(vehicle.unit)
         topics = settings.topics
         self._commands = link.subscriber(topics.thrusters, ros.Float64MultiArray)
         self._clock = link.publisher(topics.clock, ros.Clock)
@@ -80,7 +80,7 @@ class VehicleNode:
         lock_step = self._settings.pace == "lock-step"
         if lock_step:
             self._await_controller()
-        observed, k, begun = self._vehicle.start(), 0, time.monotonic()
+        observed, k, begun = self._vehicle.restart(), 0, time.monotonic()
         while True:
             if lock_step and self._commands.take():
                 self._reporter.trouble("unasked commands", "a command came before its odometry: it is ignored")
@@ -90,9 +90,9 @@ class VehicleNode:
                 self._await_command()
             elif k < self._steps:
                 self._keep_pace(begun + (k + 1) * self._vehicle.sampling_time)
-            if k >= self._steps or int(observed.status) != int(Status.OK):
+            if k >= self._steps or observed.status is not Status.OK:
                 self._link.flush(0.5)
-                return Status(int(observed.status))
+                return observed.status
             observed, k = self._vehicle.step(self._command), k + 1
 
     def status(self) -> str:
@@ -110,11 +110,11 @@ class VehicleNode:
             raise BadInput("duration", must, f"{duration:g} s")
         return steps if steps == np.inf else round(steps)
 
-    def _publish(self, observed: Observed, k: int) -> None:
+    def _publish(self, observed: VehicleOutput, k: int) -> None:
         """Send the time, then what is observed at it."""
         self._time = round(k * self._vehicle.sampling_time * SECOND)
         stamp, frames = stamp_of(self._time), self._settings.frames
-        motion = PoseAndVelocity(observed.position, observed.quaternion, observed.velocity)
+        motion = PoseAndVelocity(observed.position, observed.attitude, observed.velocity)
         self._clock.publish(ros.Clock(stamp))
         self._imu.publish(imu_of(motion, observed.specific_force, stamp, frames))
         self._odometry.publish(odometry_of(motion, stamp, frames))

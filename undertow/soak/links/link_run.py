@@ -75,7 +75,7 @@ class LinkRunner:
         """What happens by a plan."""
         self._plan, self._chance = plan, random.Random(plan.seed)
         self._vehicle.restart()
-        self._volts, self._commands, self._thrusts = np.zeros(self._vehicle.stepped.thrusters), 0, 0
+        self._volts, self._commands, self._thrusts = np.zeros(self._vehicle.vehicle.thrusters), 0, 0
         self._commanded_at = self._thrust_at = time.monotonic()
         self._sent: deque[Any] = deque(maxlen=100)
         self._held_back: list[Any] = []
@@ -105,7 +105,7 @@ class LinkRunner:
         """Whether a command comes that is not neutral; the vehicle stands still until then."""
         until = time.monotonic() + _BEGINS
         while time.monotonic() < until and self._command.code() is None:
-            for item in self._peer.items(measured_of(self._vehicle.state), self._time()):
+            for item in self._peer.items(measured_of(self._vehicle.motion), self._time()):
                 self._peer.send(item)
             self._due = time.monotonic() + PERIOD
             self._receive()
@@ -122,7 +122,7 @@ class LinkRunner:
     def _take_step(self, talking: bool) -> None:
         """Say where the vehicle is, take commands for a sampling time, and move."""
         if talking:
-            self._talk(measured_of(self._vehicle.state))
+            self._talk(measured_of(self._vehicle.motion))
         self._due = max(self._due + PERIOD, time.monotonic())
         self._receive()
         silent = time.monotonic() - self._commanded_at > MAX_AGE

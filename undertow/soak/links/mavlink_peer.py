@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
+from undertow.autopilot.vehicle import Vehicle
 from undertow.interop.mavlink.message_codec import parsed
-from undertow.interop.stepped_vehicle import SteppedVehicle
 from undertow.interop.thruster_channels import channels_of_vehicle
+from undertow.plants.pulse_driven import pulse_driven
+from undertow.power.esc import esc
 from undertow.soak.links.peer import AbstractPeer, Measured, damaged
 from undertow.soak.links.plan import free_port
 from undertow.soak.links.scenario import SUPPLY
@@ -29,11 +31,12 @@ class MavlinkPeer(AbstractPeer):
         output: `rc_override` or `servo`.
     """
 
-    def __init__(self, vehicle: SteppedVehicle, output: str):
+    def __init__(self, vehicle: Vehicle, output: str):
         self._address = "127.0.0.1", free_port()
         self.arguments = ["mavlink", "SCENARIO", "--connect", "udpin:{}:{}".format(*self._address), "--output", output]
-        self._channels = channels_of_vehicle(np.asarray(vehicle.plant.thruster_matrix))
-        self._dead_band = float(vehicle.esc.dead_band)
+        plant = pulse_driven(vehicle.plant, battery_suffices=False)
+        self._channels = channels_of_vehicle(np.asarray(plant.thruster_matrix))
+        self._dead_band = float((plant.power.esc or esc()).dead_band)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.interop.stepped_vehicle import State
+from undertow.autopilot.measured_motion import Motion
 
 
 class Measured(NamedTuple):
@@ -59,9 +59,9 @@ class AbstractPeer(abc.ABC):
         """Leave the link."""
 
 
-def measured_of(state: State) -> Measured:
+def measured_of(motion: Motion) -> Measured:
     """What an ideal navigation measures."""
-    return Measured(state.position, state.attitude, state.body_velocity)
+    return Measured(motion.position, motion.attitude, motion.velocity)
 
 
 def altered(measured: Measured, what: str) -> Measured:

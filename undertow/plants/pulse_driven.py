@@ -2,10 +2,13 @@
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.contracts import Inputs
 from undertow.core.errors import BadInput
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.plants.hybrid_vehicle import HybridVehicle, VehicleState
+from undertow.power.esc import ESC
 
 
 def pulse_driven(plant: Any, battery_suffices: bool) -> HybridVehicle:
@@ -28,3 +31,18 @@ def pulse_driven(plant: Any, battery_suffices: bool) -> HybridVehicle:
         hint = f"Give the thruster a supply{', or the vehicle a battery' if battery_suffices else ''}"
         raise BadInput("plant.thruster.supply", "be finite for speed controllers", "infinite", hint=hint)
     return plant
+
+
+def applied_voltage(plant: HybridVehicle, speed_controllers: ESC, x: VehicleState, pulses: Inputs) -> Inputs:
+    """Voltages, V, at which speed controllers drive the thrusters.
+
+    With a battery, the voltage of the bus is the one that its load leaves: the load follows from the voltage, and so
+    the largest voltage is sought that the battery can give.
+    """
+    thruster, battery = plant.thruster, plant.power.battery
+    if battery is None:
+        bus = jnp.asarray(thruster.supply)
+    else:
+        load = lambda bus: thruster.electrical_power(x.thrusters, speed_controllers.voltage(pulses, bus)).sum()
+        bus = battery.limit(x.power.charge, load, battery.open_circuit_voltage(x.power.charge))
+    return jnp.clip(speed_controllers.voltage(pulses, bus), *thruster.limits())
