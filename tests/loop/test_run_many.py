@@ -54,6 +54,7 @@ def test_mixed_runs_have_the_bits_of_each_alone_and_their_places():
                 assert_same(outcome, expected[place])
 
 
+@pytest.mark.full
 def test_a_number_that_probes_share_and_later_runs_do_not():
     """It is a constant of the program until one run differs; no result changes, and few programs are compiled."""
     probes = [prepared(2.0, seed) for seed in range(3)]

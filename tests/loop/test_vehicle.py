@@ -33,6 +33,7 @@ def outputs_of(vehicle, commands):
     return [vehicle.restart(), *(vehicle.step(command) for command in commands)]
 
 
+@pytest.mark.full
 def test_every_bit_is_that_of_a_simulation(pendulum):
     """With noise, a disturbance and a fault; the command is the simulation's."""
     record = ut.simulate_scenario(PENDULUM).dataset
@@ -45,6 +46,7 @@ def test_every_bit_is_that_of_a_simulation(pendulum):
     assert (record["acting_input"] != record["input"]).any(), "the fault acts"
 
 
+@pytest.mark.full
 def test_an_autopilot_and_a_vehicle_are_a_simulation(pendulum):
     record = ut.simulate_scenario(PENDULUM).dataset
     autopilot = ut.Autopilot(PENDULUM)
@@ -54,6 +56,7 @@ def test_an_autopilot_and_a_vehicle_are_a_simulation(pendulum):
     np.testing.assert_allclose(commands, record["commanded_input"].values, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.full
 def test_seeds(pendulum):
     """Noise of a seed is that of a scenario with this seed; the same again without one."""
     commands = np.zeros((5, 1))
@@ -69,6 +72,7 @@ def test_seeds(pendulum):
     assert (positions(found)[1:] != positions(usual)[1:]).all()
 
 
+@pytest.mark.full
 def test_a_time_is_divided_into_sampling_times_and_a_rest(pendulum):
     pendulum.restart()
     found = pendulum.step([1.5], 0.0175).truth
@@ -79,6 +83,7 @@ def test_a_time_is_divided_into_sampling_times_and_a_rest(pendulum):
     assert pendulum.time == pytest.approx(0.0175, abs=1e-15)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -97,6 +102,7 @@ def test_what_a_step_refuses(pendulum, arguments, message):
     assert pendulum.time == before
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -111,6 +117,7 @@ def test_what_a_vehicle_cannot_be_made_of(options, message):
         ut.Vehicle(PENDULUM, **options)
 
 
+@pytest.mark.full
 def test_a_state_that_is_not_finite_keeps_the_last_valid_one(pendulum):
     before = pendulum.restart().truth
     state = jax.tree.leaves(pendulum.state)

@@ -1,27 +1,28 @@
 """The plant of a scenario - a vehicle with its thrusters - under its disturbance as a system to export, and as C99."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from undertow.autopilot.measured_motion import Format, Motion
+from undertow.autopilot.measured_motion import Format, Motion, motion_in
 from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import AbstractPlant, Load, Measurement
+from undertow.core.contracts import AbstractDisturbance, AbstractPlant, Load
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.disturbances.adding import Together
 from undertow.export.c_program import Exported, Program, System, check_compiler, has_counterpart, made_from
 from undertow.export.controller import checked, described
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import status_of
-from undertow.loop.sampled import moved
+from undertow.loop.plant_step import PlantState, hold
 from undertow.loop.simd_batch import Unsupported, realized_disturbance
 from undertow.numerics.integrators import COMPACT_METHODS
-from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 
@@ -35,7 +36,7 @@ class Initial(NamedTuple):
     velocity: Any
 
 
-class VehicleInput(NamedTuple):
+class ExportedVehicleInput(NamedTuple):
     """Input of a step: start, command, force and moment from outside, and time at which the step begins."""
 
     initial: Initial
@@ -44,7 +45,7 @@ class VehicleInput(NamedTuple):
     t: Any
 
 
-class VehicleOutput(NamedTuple):
+class ExportedVehicleOutput(NamedTuple):
     """Output of a step: true motion and report of the actuators at its end, input that was applied, status code.
 
     `signals` are those numbers that the plant declares, such as the voltage of a battery.
@@ -111,31 +112,27 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     given = built.scenario.initial
     at = lambda values: zero if values is None else np.asarray(values)
     kind = jax.dtypes.canonicalize_dtype(float)
-    whole = VehicleInput(Initial(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
+    whole = ExportedVehicleInput(Initial(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
     inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), whole)
     integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
 
-    def shown(t: Any, x: Any, applied: Any) -> VehicleOutput:
+    def shown(t: Any, x: Any, applied: Any) -> ExportedVehicleOutput:
         truth, values = plant.output(t, x), plant.diagnostics(x, applied)
         numbers = {name: jnp.asarray(values[name], dtype=float) for name in numbers_of(plant)}
-        return VehicleOutput(motion_of(truth, form), truth.actuator, applied, status_of(loop, x, ()), numbers)
+        return ExportedVehicleOutput(motion_in(form, truth), truth.actuator, applied, status_of(loop, x, ()), numbers)
 
-    def start(inputs: VehicleInput):
+    def start(inputs: ExportedVehicleInput):
         x = plant.initial_state(*inputs.initial)
         return x, shown(inputs.t, x, jnp.zeros_like(inputs.command))
 
-    def step(x: Any, inputs: VehicleInput):
-        applied = plant.admissible(x, inputs.command)
+    def step(x: Any, inputs: ExportedVehicleInput):
+        disturbance = _WithOutsideWrench(loop.disturbance, inputs.external_wrench)
+        part = Realization(dataclasses.replace(loop, disturbance=disturbance), realization, ())
+        applied, before = plant.admissible(x, inputs.command), PlantState(x, (), ())
+        after = hold(part, before, inputs.t, dt, applied, integrate, settings.substeps).plant
+        return after, shown(inputs.t + dt, after, applied)
 
-        def motion(t: Any, x: Any) -> Any:
-            no_load = plant.no_load()
-            outside: Load = no_load._replace(wrench=no_load.wrench - inputs.external_wrench)
-            return plant.dynamics(t, x, applied, loop.disturbance.at(realization, t, plant.pose(x), outside))
-
-        x = moved(motion, inputs.t, x, dt, integrate, settings.substeps)
-        return x, shown(inputs.t + dt, x, applied)
-
-    def sample(chance: np.random.Generator, k: int) -> VehicleInput:
+    def sample(chance: np.random.Generator, k: int) -> ExportedVehicleInput:
         random = lambda leaf: np.asarray(_SPREAD * chance.normal(size=leaf.shape), dtype=leaf.dtype)
         time = np.asarray(max(k - 1, 0) * settings.dt, dtype=kind)
         return inputs._replace(command=random(inputs.command), external_wrench=random(zero), t=time)
@@ -166,17 +163,20 @@ def numbers_of(plant: AbstractPlant) -> dict[str, Signal]:
     return {name: signal for name, signal in plant.signals().items() if signal.dimensions == ()}
 
 
-def motion_of(truth: Measurement, form: Format) -> Motion:
-    """A true motion in a format: what `Motion.measurement` turns back."""
-    if truth.body is None:
-        return Motion(truth.position, jnp.zeros(0), truth.velocity)
-    body, velocity = truth.body, truth.velocity
-    if form.velocity == "body":
-        velocity = body.nu
-    elif form.velocity == "world":
-        velocity = jnp.concatenate([matvec(body.rotation, body.nu[:3]), matvec(body.rotation, body.nu[3:])])
-    attitude = body.attitude if form.attitude == "quaternion" else truth.position[3:]
-    return Motion(truth.position[:3], attitude, velocity)
+class _WithOutsideWrench(AbstractDisturbance):
+    """A disturbance, and a force and moment from outside."""
+
+    inner: AbstractDisturbance
+    wrench: Float[Array, " k"]  # N and N m, body axes
+
+    def realize(self, key):
+        return self.inner.realize(key)
+
+    def at(self, realization, t, pose, load: Load) -> Load:
+        return self.inner.at(realization, t, pose, load._replace(wrench=load.wrench - self.wrench))
+
+    def jumps(self, duration: float) -> tuple[float, ...]:
+        return self.inner.jumps(duration)
 
 
 def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:

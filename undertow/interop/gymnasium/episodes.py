@@ -16,10 +16,11 @@ from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.interop.gymnasium.variants import Vary, variants_of
-from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
+from undertow.loop import plant_step
+from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.outcome import Ending, going
+from undertow.loop.plant_step import PlantState
 from undertow.loop.recording import freeze_on_failure, instant
-from undertow.loop.sampled import moved
 from undertow.loop.stepped_batch import BatchStep, Starter
 from undertow.numerics.integrators import METHODS
 from undertow.numerics.random_keys import key_of_seed
@@ -75,8 +76,7 @@ class _Known(NamedTuple):
 class _State(NamedTuple):
     """State of one episode."""
 
-    x: Any  # of the plant
-    navigation: Any
+    vehicle: PlantState
     action: Any  # the one before
     observation: Any
     step: Any
@@ -193,38 +193,35 @@ class Episodes:
 
 
 def _begin(plan: Plan, realization: Realization, start: Any) -> tuple[_State, Seen]:
-    loop, zero = realization.loop, jnp.zeros(())
-    x = loop.plant.initial_state(*start)
-    truth = loop.plant.output(zero, x)
-    navigation = loop.navigation.init(realization.navigation_realization, truth)
-    action = plan.interface.first()
+    zero, action = jnp.zeros(()), plan.interface.first()
+    vehicle, seen = plant_step.begin(realization, start)
+    r = realization.loop.reference.at(zero)
     blank = jnp.concatenate([jnp.zeros(len(plan.interface.bounds())), action])
-    y, measuring = realization.read(zero, truth, MeasurementState(navigation, None))
-    observation = _observed(plan, y, loop.reference.at(zero), action, blank)
-    state = _State(x, measuring.navigation, action, observation, jnp.zeros((), dtype=int), going())
-    error = plan.interface.coordinates.difference(loop.reference.at(zero).position, truth.position)
-    return state, Seen(observation, jnp.zeros(()), state.ending.status, truth.position, error)
+    observation = _observed(plan, seen.measurement, r, action, blank)
+    state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), going())
+    error = plan.interface.coordinates.difference(r.position, seen.truth.position)
+    return state, Seen(observation, zero, state.ending.status, seen.truth.position, error)
 
 
 def _step(plan: Plan, realization: Realization, state: _State, action: Any) -> tuple[_State, Seen]:
     """As `sampled.control_step`, with the command of an action in place of a law's."""
     loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
-    t = instant(state.step, dt)
+    t, before = instant(state.step, dt), state.vehicle
     action = interface.within_bounds(action)
     command = interface.command(action)
-    applied = loop.plant.admissible(state.x, command)
-    motion = lambda t, x: realization.motion(t, x, applied)
-    x = moved(motion, t, state.x, dt, METHODS[plan.method], plan.substeps)
-    (x, _), ending = freeze_on_failure(loop, (state.x, ()), (x, ()), state.ending, t, dt, command)
+    applied = loop.plant.admissible(before.plant, command)
+    vehicle = plant_step.hold(realization, before, t, dt, applied, METHODS[plan.method], plan.substeps)
+    states = (before.plant, ()), (vehicle.plant, ())
+    (x, _), ending = freeze_on_failure(loop, *states, state.ending, t, dt, command)
     now = instant(state.step + 1, dt)
-    truth, r = loop.plant.output(now, x), loop.reference.at(now)
-    y, measuring = realization.read(now, truth, MeasurementState(state.navigation, None))
-    observation = _observed(plan, y, r, action, state.observation)
-    error = interface.coordinates.difference(r.position, truth.position)
+    vehicle, seen = plant_step.observe(realization, vehicle._replace(plant=x), now, applied)
+    r = loop.reference.at(now)
+    observation = _observed(plan, seen.measurement, r, action, state.observation)
+    error = interface.coordinates.difference(r.position, seen.truth.position)
     failing = (ending.status != int(Status.OK)) & (state.ending.status == int(Status.OK))
     reward = -_cost_of(plan, error, action, state.action) - plan.cost.failure * failing.astype(float)
-    new = _State(x, measuring.navigation, action, observation, state.step + 1, ending)
-    return new, Seen(observation, reward, ending.status, truth.position, error)
+    new = _State(vehicle, action, observation, state.step + 1, ending)
+    return new, Seen(observation, reward, ending.status, seen.truth.position, error)
 
 
 def _observed(plan: Plan, y: Any, r: Any, action: Any, before: Any) -> Any:

@@ -28,6 +28,7 @@ from undertow.interop.python_control.signals import (
 from undertow.loop import sampled
 from undertow.loop.closed_loop import ClosedLoop, MeasurementState, Realization
 from undertow.loop.outcome import going
+from undertow.loop.plant_step import PlantState, hold
 from undertow.loop.recording import instant
 from undertow.loop.stepped import step_of
 from undertow.numerics.integrators import METHODS
@@ -235,28 +236,26 @@ def _sampled_plant(built: Built) -> ct.NonlinearIOSystem:
         raise BadInput("loop.method", "be rk4 or euler for a plant in discrete time", "adaptive")
     with computing(built):
         of, (realization, states), settings = signals_of(built.closed_loop.plant), _begun(built), built.scenario.loop
-        x, navigation = states[0], states[2].navigation
-        start, whole = vector_of((x, navigation)), tree_of((x, navigation))
+        first = PlantState(states[0], states[2].navigation, states[2].faults)
+        start, whole = vector_of(first), tree_of(first)
         integrate, dt = METHODS[settings.method], jnp.asarray(settings.dt)
-        h = dt / settings.substeps
 
         def measured(realization: Realization, t: Any, state: Any):
-            x, navigation = whole(state)
+            x, navigation, faults = whole(state)
             truth = realization.loop.plant.output(t, x)
-            return x, *realization.read(t, truth, MeasurementState(navigation, None))
+            y, measuring = realization.read(t, truth, MeasurementState(navigation, None, faults))
+            return PlantState(x, measuring.navigation, measuring.faults), y
 
         def stepped(realization: Realization, t: Any, state: Any, u: Any):
-            x, _, measuring = measured(realization, t, state)
-            applied = realization.loop.plant.admissible(x, u)
-            motion = lambda t, x: realization.motion(t, x, applied)
-            for i in range(settings.substeps):
-                x = integrate(motion, t + i * h, x, h)
-            return vector_of((x, measuring.navigation))
+            before, _ = measured(realization, t, state)
+            applied = realization.loop.plant.admissible(before.plant, u)
+            return vector_of(hold(realization, before, t, dt, applied, integrate, settings.substeps))
 
         def shown(realization: Realization, t: Any, state: Any, u: Any):
             return vector_of_measurement(measured(realization, t, state)[1])
 
-        names = state_names(x, "plant") + state_names(navigation, "navigation")
+        prefixed = zip(("plant", "navigation", "faults"), first, strict=True)
+        names = [name for prefix, tree in prefixed for name in state_names(tree, prefix)]
         signals = (of.applied, of.measured, names)
         return _system("plant", built, realization, (stepped, shown), start, signals)
 
