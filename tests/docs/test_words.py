@@ -86,6 +86,7 @@ ALLOWED = {
     "docs/how-to/thruster-faults.md": {r"health"},
     "docs/how-to/real-time.md": {r"health"},
     "docs/how-to/autopilot.md": {r"health"},
+    "docs/how-to/vehicle.md": {r"health"},
     "docs/how-to/faults.md": {r"health"},
 }
 
