@@ -22,7 +22,7 @@ from undertow.loop.stepped import Uncopied, put, realized, step_of
 from undertow.numerics.integrators import COMPACT_METHODS
 from undertow.numerics.random_keys import key_of_seed
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.plants.pulse_driven import applied_voltage, pulse_driven
+from undertow.plants.pulse_input import applied_voltage, pulse_driven
 from undertow.power.esc import ESC
 from undertow.power.esc import esc as usual_esc
 from undertow.scenario.build import Built, build

@@ -19,7 +19,7 @@ from undertow.loop.closed_loop import ClosedLoop, Realization
 from undertow.loop.stepped import put, step_of
 from undertow.numerics.linear_algebra import matvec
 from undertow.plants.hybrid_vehicle import HybridVehicle, VehicleState
-from undertow.plants.pulse_driven import pulse_driven
+from undertow.plants.pulse_input import pulse_driven
 from undertow.power.esc import esc
 from undertow.scenario.build import build
 from undertow.scenario.reading import read

@@ -12,7 +12,7 @@ from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_
 from undertow.interop.thruster_channels import channels_of_vehicle
 from undertow.loop.stepped import step_of
 from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.plants.pulse_driven import pulse_driven
+from undertow.plants.pulse_input import pulse_driven
 from undertow.power.esc import ESC, esc
 
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from undertow.autopilot.vehicle import Vehicle
 from undertow.interop.mavlink.message_codec import parsed
 from undertow.interop.thruster_channels import channels_of_vehicle
-from undertow.plants.pulse_driven import pulse_driven
+from undertow.plants.pulse_input import pulse_driven
 from undertow.power.esc import esc
 from undertow.soak.links.peer import AbstractPeer, Measured, damaged
 from undertow.soak.links.plan import free_port
