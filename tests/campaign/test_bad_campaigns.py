@@ -11,7 +11,7 @@ from command import VEHICLE, contents
 from undertow.campaign.prepare import prepare
 from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
-from undertow.core.disk import alone
+from undertow.core.file_lock import file_lock
 from undertow.scenario.reading import dump
 
 
@@ -259,7 +259,7 @@ def test_a_refused_overwrite_leaves_a_campaign_that_is_flying(campaign_file, tmp
     path, out = campaign_file(trials=4), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     before = contents(out)
-    with alone(out / STORE):
+    with file_lock(out / STORE):
         assert run(["campaign", str(path), "--out", str(out), "--overwrite"]) == 2
     assert "must be a folder that nothing else writes to" in capsys.readouterr().err
     assert contents(out) == before

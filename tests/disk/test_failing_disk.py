@@ -63,7 +63,7 @@ def test_calls_of_a_command(shim, tmp_path, name):
 
 # Where a file may be written in place, and why that costs nobody a result.
 IN_PLACE = {
-    "undertow/core/disk.py": "the one writer",
+    "undertow/core/atomic_io.py": "the one writer",
     "undertow/bench/waiting.py": "a temporary folder",
     "undertow/process_setup.py": "its own file, which takes another's place, before JAX is imported",
     "undertow/export/fmu.py": "a temporary folder for the compiler",
@@ -89,4 +89,4 @@ def test_files_are_written_by_the_one_writer():
     soak = ROOT / "undertow" / "soak"  # its files are made to be damaged
     files = [path for path in (ROOT / "undertow").rglob("*.py") if soak not in path.parents]
     writing = {str(path.relative_to(ROOT)) for path in files if pattern.search(path.read_text(encoding="utf-8"))}
-    assert not writing - IN_PLACE.keys(), "use `write_whole` or `replacing` of undertow/core/disk.py"
+    assert not writing - IN_PLACE.keys(), "use `write_whole` or `replacing` of undertow/core/atomic_io.py"

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from undertow.core import disk
+from undertow.core import atomic_io
 from undertow.core.errors import BadInput
 from undertow.simulation.checkpoint import Checkpoint, OutOfTime
 from undertow.tuning.objective import Objective
@@ -232,7 +232,7 @@ def test_a_full_disk_costs_no_evaluation(tmp_path, monkeypatch):
     def full(descriptor):
         raise OSError("No space left on device")
 
-    monkeypatch.setattr(disk.os, "fsync", full)
+    monkeypatch.setattr(atomic_io.os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
         objective(tmp_path, Bowl(), resume=True)
     assert file.read_bytes() == before

@@ -11,7 +11,7 @@ from undertow.arena.tuned_gains import Gains, controller_of
 from undertow.campaign.campaign_schema import validate
 from undertow.campaign.prepare import Prepared, prepare_campaign
 from undertow.comparison.candidates import Candidate, in_letters
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.scenario.build import build

@@ -19,8 +19,9 @@ from zarr.storage import MemoryStore
 from undertow.campaign.columns import DONE, FLAGS, Label
 from undertow.campaign.fingerprint import Identity, samples
 from undertow.campaign.store_layout import Layout
-from undertow.core.disk import alone, sync
+from undertow.core.atomic_io import sync
 from undertow.core.errors import BadInput
+from undertow.core.file_lock import file_lock
 
 # The checksum reveals a chunk that was written only in part.
 _CODEC = ZstdCodec(level=3, checksum=True)
@@ -143,7 +144,7 @@ class Store:
         self.layout, self._path, self._labels = layout, path, labels
         path.mkdir(parents=True, exist_ok=True)
         with contextlib.ExitStack() as held:
-            held.enter_context(alone(path))
+            held.enter_context(file_lock(path))
             self._open(identity, coordinates, attributes)
             self._held = held.pop_all()
 

@@ -28,7 +28,7 @@ from undertow.comparison.candidates import Candidate, laws
 from undertow.comparison.equal_budgets import check_budget
 from undertow.comparison.step_time import step_time
 from undertow.core import checks
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.json_text import to_json
 from undertow.report.arena_page import PAGE, SCORE, write_board

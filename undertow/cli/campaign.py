@@ -19,7 +19,7 @@ from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
 from undertow.cli.tables import titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
-from undertow.core.disk import replacing_folder, write_whole
+from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.report.campaign_page import by_xla, write_campaign

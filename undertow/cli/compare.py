@@ -28,7 +28,7 @@ from undertow.comparison.sentences import sentences
 from undertow.comparison.step_time import HOW_LONG, step_times
 from undertow.comparison.tables import NOTE, medians
 from undertow.core import checks
-from undertow.core.disk import replacing_folder, write_whole
+from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.json_text import to_json
 from undertow.core.status import Status
 from undertow.report.comparison_page import write_comparison

@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from undertow.core import catalogue
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario.json_schema import scenario_schema
 

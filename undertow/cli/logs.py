@@ -11,7 +11,7 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.logs.log import Log
 from undertow.scenario.log_file import read_log

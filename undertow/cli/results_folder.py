@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from undertow.core.disk import InUse, alone, lock_of, settle, sync
+from undertow.core.atomic_io import fsync_tree, sync
 from undertow.core.errors import BadInput
+from undertow.core.file_lock import InUse, file_lock, lock_of
 
 
 class Draft(NamedTuple):
@@ -70,7 +71,7 @@ def _hold(folder: Path, held: contextlib.ExitStack) -> None:
     _check_place(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        held.enter_context(alone(folder))
+        held.enter_context(file_lock(folder))
     except OSError as error:
         raise _unwritable(folder, error) from None
 
@@ -182,7 +183,7 @@ def _stage(folder: Path) -> Path:
 
 def _publish(staging: Path, folder: Path, names: Sequence[str], marker: str) -> None:
     """Move all files, the marker last. After a marker, remove what is left of an earlier result."""
-    settle(staging)
+    fsync_tree(staging)
     if folder.exists():
         new = [path.name for path in staging.iterdir()]
         for name in new:

@@ -25,7 +25,7 @@ from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
-from undertow.core.disk import sync, write_whole
+from undertow.core.atomic_io import sync, write_whole
 from undertow.core.errors import BadInput
 from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
 from undertow.realtime.link import AbstractLink

@@ -19,8 +19,8 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import shares, stage
 from undertow.core import checks
-from undertow.core.disk import alone
 from undertow.core.errors import BadInput
+from undertow.core.file_lock import file_lock
 from undertow.scenario.build import Built
 from undertow.scenario.reading import dump
 from undertow.simulation.executors import make_executor
@@ -139,7 +139,7 @@ def _clear(folder: Path, names: Sequence[str]) -> None:
     """
     if not folder.exists():
         return
-    with alone(folder / STORE):
+    with file_lock(folder / STORE):
         for name in names:
             results_folder.remove(folder / name)
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.comparison.candidates import Candidate, file_stem, part_of
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.scenario.build import build

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.loop.simd_batch import Unsupported, unavailable
 from undertow.loop.stepped import Step, put

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.logs.frames import quaternions
 from undertow.logs.log import Log

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.core.disk import replacing
+from undertow.core.atomic_io import replacing
 from undertow.core.errors import BadInput, nearest
 from undertow.logs.known_signals import SIGNALS
 

@@ -18,7 +18,7 @@ from undertow.arena.robustness import VEHICLE
 from undertow.arena.tasks import TASKS, VERSION, tolerances
 from undertow.comparison.step_time import HOW_LONG
 from undertow.comparison.tables import Rows
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.report.figures.arena import arena_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose

@@ -12,7 +12,7 @@ from undertow.campaign.campaign_schema import Distribution
 from undertow.campaign.columns import ENDINGS
 from undertow.campaign.labels import words
 from undertow.campaign.store_results import Results
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.status import Status
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all

@@ -14,7 +14,7 @@ from undertow.comparison.findings import Findings
 from undertow.comparison.sentences import HOW, sentences
 from undertow.comparison.step_time import HOW_LONG, StepTime
 from undertow.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import alike, comparison_plots
 from undertow.report.figures.writing import save_all

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.report.figures.recorded import input_names
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text

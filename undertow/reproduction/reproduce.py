@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.json_text import to_json
 from undertow.reproduction import claims, drifting, examples, horizons, lag_map
 from undertow.reproduction.robust_variant import chapter

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from undertow.analysis.metrics import Gathered, accumulators, results
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.runtime import on_processor
 from undertow.core.status import Status
 from undertow.loop import continuous

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 
 Result = TypeVar("Result")

@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.scenario.reading import dump
 from undertow.simulation.run_facts import facts_from
 from undertow.simulation.run_result import RunRecord, RunResult

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array
 
 from undertow.core import checks
-from undertow.core.disk import replacing
+from undertow.core.atomic_io import replacing
 from undertow.core.errors import BadInput
 
 _DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)

@@ -19,7 +19,7 @@ from rosbags.rosbag2.storage_mcap import McapWriter
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 
 from undertow.core import checks
-from undertow.core.disk import settle, sync, write_whole
+from undertow.core.atomic_io import fsync_tree, sync, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
 from undertow.interop.ros2 import messages as ros
@@ -134,7 +134,7 @@ def new_bag(folder: Path, storage: str) -> Iterator[BagWriter]:
                 yield bag
         except sqlite3.Error as error:
             raise OSError(errno.EIO, str(error), str(folder)) from None
-        settle(inner)
+        fsync_tree(inner)
         os.replace(inner, folder)
     sync(folder.parent)
 

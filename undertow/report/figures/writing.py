@@ -13,7 +13,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.user_code import python_says
 from undertow.report.figures.one_column import one_column
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.ticker import FuncFormatter
 
-from undertow.core.disk import replacing
+from undertow.core.atomic_io import replacing
 from undertow.core.errors import BadInput
 from undertow.report.figures import style
 from undertow.report.replay.replay_data import COLOURS, Replay, rotations

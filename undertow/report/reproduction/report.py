@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.report.figures import paper_figures, sweep_figure
 from undertow.report.figures.ablations import ablations_figure
 from undertow.report.figures.fidelity import fidelity_figure, robust_fidelity_figure

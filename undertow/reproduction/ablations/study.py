@@ -13,7 +13,7 @@ from undertow.campaign.campaign_schema import read_campaign, whole
 from undertow.campaign.campaign_summary import median_interval, quantiles
 from undertow.campaign.labels import words
 from undertow.campaign.trials import trials
-from undertow.core.disk import write_whole
+from undertow.core.atomic_io import write_whole
 from undertow.core.status import Status
 from undertow.reproduction import all_outputs
 from undertow.reproduction.ablations.verdicts import Ablation

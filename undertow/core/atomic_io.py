@@ -1,47 +1,12 @@
-"""Safe writing: one process at a time writes to a path, and what is written survives a power cut."""
+"""Safe writing: what is written is whole, and survives a power cut."""
 
 import contextlib
-import fcntl
 import os
 import secrets
 import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-
-from undertow.core.errors import BadInput
-
-
-class InUse(BadInput):
-    """Another process is writing to the path."""
-
-
-@contextlib.contextmanager
-def alone(path: Path) -> Iterator[None]:
-    """Lock a file or folder for writing by this process only; the lock is released however the process ends.
-
-    Args:
-        path: file or folder to write; it need not exist, but its parent folder must.
-
-    Raises:
-        InUse: another process is writing to it.
-        OSError: it cannot be written to.
-    """
-    lock = lock_of(path)
-    handle = _locked(lock, path)
-    try:
-        yield
-    finally:
-        with contextlib.suppress(OSError):  # one that stays is not locked, and harms nobody
-            lock.unlink()  # while it is held: a waiting process sees that its file was replaced
-        os.close(handle)
-
-
-def lock_of(path: Path) -> Path:
-    """The lock file: beside the path, or inside it where the parent folder cannot be written to."""
-    path = path.resolve()
-    name = f".{path.name}.lock"
-    return path / name if path.is_dir() and not os.access(path.parent, os.W_OK) else path.with_name(name)
 
 
 @contextlib.contextmanager
@@ -85,7 +50,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     new.mkdir()
     try:
         yield new
-        settle(new)
+        fsync_tree(new)
         if path.exists():
             os.replace(path, old)
         try:
@@ -100,11 +65,11 @@ def replacing_folder(path: Path) -> Iterator[Path]:
             shutil.rmtree(left, ignore_errors=True)
 
 
-def settle(path: Path) -> None:
+def fsync_tree(path: Path) -> None:
     """Wait until a file, or everything in a folder, is on the disk and survives a power cut."""
     if path.is_dir():
         for inner in path.iterdir():
-            settle(inner)
+            fsync_tree(inner)
     sync(path)
 
 
@@ -115,26 +80,3 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _locked(lock: Path, path: Path) -> int:
-    while True:
-        handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if _same(handle, lock):
-                return handle
-        except BlockingIOError:
-            os.close(handle)
-            raise InUse("--out", "be a folder that nothing else writes to", str(path)) from None
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)  # its owner has removed the file meanwhile
-
-
-def _same(handle: int, lock: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(handle), lock.stat())
-    except FileNotFoundError:
-        return False

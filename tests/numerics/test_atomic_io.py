@@ -5,35 +5,35 @@ import os
 
 import pytest
 
-from undertow.core import disk
+from undertow.core import atomic_io, file_lock
 
 
 def test_one_at_a_time_in_either_of_two_names(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "out", target_is_directory=True)
-    with disk.alone(tmp_path / "out"):
+    with file_lock.file_lock(tmp_path / "out"):
         for path in (tmp_path / "out", tmp_path / "link"):
             with (
-                pytest.raises(disk.InUse, match=r"^`--out` must be a folder that nothing else writes to"),
-                disk.alone(path),
+                pytest.raises(file_lock.InUse, match=r"^`--out` must be a folder that nothing else writes to"),
+                file_lock.file_lock(path),
             ):
                 pass
-        with disk.alone(tmp_path / "another"):
+        with file_lock.file_lock(tmp_path / "another"):
             pass
-    with disk.alone(tmp_path / "out"):
+    with file_lock.file_lock(tmp_path / "out"):
         pass
     assert [one.name for one in tmp_path.iterdir()] == ["link"]
 
 
 def test_the_lock_is_released_by_an_error(tmp_path):
-    with pytest.raises(ZeroDivisionError), disk.alone(tmp_path / "out"):
+    with pytest.raises(ZeroDivisionError), file_lock.file_lock(tmp_path / "out"):
         raise ZeroDivisionError
-    with disk.alone(tmp_path / "out"):
+    with file_lock.file_lock(tmp_path / "out"):
         pass
 
 
 def test_a_lock_whose_file_was_removed_meanwhile_is_taken_again(tmp_path, monkeypatch):
     """Between opening and locking, its owner ends and removes it."""
-    lock, flock, opened = disk.lock_of(tmp_path / "out"), fcntl.flock, []
+    lock, flock, opened = file_lock.lock_of(tmp_path / "out"), fcntl.flock, []
 
     def late(handle, how):
         if not opened:
@@ -41,27 +41,27 @@ def test_a_lock_whose_file_was_removed_meanwhile_is_taken_again(tmp_path, monkey
         opened.append(handle)
         flock(handle, how)
 
-    monkeypatch.setattr(disk.fcntl, "flock", late)
-    with disk.alone(tmp_path / "out"):
+    monkeypatch.setattr(fcntl, "flock", late)
+    with file_lock.file_lock(tmp_path / "out"):
         assert len(opened) == 2 and lock.exists()
     assert not lock.exists()
 
 
 def test_the_lock_stands_inside_where_the_parent_is_read_only(tmp_path, monkeypatch):
     (tmp_path / "out").mkdir()
-    assert disk.lock_of(tmp_path / "out") == tmp_path / ".out.lock"
-    monkeypatch.setattr(disk.os, "access", lambda path, mode: path != tmp_path)
-    assert disk.lock_of(tmp_path / "out") == tmp_path / "out" / ".out.lock"
-    assert disk.lock_of(tmp_path / "file") == tmp_path / ".file.lock"
+    assert file_lock.lock_of(tmp_path / "out") == tmp_path / ".out.lock"
+    monkeypatch.setattr(file_lock.os, "access", lambda path, mode: path != tmp_path)
+    assert file_lock.lock_of(tmp_path / "out") == tmp_path / "out" / ".out.lock"
+    assert file_lock.lock_of(tmp_path / "file") == tmp_path / ".file.lock"
 
 
 def test_a_text_is_written_whole_or_not_at_all(tmp_path):
     path = tmp_path / "notes.txt"
-    disk.write_whole(path, "one")
+    atomic_io.write_whole(path, "one")
     with pytest.raises(UnicodeEncodeError):
-        disk.write_whole(path, "two \ud800")
+        atomic_io.write_whole(path, "two \ud800")
     assert path.read_text() == "one"
-    disk.write_whole(path, "two \u00e9")
+    atomic_io.write_whole(path, "two \u00e9")
     assert path.read_bytes() == "two \u00e9".encode()
 
 
@@ -70,9 +70,9 @@ def test_everything_in_a_folder_is_on_the_disk(tmp_path, monkeypatch):
     (tmp_path / "a" / "b" / "c.txt").write_text("c")
     settled, fsync = [], os.fsync
     monkeypatch.setattr(
-        disk.os, "fsync", lambda handle: settled.append(os.readlink(f"/proc/self/fd/{handle}")) or fsync(handle)
+        atomic_io.os, "fsync", lambda handle: settled.append(os.readlink(f"/proc/self/fd/{handle}")) or fsync(handle)
     )
-    disk.settle(tmp_path / "a")
+    atomic_io.fsync_tree(tmp_path / "a")
     assert [one.removeprefix(f"{tmp_path}/") for one in settled] == ["a/b/c.txt", "a/b", "a"]
 
 
@@ -82,11 +82,11 @@ def test_what_was_there_stays_until_the_new_file_is_whole(tmp_path):
     kept.write_text("whole")
     kept.chmod(0o600)
     link.symlink_to(kept)
-    with pytest.raises(OSError, match="full"), disk.replacing(link) as file:
+    with pytest.raises(OSError, match="full"), atomic_io.replacing(link) as file:
         file.write_text("ha")
         raise OSError("full")
     assert kept.read_text() == "whole" and sorted(one.name for one in tmp_path.iterdir()) == ["kept.txt", "link.txt"]
-    with disk.replacing(link) as file:
+    with atomic_io.replacing(link) as file:
         assert file.suffix == ".txt" and file.parent == tmp_path
         file.write_text("new")
     assert link.is_symlink() and kept.read_text() == "new" and kept.stat().st_mode & 0o777 == 0o600
@@ -95,7 +95,7 @@ def test_what_was_there_stays_until_the_new_file_is_whole(tmp_path):
 def test_a_new_file_has_the_permissions_that_the_user_wants(tmp_path):
     before = os.umask(0o077)
     try:
-        with disk.replacing(tmp_path / "a.txt") as file:
+        with atomic_io.replacing(tmp_path / "a.txt") as file:
             file.write_text("a")
     finally:
         os.umask(before)
@@ -105,7 +105,7 @@ def test_a_new_file_has_the_permissions_that_the_user_wants(tmp_path):
 def test_it_is_on_the_disk_before_it_takes_the_place(tmp_path, monkeypatch):
     """A power cut leaves the old file or the new one: contents, then the name, then the folder."""
     steps, replace = [], os.replace
-    monkeypatch.setattr(disk, "sync", lambda path: steps.append(path.name))
-    monkeypatch.setattr(disk.os, "replace", lambda old, new: (steps.append("replace"), replace(old, new)))
-    disk.write_whole(tmp_path / "a.txt", "a")
+    monkeypatch.setattr(atomic_io, "sync", lambda path: steps.append(path.name))
+    monkeypatch.setattr(atomic_io.os, "replace", lambda old, new: (steps.append("replace"), replace(old, new)))
+    atomic_io.write_whole(tmp_path / "a.txt", "a")
     assert steps[0].startswith(".a.") and steps[1:] == ["replace", tmp_path.name]
