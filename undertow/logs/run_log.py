@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from undertow.core.errors import BadInput
-from undertow.core.unpacked_size import size_complaint
 from undertow.logs.known_signals import thruster_columns
 from undertow.logs.log import Log, Series
 from undertow.logs.messages import group_of
+from undertow.logs.result_file import UnreadableResult, opened_result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,12 +75,8 @@ def read_dataset(path: Path, name: str) -> "xr.Dataset":
     Raises:
         BadInput: it is no netCDF file, damaged, or would unpack to more than a run has.
     """
-    import xarray as xr
-
     try:
-        with xr.open_dataset(path, engine="netcdf4") as dataset:
-            if not (complaint := size_complaint(path, dataset.nbytes)):
-                return dataset.load()
-    except Exception:  # netCDF and xarray raise many kinds of errors for whatever bytes there are
-        complaint = "which is missing" if not path.exists() else "which is damaged, incomplete, or not a netCDF file"
-    raise BadInput(name, _MUST, f"{path.name}, {complaint}")
+        with opened_result(path) as dataset:
+            return dataset.load()
+    except UnreadableResult as error:
+        raise BadInput(name, _MUST, f"{path.name}, which is {error}") from None

@@ -6,10 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import xarray as xr
-
 from undertow.core.errors import BadInput, nearest
-from undertow.core.unpacked_size import size_complaint
+from undertow.logs.result_file import UnreadableResult, opened_result
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
 
@@ -165,16 +163,10 @@ def dump(data: Mapping[str, Any]) -> str:
 def _from_result(path: Path, what: str, allow_code: bool) -> Text:
     must = "be a result file of undertow"
     try:
-        with xr.open_dataset(path, engine="netcdf4") as dataset:
-            if complaint := size_complaint(path, dataset.nbytes):
-                raise wrong_file(path, what, must, complaint)
+        with opened_result(path) as dataset:
             attributes, actual = dict(dataset.attrs), checksum(dataset)
-    except BadInput:
-        raise
-    except Exception:  # netCDF and xarray raise many kinds of errors for a file that is torn, or none of theirs
-        empty = path.stat().st_size == 0
-        got = "empty (0 bytes)" if empty else "damaged, incomplete, or not a netCDF file"
-        raise wrong_file(path, what, must, got, hint="Run its scenario again") from None
+    except UnreadableResult as error:
+        raise wrong_file(path, what, must, str(error), hint="Run its scenario again") from None
     text = attributes.get("scenario")
     if not isinstance(text, str):
         raise wrong_file(path, what, must, "one that holds no scenario")

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
+from undertow.logs.result_file import opened_result
 from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum, claims
 from undertow.scenario.reading import parse
@@ -43,7 +44,7 @@ class Repetition(NamedTuple):
 
 def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it used and whose checksum, if any, is correct."""
-    with xr.open_dataset(path, engine="netcdf4") as earlier:
+    with opened_result(path) as earlier:
         before, held = dict(earlier.attrs), claims(earlier)
     now, left_out = claims(repeated), set(before.get(_LEFT_OUT, "").split(", "))
     differing = [name for name, claim in held.items() if now.get(name) != claim]

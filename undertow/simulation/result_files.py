@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from undertow.core.atomic_io import write_whole
+from undertow.logs.result_file import opened_result
 from undertow.scenario.reading import dump
 from undertow.simulation.run_facts import facts_from
 from undertow.simulation.run_result import RunRecord, RunResult
@@ -41,11 +42,12 @@ def read_record(path: Path) -> RunRecord:
     """What a result file holds, written by this version of undertow.
 
     Raises:
-        OSError: the file cannot be read.
+        UnreadableResult: the file cannot be read.
         KeyError: it lacks an attribute.
     """
-    with xr.open_dataset(path, engine="netcdf4") as dataset:
-        return RunRecord(dataset.load(), facts_from(dataset.attrs))
+    with opened_result(path) as opened:
+        dataset = opened.load()
+    return RunRecord(dataset, facts_from(dataset.attrs))
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
