@@ -127,7 +127,7 @@ def test_others_are_ignored_while_the_autopilot_is_there(session):
 def test_channels_that_are_not_driven_are_off(session):
     """0, 65535 and what no servo sends: zero volts, not full reverse."""
     session.answer(packet(0, [0, 65535, 1, 799, 2201, 1600, 1400, 1500]), SITL, 0.0)
-    np.testing.assert_array_equal(session.vehicle.input, [0, 0, 0, 0, 0, -4, 4, 0])
+    np.testing.assert_array_equal(session.vehicle.vehicle.output.applied, [0, 0, 0, 0, 0, -4, 4, 0])
     assert session.undriven == 5
 
 
@@ -136,7 +136,7 @@ def test_32_channels(vehicle):
     assert session.answer(packet(0, [1600] * 16), SITL, 0.0) is None
     assert "`channels` must be of the 16 that arrive, but is 32" in session.complaint
     assert session.answer(packet(0, [0] * 24 + [1600] * 8, magic=29569), SITL, 0.0) is not None
-    np.testing.assert_array_equal(session.vehicle.input, [4] * 7 + [-4])
+    np.testing.assert_array_equal(session.vehicle.vehicle.output.applied, [4] * 7 + [-4])
 
 
 def test_anything_may_arrive(session):
@@ -168,7 +168,7 @@ def test_anything_may_arrive(session):
 def test_a_vehicle_that_cannot_go_on_ends_the_session(session):
     """The last valid reply is repeated until the autopilot starts again."""
     valid = session.answer(packet(0), SITL, 0.0)
-    session.vehicle._advance.state.nu[...] = 1e9
+    session.vehicle.vehicle.state.nu[...] = 1e9
     assert session.answer(packet(1), SITL, 0.0) == valid and session.ended
     assert session.answer(packet(0), SITL, 1.0) is None  # a late copy
     session.answer(packet(2), SITL, 1.0)

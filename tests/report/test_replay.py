@@ -207,7 +207,7 @@ def test_trials_are_run_again_as_they_were(trials):
 
 
 def test_failed_trials_leave_the_others(trials, monkeypatch):
-    shown = lambda several, recorded: {"one": "a replay"} if "one" in several else 1 / 0
+    shown = lambda several, signals, every: {"one": "a replay"} if "one" in several else 1 / 0
     monkeypatch.setattr(trials_again, "_together", shown)
     replays, (failure,) = replays_of_trials(trials)
     assert replays == ["a replay"] and failure.startswith("the replay of wild could not be made (")
