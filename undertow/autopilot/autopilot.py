@@ -27,8 +27,8 @@ from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.stepped import Uncopied, put, step_of
 from undertow.power.esc import ESC
 from undertow.scenario.build import Built, build
-from undertow.scenario.link_scenario import at_sampling_time
-from undertow.scenario.reading import Text, from_data, read
+from undertow.scenario.link_scenario import at_sampling_time, text_of
+from undertow.scenario.reading import Text
 from undertow.supervision.conditions import Request, reason_of, state_of
 from undertow.supervision.supervised_controller import SupervisedState, state_in, transfer
 from undertow.supervision.supervisor import largest_estimate
@@ -512,10 +512,7 @@ def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tupl
         return scenario, "float64", None
     built, placed = scenario, isinstance(scenario, Built)
     if not isinstance(built, Built):
-        if isinstance(built, Mapping):
-            built = from_data(built)
-        text = built if isinstance(built, Text) else read(Path(built), allow_code=allow_code)
-        built = build(at_sampling_time(text, sampling_time))
+        built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for an autopilot", built.scenario.loop.kind)
     loop = built.closed_loop

@@ -19,8 +19,7 @@ from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.loop.stepped import Uncopied, put, step_of
 from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario.build import build
-from undertow.scenario.link_scenario import at_sampling_time
-from undertow.scenario.reading import from_data, read
+from undertow.scenario.link_scenario import at_sampling_time, text_of
 
 
 class NavigationFilter(Uncopied):
@@ -61,10 +60,9 @@ class NavigationFilter(Uncopied):
         log: str | Path | None = None,
         allow_code: bool = False,
     ):
-        text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
         if sampling_time is not None:
             checks.positive("sampling_time", sampling_time, "s")
-        built = build(at_sampling_time(text, sampling_time))
+        built = build(at_sampling_time(text_of(scenario, allow_code), sampling_time))
         navigation = built.closed_loop.navigation
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)

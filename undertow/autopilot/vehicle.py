@@ -26,8 +26,8 @@ from undertow.plants.pulse_input import applied_voltage, pulse_driven
 from undertow.power.esc import ESC
 from undertow.power.esc import esc as usual_esc
 from undertow.scenario.build import Built, build
-from undertow.scenario.link_scenario import at_sampling_time
-from undertow.scenario.reading import Text, from_data, read
+from undertow.scenario.link_scenario import at_sampling_time, text_of
+from undertow.scenario.reading import Text
 from undertow.sensors.motion import motion_of
 
 COMMANDS = ("input", "pulses")
@@ -83,7 +83,6 @@ class _Shown(NamedTuple):
     measured: Motion
     truth: Motion
     specific_force: Any
-    going_on: Any
 
 
 class Vehicle(Uncopied):
@@ -143,7 +142,9 @@ class Vehicle(Uncopied):
         checks.choice("command", command, COMMANDS)
         form = Format(attitude, velocity)
         form.check()
-        built = scenario if isinstance(scenario, Built) else _built(scenario, sampling_time, allow_code)
+        built = scenario
+        if not isinstance(built, Built):
+            built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
         settings, self._loop = built.scenario.loop, built.closed_loop
         self.sampling_time = float(settings.dt if sampling_time is None else sampling_time)
         self.duration = float(settings.duration)
@@ -175,7 +176,7 @@ class Vehicle(Uncopied):
 
     def _first(self, part: Realization, start: Any) -> tuple[PlantState, _Shown]:
         state, observation = plant_step.begin(part, start)
-        return state, self._shown(observation, observation.truth, jnp.zeros(()), jnp.asarray(True))
+        return state, self._shown(observation, observation.truth, jnp.zeros(()))
 
     def _next(self, part: tuple[Realization, ESC | None], state: PlantState, given: _Given):
         realization, speed_controllers = part
@@ -192,14 +193,14 @@ class Vehicle(Uncopied):
         new = new._replace(plant=jax.tree.map(lambda n, o: jnp.where(going_on, n, o), new.plant, state.plant))
         new, observation = plant_step.observe(realization, new, given.end, applied)
         before = plant.output(t, state.plant)
-        return new, self._shown(observation._replace(status=status), before, given.dt, going_on)
+        return new, self._shown(observation._replace(status=status), before, given.dt)
 
-    def _shown(self, observation: PlantObservation, before: Measurement, dt: Any, going_on: Any) -> _Shown:
+    def _shown(self, observation: PlantObservation, before: Measurement, dt: Any) -> _Shown:
         truth, force = observation.truth, ()
         if self._form is not None:
             force = motion_of(truth, before.velocity[:3], dt).specific_force
         measured, true = (motion_in(self._form, seen) for seen in (observation.measurement, truth))
-        return _Shown(observation, measured, true, force, going_on)
+        return _Shown(observation, measured, true, force)
 
     def restart(self, seed: int | None = None) -> VehicleOutput:
         """Go back to time zero and the start that the scenario states; everything random is that of the seed.
@@ -241,7 +242,7 @@ class Vehicle(Uncopied):
     @property
     def going_on(self) -> bool:
         """Whether the state is valid; the last valid one is kept where it is not, and `output.status` says why."""
-        return self._going_on
+        return self.output.status in _GOING_ON
 
     def step(self, command: Any, dt: float | None = None) -> VehicleOutput:
         """Hold a command for a time; thrusters limit it to what they can give.
@@ -283,7 +284,6 @@ class Vehicle(Uncopied):
         copied = jax.tree.map(np.copy, shown)
         observation, measured = copied.observation, copied.measured
         propellers = tuple(jax.tree.leaves(observation.measurement.actuator)) or None
-        self._going_on = bool(copied.going_on)
         self.output = VehicleOutput(
             measured.position,
             measured.velocity,
@@ -295,9 +295,3 @@ class Vehicle(Uncopied):
             copied.specific_force,
             Status(int(observation.status)),
         )
-
-
-def _built(scenario: Any, sampling_time: float | None, allow_code: bool) -> Built:
-    text = from_data(scenario) if isinstance(scenario, Mapping) else scenario
-    text = text if isinstance(text, Text) else read(Path(text), allow_code=allow_code)
-    return build(at_sampling_time(text, sampling_time))

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from undertow.scenario.reading import Text, read
+from undertow.scenario.reading import Text, from_data, read
 
 
 def read_for_link(path: Path, *, allow_code: bool = False, unsupervised: bool = False) -> Text:
@@ -21,6 +22,17 @@ def read_for_link(path: Path, *, allow_code: bool = False, unsupervised: bool = 
     if unsupervised or text.data.get("supervisor"):
         return text
     return text._replace(data=text.data | {"supervisor": True})
+
+
+def text_of(scenario: str | Path | Mapping[str, Any] | Text, allow_code: bool = False) -> Text:
+    """A scenario, given as a file, as a mapping, or as read.
+
+    Raises:
+        BadInput: as of `read`.
+    """
+    if isinstance(scenario, Text):
+        return scenario
+    return from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
 
 
 def at_sampling_time(text: Text, sampling_time: float | None) -> Text:

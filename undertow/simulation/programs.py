@@ -65,8 +65,8 @@ class _Collector:
     def add(self, batch: RunBatch, first_place: int) -> None:
         """Add runs whose places begin at a number."""
         pairs = zip(numbers_of(batch.first.run), batch.numbers, strict=True)
-        for column, (number, (leaf, own)) in zip(self._columns, enumerate(pairs), strict=True):
-            shared = self.shared[number]
+        for number, (leaf, own) in enumerate(pairs):
+            shared, column = self.shared[number], self._columns[number]
             if shared is not None and not _equal(shared, leaf, own):
                 # The runs so far have it, these do not.
                 column.append(np.broadcast_to(np.array(shared), (self.count, *np.shape(shared))))
@@ -110,17 +110,11 @@ class ProgramCache:
         gpu: whether a GPU runs them where there is one.
     """
 
-    def __init__(
-        self,
-        probes: Callable[[], Iterable[PreparedRun | RunBatch]] | None = None,
-        xla_width: int = 0,
-        gpu: bool = False,
-    ):
+    def __init__(self, probes: Callable[[], Runs] | None = None, xla_width: int = 0, gpu: bool = False):
         self._probes, self._xla_width, self._gpu = probes, xla_width, gpu
         self._shared: dict[Any, list[Any]] | None = None  # by structure
-        self._runners: dict[
-            ProgramKey, tuple[list[Any], BatchRunner]
-        ] = {}  # with their constants, None for no constant
+        # With their constants, None for what is none.
+        self._runners: dict[ProgramKey, tuple[list[Any], BatchRunner]] = {}
         self._lock = threading.Lock()
         self._compiling: dict[ProgramKey, threading.Lock] = {}
 
