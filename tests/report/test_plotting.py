@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from undertow.logs.result_file import UnreadableResult
 from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
 from undertow.report.run_figures import plotted
 from undertow.simulation.run_facts import facts_from
@@ -72,7 +73,7 @@ def test_no_process_where_matplotlib_is_loaded(tmp_path):
     with plotting_process() as plotting:
         assert plotting._process is None
         plotting.plot(tmp_path / "missing.nc", None)
-        with pytest.raises(OSError, match=r"missing\.nc"):
+        with pytest.raises(UnreadableResult, match="missing"):
             plotting.plotted()
 
 

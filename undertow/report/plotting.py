@@ -61,7 +61,7 @@ class PlottingProcess:
         """Wait for the figures; plotted here where the process cannot.
 
         Raises:
-            OSError: the file of the run cannot be read.
+            UnreadableResult: the file of the run cannot be read.
         """
         assert self._asked is not None, "`plot` comes first"
         if self._process is not None and self._process.stdout is not None:
