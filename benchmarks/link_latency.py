@@ -21,7 +21,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from undertow.interop.latency import Latency
+from undertow.realtime.statistics import Durations
 from undertow.interop.mavlink.message_codec import parsed
 
 SCENARIO = Path(__file__).parents[1] / "examples/bluerov2_heavy.yaml"
@@ -43,7 +43,7 @@ def command(*arguments: str) -> Iterator[int]:
 
 def measured(exchange: Callable[[int], None], steps: int, rate: float) -> dict[str, float]:
     """Time of exchanges, ms."""
-    latency = Latency(steps)
+    latency = Durations()
     due = time.perf_counter()
     for step in range(-WARM_UP, steps):
         due += 1 / rate if rate else 0.0

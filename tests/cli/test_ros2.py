@@ -47,7 +47,7 @@ def test_two_processes_give_the_run_of_a_simulation_and_ctrl_c_ends_them(scenari
     controller.send_signal(signal.SIGINT)
     out, error = controller.communicate(timeout=60)
     assert controller.returncode == 130 and "Interrupted" in error
-    assert "101 odometry, 0 targets, 102 commands" in out and "The last command is zero thrust" in out
+    assert "odometry 101; commands 102" in out and "The last command is the safe output" in out
 
     record, found = ut.simulate_scenario(scenario).dataset, read_rosbag2("run")
     np.testing.assert_allclose(found["/odom/position"][1], record["position"].values[:, :3], rtol=0, atol=1e-12)

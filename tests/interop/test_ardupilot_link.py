@@ -15,8 +15,8 @@ from fake_autopilot import FakeAutopilot, vector
 from undertow.cli.main import run
 from undertow.interop.ardupilot.server import listen, serve, status_line
 from undertow.interop.ardupilot.session import Session
-from undertow.interop.latency import Latency
 from undertow.interop.thruster_channels import channels_of_vehicle
+from undertow.realtime.statistics import Durations
 
 pytestmark = pytest.mark.interop
 
@@ -78,7 +78,7 @@ def test_status_lines(session):
         thread.join(10)
     assert lines[0] == "waiting for ArduPilot"
     assert "waiting for ArduPilot; 1 other packets: `packet` must begin with 18458 or 29569, but is 25960" in lines
-    said = status_line(session, Latency())
+    said = status_line(session, Durations())
     assert re.match(
         r"0\.0 s; 100 Hz; north 0\.1\d m, east -0\.\d\d m, down 0\.3\d m; reply no step yet; invalid 1", said
     )

@@ -17,8 +17,11 @@ from mavlink_vehicle import MavlinkVehicle
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink import Companion, CompanionLoop, UdpLink
-from undertow.interop.mavlink.sender_clock import SenderClock
+from undertow.interop.mavlink import Companion, CompanionLink, UdpLink
+from undertow.realtime.control_loop import RealTimeLoop
+from undertow.realtime.loop_clock import MonotonicClock
+from undertow.realtime.loop_settings import LoopSettings
+from undertow.realtime.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
 
@@ -31,18 +34,20 @@ CLOSE = 2e-5
 @pytest.fixture(scope="module")
 def companion(driven):
     """Starts at once, as a simulation does."""
-    return Companion(driven, blend=0.0, timeout=5.0)
+    return Companion(driven, timeout=5.0)
 
 
 @contextlib.contextmanager
 def accompanied(companion, link, **options):
     """The companion talks in a thread, until the block ends; the clock of its vehicle is a new one."""
     companion._clock = SenderClock(companion.timeout)
-    ended = threading.Event()
-    thread = threading.Thread(target=CompanionLoop(companion, link, **options).run, args=(ended.is_set,))
+    ended, settings = threading.Event(), LoopSettings(max_age=companion.timeout)
+    paced = CompanionLink(companion, link)
+    loop = RealTimeLoop(companion.autopilot, paced, MonotonicClock(), settings, ended.is_set, **options)
+    thread = threading.Thread(target=loop.run)
     thread.start()
     try:
-        yield
+        yield loop
     finally:
         ended.set()
         thread.join(10)
@@ -67,19 +72,22 @@ def test_a_closed_loop_is_that_of_a_simulation(driven, vehicle, source, listens)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         place = f"127.0.0.1:{free.getsockname()[1]}"
-    companion = Companion(driven, source=source, blend=0.0, timeout=5.0)
+    companion = Companion(driven, source=source, timeout=5.0)
     kinds = ("udpin", "udpout") if listens == "companion" else ("udpout", "udpin")
     first, second = (lambda: UdpLink(f"{kinds[0]}:{place}")), (lambda: MavlinkVehicle(f"{kinds[1]}:{place}"))
-    with first() as link, second() as peer, accompanied(companion, link):
-        if listens == "vehicle":
-            assert peer.wait("HEARTBEAT").get_srcSystem() == 255
-        if source == "odometry":
-            send = lambda frame, state: peer.odometry(5_000_000 + 10_000 * frame, state)
-        else:
-            send = lambda frame, state: peer.position_and_attitude(5_000 + 10 * frame, state)
-        found = closed_loop(vehicle, peer, send)
-        assert companion.counts == dict.fromkeys(companion.counts, 0) | {"steps": FRAMES, "starts": 1}
-        assert companion.steps_counted == dict.fromkeys(companion.steps_counted, 0) | {"steps": FRAMES - 1}
+    with first() as link, second() as peer:
+        with accompanied(companion, link) as loop:
+            if listens == "vehicle":
+                assert peer.wait("HEARTBEAT").get_srcSystem() == 255
+            if source == "odometry":
+                send = lambda frame, state: peer.odometry(5_000_000 + 10_000 * frame, state)
+            else:
+                send = lambda frame, state: peer.position_and_attitude(5_000 + 10 * frame, state)
+            found = closed_loop(vehicle, peer, send)
+    assert not any(companion.counts.values()) and loop.statistics.steps == FRAMES
+    assert loop.session.counts == dict.fromkeys(loop.session.counts, 0) | {"starts": 1}
+    timing = companion.autopilot.counts
+    assert timing == dict.fromkeys(timing, 0) | {"steps": FRAMES - 1}
     run = ut.simulate_scenario(DRIVEN).dataset
     expected = np.concatenate([run["position"].values[:-1, :3], run["velocity"].values[:-1, :3]], axis=1)
     np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE)
@@ -101,16 +109,16 @@ def test_what_is_sent_last_is_neutral(companion, vehicle):
 def test_another_sender_with_the_same_system_id_is_ignored(companion, vehicle):
     """While the vehicle talks: the commands go to it, and not to the other one."""
     with UdpLink("udpin:127.0.0.1:0") as link, MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as peer:
-        with MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as other, accompanied(companion, link):
+        with MavlinkVehicle(f"udpout:127.0.0.1:{link.port}") as other, accompanied(companion, link) as loop:
             peer.heartbeat()
             peer.odometry(20_000_000, vehicle.state())
             peer.pulses()
-            steps = companion.counts["steps"]
+            steps = loop.statistics.steps
             other.heartbeat(armed=False)
             other.odometry(20_010_000, vehicle.state())
             peer.odometry(20_020_000, vehicle.state())
             peer.pulses()
-            assert companion.counts["steps"] == steps + 1 and companion.armed
+            assert loop.statistics.steps == steps + 1 and companion.armed
             assert other.wait("RC_CHANNELS_OVERRIDE", timeout=0.2) is None
 
 
@@ -131,7 +139,7 @@ def test_status_lines(companion, vehicle):
             while not (lines and "MAV_FRAME_LOCAL_ENU" in lines[-1]):
                 assert len(lines) < 50
                 threading.Event().wait(0.05)
-    assert re.match(r"(no valid odometry|running, [A-Z]+( \(.*\))?); \d+ Hz; step (p50 \d|no step)", lines[-1])
+    assert re.match(r"(no valid measurement|running, [A-Z]+( \(.*\))?); \d+ Hz; step (p50 \d|no step)", lines[-1])
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,14 @@ import time
 import numpy as np
 
 from undertow.interop.ros2 import messages as ros
+from undertow.interop.ros2.controller_link import ControllerLink, ControllerSettings
 from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity
 from undertow.interop.ros2.link import Link
+from undertow.interop.ros2.node import Reporter
 from undertow.interop.ros2.to_messages import odometry_of, stamp_of
+from undertow.realtime.control_loop import RealTimeLoop
+from undertow.realtime.loop_clock import MonotonicClock
+from undertow.realtime.loop_settings import LoopSettings
 
 STILL = PoseAndVelocity(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(6))
 
@@ -30,6 +35,32 @@ class Peer:
     def tell_time(self, seconds: float) -> None:
         """Time of /clock."""
         self.clock.publish(ros.Clock(stamp_of(round(seconds * SECOND))))
+
+
+class ControllerNode:
+    """A controller on its topics, turn by turn."""
+
+    def __init__(self, controller, link: Link, settings: ControllerSettings, reporter: Reporter):
+        self.topics = ControllerLink(controller, link, settings, reporter)
+        loop_settings = LoopSettings(max_age=settings.max_age)
+        self.loop = RealTimeLoop(controller.autopilot, self.topics, MonotonicClock(), loop_settings)
+
+    def spin(self, seconds: float) -> None:
+        """Wait for odometry, at most so long, and answer it."""
+        self.loop.turn(self.topics, seconds)
+
+    def status(self) -> str:
+        """Counts and complaints in one line."""
+        return self.loop.counts_line(self.topics)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What happened on the topics."""
+        return self.topics.counts()
+
+    def stop(self) -> None:
+        """Send the last command."""
+        self.topics.finish(np.zeros(8))
 
 
 class Said:

@@ -6,10 +6,11 @@ Run them with `pytest -m dds`; they need fastddsgen, libfastrtps-dev and g++.
 import fast_dds
 import numpy as np
 import pytest
-from peer import Peer, Running, Said, until
+from peer import ControllerNode, Peer, Running, Said, until
 
 from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
+from undertow.interop.ros2.compiled_controller import CompiledController
+from undertow.interop.ros2.controller_link import ControllerSettings
 from undertow.interop.ros2.link import Link
 from undertow.interop.ros2.node import Reporter
 
@@ -57,9 +58,9 @@ def test_garbage_under_the_name_of_a_type_harms_nobody(program, domain, tmp_path
         answered = Running(process.stdout.readline)
         until(lambda: node.spin(0.02) or answered.result, 30)
         assert answered.result == "arrived\n"
-        assert node.status().startswith("0 odometry, 0 targets, 0 commands")
+        assert (node.counts["odometry"], node.counts["commands"]) == (0, 0)
         peer = Peer(domain)
         until(peer.odometry.subscribers)
         peer.send(1.0)
-        until(lambda: node.spin(0.02) or node.status().startswith("1 odometry, 0 targets, 1 commands"))
+        until(lambda: node.spin(0.02) or node.counts["commands"] == 1)
         peer.link.close()

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from peer import ControllerNode
 
 import undertow as ut
 from undertow.autopilot.vehicle import Vehicle
 from undertow.core.status import Status
 from undertow.interop.ros2 import from_messages, read_rosbag2, to_messages
-from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
+from undertow.interop.ros2.compiled_controller import CompiledController
+from undertow.interop.ros2.controller_link import ControllerSettings
 from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity, motion_of
 from undertow.interop.ros2.link import Link
 from undertow.interop.ros2.node import Reporter

@@ -1,10 +1,11 @@
 """End a command at once on a signal that ends it, also while modules are imported or compiled code runs."""
 
+import contextlib
 import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import TypeVar
 
@@ -68,6 +69,38 @@ def _importing(frame: FrameType | None) -> bool:
     while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
         frame = frame.f_back
     return frame is not None
+
+
+class EndingSignal:
+    """The signal that asks a loop for its end.
+
+    Attributes:
+        number: of the first one; 0 before.
+    """
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def asked(self) -> bool:
+        """Whether one has come."""
+        return self.number != 0
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[None]:
+        """Inside, signals do not raise: the loop asks, and ends with its safe output."""
+
+        def note(number: int, frame: FrameType | None) -> None:
+            if not self.number:
+                self.number = number
+                with contextlib.suppress(OSError):  # nobody reads it: the terminal is gone, or the pipe closed
+                    os.write(2, b"\nInterrupted: stopping.\n")
+
+        before = {one: signal.signal(one, note) for one in ending_signals()}
+        try:
+            yield
+        finally:
+            for one, handler in before.items():
+                signal.signal(one, handler)
 
 
 def interruptible(work: Callable[[], Result]) -> Result:

@@ -14,7 +14,7 @@ _COMPILED = (
     ("undertow.cli.ardupilot", "SteppedVehicle", ""),
     ("undertow.interop.mavlink.companion", "Autopilot", "pymavlink"),
     ("undertow.interop.mavlink.companion", "ThrusterDriver", "pymavlink"),
-    ("undertow.interop.ros2.controller_node", "CompiledController", "cyclonedds"),
+    ("undertow.interop.ros2.compiled_controller", "CompiledController", "cyclonedds"),
 )
 
 _kept: dict[str, Any] = {}

@@ -1,14 +1,15 @@
 """`undertow mavlink`: the controller of a scenario as a MAVLink companion."""
 
-import time
 from pathlib import Path
 from typing import NamedTuple
 
-from undertow.cli.exit_codes import DONE, report
+from undertow.cli.exit_codes import report
+from undertow.cli.paced_loop import run_until_signal
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.realtime.loop_settings import LoopSettings
 
 
 class Options(NamedTuple):
@@ -33,7 +34,7 @@ class Options(NamedTuple):
 def mavlink(scenario: Path, options: Options) -> int:
     """Control the vehicle at the other end of a link until Ctrl-C; return the exit code."""
     try:
-        from undertow.interop.mavlink import Companion, CompanionLoop, UdpLink, read_key
+        from undertow.interop.mavlink import Companion, CompanionLink, UdpLink, read_key
     except ModuleNotFoundError as error:
         if error.name != "pymavlink":
             raise
@@ -56,8 +57,7 @@ def mavlink(scenario: Path, options: Options) -> int:
                 unsupervised=options.unsupervised,
                 allow_code=options.allow_code,
             )
-        link.drain()  # what came while the law was compiled
+        link.drain()  # what came while the controller was compiled
         report(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
-        end = float("inf") if options.duration is None else time.monotonic() + options.duration
-        CompanionLoop(companion, link, report).run(until=lambda: time.monotonic() >= end)
-    return DONE
+        settings = LoopSettings(max_age=options.timeout, from_safe=True)
+        return run_until_signal(companion.autopilot, CompanionLink(companion, link), settings, options.duration, report)

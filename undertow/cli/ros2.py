@@ -1,7 +1,6 @@
 """`undertow ros2`: the controller of a scenario, or its simulated vehicle, as a ROS 2 node."""
 
 import contextlib
-import math
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -98,23 +97,23 @@ def _recording(bag: Any, missing: list[str]) -> Iterator[BackgroundWriter | None
 
 
 def _compiled_controller(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
-    from undertow.interop.ros2.controller_node import CompiledController, ControllerNode, ControllerSettings
+    from undertow.cli.paced_loop import run_until_signal
+    from undertow.interop.ros2.compiled_controller import CompiledController
+    from undertow.interop.ros2.controller_link import ControllerLink, ControllerSettings
+    from undertow.realtime.loop_settings import LoopSettings
 
-    duration = math.inf if options.duration is None else options.duration
-    checks.positive("--duration", duration, "s", finite=False)
+    if options.duration is not None:
+        checks.positive("--duration", options.duration, "s", finite=False)
     options_of_law = {"unsupervised": options.unsupervised, "allow_code": options.allow_code}
     made = lambda: CompiledController(scenario, options.output or "input", options.rate, **options_of_law)
     controller = interruptible(made)
     settings = ControllerSettings(options.max_age, options.use_sim_time, names, frames)
 
     def run(link: Any) -> int:
-        node = ControllerNode(controller, link, settings, reporter)
-        reporter.say(f"{names.odom}, {names.target_pose} -> {node.topic}. To end: Ctrl-C")
-        try:
-            node.run(duration)
-        finally:
-            reporter.say(f"ended: {node.status()}. The last command is zero thrust")
-        return DONE
+        topics = ControllerLink(controller, link, settings, reporter)
+        reporter.say(f"{names.odom}, {names.target_pose} -> {topics.topic}. To end: Ctrl-C")
+        loop = LoopSettings(max_age=options.max_age)
+        return run_until_signal(controller.autopilot, topics, loop, options.duration, reporter.say)
 
     return run
 

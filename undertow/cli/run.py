@@ -6,12 +6,10 @@ import json
 import math
 import os
 import platform
-import signal
 import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from types import FrameType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,17 +18,18 @@ import typer
 from undertow.autopilot.autopilot import Autopilot
 from undertow.autopilot.measured_motion import Format
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
-from undertow.cli.interruptible import ending_signals, interruptible
+from undertow.cli.interruptible import EndingSignal, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
 from undertow.core.atomic_io import sync, write_whole
 from undertow.core.errors import BadInput
-from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
+from undertow.realtime.control_loop import RealTimeLoop
 from undertow.realtime.link import AbstractLink
 from undertow.realtime.log_link import LogLink
 from undertow.realtime.loop_clock import MonotonicClock, SimulatedClock
+from undertow.realtime.loop_settings import LoopSettings, Reason
 from undertow.realtime.process_priority import scheduled
 from undertow.realtime.statistics import LoopStatistics
 from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
@@ -66,33 +65,6 @@ class Options(NamedTuple):
     allow_code: bool
 
 
-class _Stop:
-    """Whether a signal asked for the end, and which."""
-
-    def __init__(self) -> None:
-        self.number = 0
-
-    def asked(self) -> bool:
-        return self.number != 0
-
-    @contextlib.contextmanager
-    def listening(self) -> Iterator[None]:
-        """Inside, signals do not raise: the loop asks, and ends with its safe output."""
-
-        def note(number: int, frame: FrameType | None) -> None:
-            first, self.number = not self.number, number
-            if first:
-                with contextlib.suppress(OSError):  # nobody reads it: the terminal is gone, or the pipe closed
-                    os.write(2, b"\nInterrupted: stopping.\n")
-
-        before = {one: signal.signal(one, note) for one in ending_signals()}
-        try:
-            yield
-        finally:
-            for one, handler in before.items():
-                signal.signal(one, handler)
-
-
 def run(scenario: Path, options: Options) -> int:
     """Run until the end of the scenario, of the link, or Ctrl-C; return the exit code."""
     _check(options)
@@ -121,7 +93,7 @@ def _check(options: Options) -> None:
 
 def _controlled(path: Path, built: Built, options: Options) -> int:
     """The loop with the vehicle of the scenario, or one behind UDP, with a log."""
-    own, period, stop = options.link == "vehicle", float(built.scenario.loop.dt), _Stop()
+    own, period, stop = options.link == "vehicle", float(built.scenario.loop.dt), EndingSignal()
     duration = options.duration or (built.scenario.loop.duration if own else math.inf)
     steps = duration if math.isinf(duration) else round(duration / period)
     if steps < 1:
@@ -265,7 +237,7 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
     console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 
 
-def _ending(reason: Reason, link: AbstractLink, options: Options, stop: _Stop) -> int:
+def _ending(reason: Reason, link: AbstractLink, options: Options, stop: EndingSignal) -> int:
     """The exit code, with a line about a failure."""
     if reason is Reason.STOPPED:
         return 128 + stop.number
@@ -312,7 +284,7 @@ def _replay(text: Text, built: Built, options: Options) -> int:
 
 def _serve(built: Built, options: Options) -> int:
     """Be the simulated vehicle at the other end of a link by UDP."""
-    stop, server = _Stop(), interruptible(lambda: UdpVehicleServer(built, str(options.serve)))
+    stop, server = EndingSignal(), interruptible(lambda: UdpVehicleServer(built, str(options.serve)))
     typer.echo(f"The vehicle listens on {options.serve}. To end: Ctrl-C")
     end = math.inf if options.duration is None else time.monotonic() + options.duration
     try:

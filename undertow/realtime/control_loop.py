@@ -1,59 +1,32 @@
-"""The real-time loop: one control step per period, under a deadline, with a safe output at the end.
+"""The real-time loop: it steps a controller over a link to the vehicle, with a safe output at the end.
 
-Step n is planned for n periods after the start. In each step the loop receives the newest measurement, computes, and
-sends one command. Then it waits for the next whole period that has not begun: a period whose beginning was missed has
-no step of its own, so that no period ever has two commands. The controller gets the time since its last step. A step
-that begins up to a tenth of a period late counts as on time there, so that jitter of the machine is not passed on.
+By its own clock it takes one step per period, under a deadline. Step n is planned for n periods after the start. In
+each step the loop receives the newest measurement, computes, and sends one command. Then it waits for the next whole
+period that has not begun: a period whose beginning was missed has no step of its own, so that no period ever has two
+commands. The controller gets the time since its last step. A step that begins up to a tenth of a period late counts as
+on time there, so that jitter of the machine is not passed on.
+
+Where the link sets the pace, a step is taken when a measurement comes, by the rules of `ControlSession`.
 """
 
 import contextlib
-import enum
 import gc
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from undertow.autopilot.autopilot import Autopilot
-from undertow.core import checks
-from undertow.core.checks import numbers
-from undertow.realtime.link import AbstractLink, LinkMeasurement
+from undertow.realtime.control_session import ControlSession
+from undertow.realtime.link import AbstractLink, AbstractPacingLink, LinkMeasurement
 from undertow.realtime.loop_clock import AbstractLoopClock
+from undertow.realtime.loop_settings import LoopSettings, Reason
 from undertow.realtime.statistics import LoopStatistics
 
 _LITTLE = 0.1  # periods, by which a step may begin late and counts as on time for the controller
 _ROUNDING = 1e-6  # periods
 _STANDSTILL = 2.0  # periods, that a loop of long periods may stand still beyond `max_age`
-
-
-class Reason(enum.Enum):
-    """Why a loop ended."""
-
-    COMPLETED = "completed"
-    LINK_ENDED = "the link ended"
-    LINK_LOST = "no measurement"
-    NO_START = "no first measurement"
-    STALLED = "the controller stood still"
-    STOPPED = "stopped"
-
-
-class LoopSettings(NamedTuple):
-    """How a loop runs.
-
-    Attributes:
-        safe: output that is sent last, however the loop ends, in the unit of the plant's input; one number or one per
-            actuator.
-        deadline: s after the planned beginning of a step, by which its command should be sent; None for the period.
-        max_age: s without a new measurement, or without a step of its own, after which the loop ends.
-        patience: s that the loop waits for the first measurement.
-    """
-
-    safe: Any = 0.0
-    deadline: float | None = None
-    max_age: float = 0.5
-    patience: float = 10.0
+LOOK = 0.05  # s, longest wait for a measurement that sets the pace, before other things are looked after
 
 
 class RealTimeLoop:
@@ -64,10 +37,13 @@ class RealTimeLoop:
         link: it is finished by `run`.
         clock: the only clock that is used.
         settings: None for the usual ones.
-        stop: asked once per step; the loop ends when it says so.
-        begun: called once, when the first measurement has come.
+        stop: asked once per step, or twenty times per second; the loop ends when it says so.
+        begun: called once, when the first measurement of a loop by its own clock has come.
+        report: gets a line once per second, of a loop by measurements.
+        every: s between these lines.
 
     Attributes:
+        session: its rules.
         statistics: of the steps so far.
 
     Raises:
@@ -82,45 +58,38 @@ class RealTimeLoop:
         settings: LoopSettings | None = None,
         stop: Callable[[], bool] = lambda: False,
         begun: Callable[[], None] = lambda: None,
+        report: Callable[[str], None] = lambda line: None,
+        every: float = 1.0,
     ):
-        settings = LoopSettings() if settings is None else settings
         self._autopilot, self._link, self._clock, self._stop, self._begun = autopilot, link, clock, stop, begun
+        self._report, self._every = report, every
+        self._report_due, self._steps_reported = clock.now() + every, 0
+        self._looked: float | None = None  # when measurements were looked for last, s
         self._period = autopilot.sampling_time
-        self._deadline = self._period if settings.deadline is None else settings.deadline
-        checks.positive("deadline", self._deadline, "s")
-        checks.positive("max_age", settings.max_age, "s")
-        checks.positive("patience", settings.patience, "s")
-        inputs = autopilot.plant.inputs()
-        several = np.ndim(settings.safe) > 0
-        given = settings.safe if several else np.full(inputs, settings.safe)
-        self._safe = numbers("safe", given, (inputs,))
-        checks.finite("safe", self._safe)
-        self._max_age, self._patience = settings.max_age, settings.patience
-        self._standstill = max(settings.max_age, _STANDSTILL * self._period)
-        self._missing = self._nothing()
+        chosen = LoopSettings() if settings is None else settings
+        self._settings = chosen.checked(autopilot.plant.inputs())
+        self._deadline = self._period if chosen.deadline is None else chosen.deadline
+        self._standstill = max(chosen.max_age, _STANDSTILL * self._period)
+        safe = self._settings.safe
+        self.session = ControlSession(autopilot, link.form, chosen.max_age, safe, chosen.from_safe)
         self.statistics = LoopStatistics()
-
-    def _nothing(self) -> LinkMeasurement:
-        """What the autopilot is given without a measurement: it takes what its model expects."""
-        form, outputs = self._link.form, len(self._autopilot.plant.outputs)
-        if form is None:
-            return LinkMeasurement(np.full(outputs, np.nan), np.full(outputs, np.nan))
-        names, unknown = form.columns(), lambda columns: np.full(len(columns), np.nan)
-        return LinkMeasurement(unknown(names.position), unknown(names.velocity), unknown(names.attitude))
 
     def run(self, steps: float = math.inf, periods: float = math.inf) -> Reason:
         """Take steps until so many are taken, so many periods are over, the link ends or is silent, or `stop` says so.
 
-        Whatever happens, the last thing sent is the safe output.
+        A loop whose link sets the pace waits where that is silent. Whatever happens, the last thing sent is the safe
+        output.
         """
         try:
-            self._link.guard(self._safe, self._standstill)
+            self._link.guard(self._settings.safe, self._standstill)
+            if isinstance(self._link, AbstractPacingLink):
+                return self._by_measurements(self._link, steps, periods)
             with _without_collection():
-                return self._run(steps, periods)
+                return self._by_clock(steps, periods)
         finally:
-            self._link.finish(self._safe)
+            self._link.finish(self._settings.safe)
 
-    def _run(self, steps: float, periods: float) -> Reason:
+    def _by_clock(self, steps: float, periods: float) -> Reason:
         received = self._first_measurement()
         if received is None:
             return self._why_no_start()
@@ -130,7 +99,7 @@ class RealTimeLoop:
         planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
         while True:
             begun = clock.now()
-            self._link.send(self._step(received, elapsed, seen.steps == 0))
+            self._link.send(self._command(received, elapsed))
             answered = clock.now()
             self._autopilot.log_step()  # after the command is on its way
             following = max(planned + 1, math.floor((clock.now() - begin) / period) + 1)
@@ -156,7 +125,7 @@ class RealTimeLoop:
             if self._link.ended:
                 return Reason.LINK_ENDED
             waited = 0.0 if received is not None else waited + elapsed
-            if waited > self._max_age:
+            if waited > self._settings.max_age:
                 return Reason.LINK_LOST
 
     def _count(self, answered: float, missed: int, fresh: bool) -> None:
@@ -173,15 +142,12 @@ class RealTimeLoop:
         whole = math.floor(periods + _ROUNDING)
         return whole if periods - whole <= _LITTLE else periods
 
-    def _step(self, received: LinkMeasurement | None, elapsed: float, first: bool) -> np.ndarray:
+    def _command(self, received: LinkMeasurement | None, elapsed: float) -> np.ndarray:
         """The command for a measurement, or without one."""
-        given = self._missing if received is None else received
-        more = {"target": given.target, "applied": given.applied, "propellers": given.propellers}
-        dt = elapsed if given.elapsed is None else given.elapsed
-        motion = (given.position, given.velocity, given.attitude)
-        if first or given.elapsed == 0:
-            return self._autopilot.start(*motion, **more, health=given.health)
-        return self._autopilot.step(*motion, **more, health=given.health, dt=dt)
+        if received is not None and (self.statistics.steps == 0 or received.elapsed == 0):
+            return self.session.start(received, received.applied)
+        dt = elapsed if received is None or received.elapsed is None else received.elapsed
+        return self.session.step(received, dt)
 
     def _first_measurement(self) -> LinkMeasurement | None:
         """Wait for the first measurement whose entries are all finite; None where none came, or the loop was stopped.
@@ -191,11 +157,11 @@ class RealTimeLoop:
         begin, planned = self._clock.now(), 0
         while not self._stop() and not self._link.ended:
             received = self._link.receive(self._period if planned else 0.0)
-            if received is not None and _all_finite(received):
+            if received is not None and not received.missing():
                 return received
-            if self._clock.now() - begin > self._patience:
+            if self._clock.now() - begin > self._settings.patience:
                 return None
-            self._link.await_measurement(self._safe)
+            self._link.await_measurement(self._settings.safe)
             planned += 1
             self._clock.sleep_until(begin + planned * self._period)
         return None
@@ -205,10 +171,62 @@ class RealTimeLoop:
             return Reason.LINK_ENDED
         return Reason.STOPPED if self._stop() else Reason.NO_START
 
+    def _by_measurements(self, link: AbstractPacingLink, steps: float, periods: float) -> Reason:
+        begin = self._clock.now()
+        while not self._stop():
+            self.turn(link, LOOK)
+            if self.statistics.steps >= steps or self._clock.now() - begin >= periods * self._period:
+                return Reason.COMPLETED
+            if link.ended:
+                return Reason.LINK_ENDED
+            self._report_if_due(link)
+        return Reason.STOPPED
 
-def _all_finite(received: LinkMeasurement) -> bool:
-    given = (received.position, received.velocity, received.attitude, received.propellers)
-    return all(np.isfinite(one).all() for one in jax.tree.leaves(given))
+    def turn(self, link: AbstractPacingLink, longest: float) -> None:
+        """Wait at most so long (s) for a measurement and answer it, or send the safe output where that is due."""
+        link.wait(longest)
+        now = link.time(self._clock.now())
+        elapsed = now - (now if self._looked is None else self._looked)
+        self._looked = now
+        if elapsed > self._standstill + LOOK:
+            link.discard()
+        begun, was_running = self._clock.now(), self.session.running
+        measurement = link.receive(elapsed)
+        objection = link.objection()
+        if measurement is None:
+            self.session.stop_if_lost(now, objection)
+            command = None
+        else:
+            command = self.session.follow(measurement, now, objection)
+        if command is not None:
+            if not was_running:
+                link.note_begin()
+            link.send(command)
+            self.statistics.computing.add(self._clock.now() - begun)
+            self.statistics.steps += 1
+            self._autopilot.log_step()
+        elif was_running and not self.session.running:
+            link.note_stop(self.session.state(objection))
+        if self.session.is_safe_output_due(now):
+            link.send(self._settings.safe)
+
+    def _report_if_due(self, link: AbstractPacingLink) -> None:
+        now = self._clock.now()
+        if now >= self._report_due:
+            rate = (self.statistics.steps - self._steps_reported) / self._every
+            self._report(self.status_line(link, rate))
+            self._steps_reported, self._report_due = self.statistics.steps, now + self._every
+
+    def status_line(self, link: AbstractPacingLink, rate: float) -> str:
+        """What is going on, in one line; `rate` is that of the steps, Hz."""
+        return "; ".join([self.session.state(link.objection()), f"{rate:.0f} Hz", self.counts_line(link)])
+
+    def counts_line(self, link: AbstractPacingLink) -> str:
+        """Times of the steps, what happened so far, and what the operator should know."""
+        timing = self._autopilot.counts
+        counts = {**link.counts(), **self.session.counts, "late": timing["late"], "missed": timing["missed"]}
+        numbers = [f"{name} {number}" for name, number in counts.items() if number]
+        return "; ".join([f"step {self.statistics.computing}", *numbers, *link.complaints()])
 
 
 @contextlib.contextmanager

@@ -48,6 +48,14 @@ class Durations:
         found = {"number": self.number, "mean": self._sum / self.number, "rms": (self._square / self.number) ** 0.5}
         return found | {name: self.quantile(share) for name, share in _SHARES.items()} | {"max": self._largest}
 
+    def milliseconds(self) -> dict[str, float]:
+        """Median, 99th percentile and longest, ms; {} without one."""
+        found = self.summary()
+        return {name: 1e3 * found[name] for name in ("p50", "p99", "max")} if found else {}
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value:.2f} ms" for name, value in self.milliseconds().items()) or "no step yet"
+
 
 class LoopStatistics:
     """What a real-time loop did.

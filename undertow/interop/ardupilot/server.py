@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from undertow.core.errors import BadInput
 from undertow.interop.ardupilot.session import Session
-from undertow.interop.latency import Latency
+from undertow.realtime.statistics import Durations
 
 PORT = 9002  # to which ArduPilot sends; 10 more for each further instance (-I1 sends to 9012)
 
@@ -44,7 +44,7 @@ def serve(
     report: Callable[[str], None] = lambda line: None,
     duration: float = float("inf"),
     every: float = 1.0,
-    latency: Latency | None = None,
+    latency: Durations | None = None,
 ) -> None:
     """Answer packets until the vehicle cannot go on, its time is up, or Ctrl-C.
 
@@ -59,7 +59,7 @@ def serve(
         every: s between these lines.
         latency: gets the time from each packet to its reply.
     """
-    measured = latency or Latency()
+    measured = latency or Durations()
     due = time.monotonic() + every
     while not session.ended and session.vehicle.time < duration - _LITTLE:
         answered, begun = None, 0.0
@@ -77,7 +77,7 @@ def serve(
             due = time.monotonic() + every
 
 
-def status_line(session: Session, latency: Latency) -> str:
+def status_line(session: Session, latency: Durations) -> str:
     """What is going on, in one line."""
     if session.sender is None:
         others = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""

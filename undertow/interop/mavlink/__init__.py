@@ -1,7 +1,8 @@
 """The controller of a scenario as a MAVLink companion of an autopilot: odometry in, commands to the thrusters out.
 
 `odometry` reads positions and attitudes, `actuator_commands` writes what the thrusters get, `companion` has the rules
-of when the law runs, `link` the UDP socket, `signing` the signatures, and `companion_loop` lets the companion talk.
+of when a controller may run, `link` the UDP socket, `signing` the signatures, and `companion_link` makes them a link of
+the real-time loop.
 docs/how-to/mavlink.md explains them.
 """
 
@@ -12,6 +13,6 @@ if importlib.util.find_spec("pymavlink") is None:
     raise ModuleNotFoundError(f"pymavlink is not installed. {remedy}", name="pymavlink")
 
 from undertow.interop.mavlink.companion import Companion as Companion
-from undertow.interop.mavlink.companion_loop import CompanionLoop as CompanionLoop
+from undertow.interop.mavlink.companion_link import CompanionLink as CompanionLink
 from undertow.interop.mavlink.link import UdpLink as UdpLink
 from undertow.interop.mavlink.signing import read_key as read_key

@@ -82,10 +82,20 @@ class Reporter:
         if now >= self._next:
             self._next = now + STATUS_PERIOD
             self._say(line())
-            if only is not None and (count := only.publishers()) > 1:
-                what = f"{only.topic} has {count} publishers, whose messages are mixed"
-                self.warn(what, f"{what}. End all but one, or give one another topic with --remap")
+            if only is not None and (mixed := mixed_publishers(only)):
+                self.warn(mixed, mixed)
 
     def events(self) -> str:
         """The counts as text; empty without any."""
         return "".join(f", {number} {event}" for event, number in sorted(self.counts.items()) if number)
+
+
+def mixed_publishers(inlet: Inlet) -> str:
+    """What is wrong where several publishers send to one subscriber; "" where they do not."""
+    count = inlet.publishers()
+    if count < 2:
+        return ""
+    return (
+        f"{inlet.topic} has {count} publishers, whose messages are mixed. "
+        "End all but one, or give one another topic with --remap"
+    )

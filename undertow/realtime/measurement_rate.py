@@ -1,15 +1,15 @@
-"""Whether odometry comes regularly enough for a law: a few late steps are none, many of them are another law."""
+"""Whether measurements come regularly enough for a law: a few late steps are none, many of them are another law."""
 
 from collections import deque
 
-LATE = 1.5  # sampling times from one odometry to the next, from which on it is late
-MOST = 5  # late ones within `WINDOW`, at which odometry counts as irregular
+LATE = 1.5  # sampling times from one measurement to the next, from which on it is late
+MOST = 5  # late ones within `WINDOW`, at which measurements count as irregular
 WINDOW = 1.0  # s
 _SHORTEST = 10  # sampling times that the window has at least
 
 
-class OdometryRate:
-    """Odometry is irregular from five late ones within a second on, until there was none for a second.
+class MeasurementRate:
+    """Measurements are irregular from five late ones within a second on, until there was none for a second.
 
     A law in whose model the sampling time is much shorter than that of its measurements can be unstable.
 
@@ -17,8 +17,8 @@ class OdometryRate:
         sampling_time: s.
 
     Attributes:
-        irregular: whether it is, by the last odometry.
-        counted: how often it became so.
+        irregular: whether they are, by the last one.
+        counted: how often they became so.
     """
 
     def __init__(self, sampling_time: float):
@@ -27,7 +27,7 @@ class OdometryRate:
         self.irregular, self.counted = False, 0
 
     def note(self, elapsed: float, now: float) -> None:
-        """An odometry that is used has come.
+        """A measurement that is used has come.
 
         Args:
             elapsed: since the one before, by the clock of its sender, s.

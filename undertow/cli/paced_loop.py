@@ -1,0 +1,34 @@
+"""Run a real-time loop whose link sets the pace, for the commands that have one."""
+
+import math
+from collections.abc import Callable
+
+from undertow.autopilot.autopilot import Autopilot
+from undertow.cli.exit_codes import DONE
+from undertow.cli.interruptible import EndingSignal
+from undertow.realtime.control_loop import RealTimeLoop
+from undertow.realtime.link import AbstractPacingLink
+from undertow.realtime.loop_clock import MonotonicClock
+from undertow.realtime.loop_settings import LoopSettings
+
+
+def run_until_signal(
+    autopilot: Autopilot,
+    link: AbstractPacingLink,
+    settings: LoopSettings,
+    duration: float | None,
+    report: Callable[[str], None],
+) -> int:
+    """Control for so many seconds (None: without end), or until a signal ends it; return the exit code.
+
+    A line per second, and one at the end, go to `report`.
+    """
+    stop = EndingSignal()
+    loop = RealTimeLoop(autopilot, link, MonotonicClock(), settings, stop.asked, report=report)
+    periods = math.inf if duration is None else duration / autopilot.sampling_time
+    try:
+        with stop.listening():
+            loop.run(periods=periods)
+    finally:
+        report(f"Ended: {loop.counts_line(link)}. The last command is the safe output")
+    return 128 + stop.number if stop.number else DONE
