@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from undertow.checks.flow_stability import flow_advice
+from undertow.cli.commands.understand import AnalyzeCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -23,15 +24,15 @@ from undertow.scenario.reading import read
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
 
-def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool, pdf: str | None) -> int:
+def analyze(command: AnalyzeCommand) -> int:
     """Predict a scenario and write the page to `out`, or to a free folder under runs/; return the exit code."""
-    check_pdf(pdf)
+    check_pdf(command.pdf)
     console = wide_console()
     with (
-        output_folder(out, Path("runs") / f"{scenario.stem}-prediction") as folder,
-        results_folder(folder, _WRITTEN, "prediction.json", overwrite) as draft,
+        output_folder(command.out, Path("runs") / f"{command.scenario.stem}-prediction") as folder,
+        results_folder(folder, _WRITTEN, "prediction.json", command.overwrite) as draft,
     ):
-        built = build(read(scenario, allow_code=allow_code))
+        built = build(read(command.scenario, allow_code=command.allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
         before = (*built.advice(), *flow_advice(built))
@@ -39,7 +40,7 @@ def analyze(scenario: Path, out: Path | None, overwrite: bool, allow_code: bool,
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
-        warn_of(write_prediction(prediction, warnings, draft.path, pdf))
+        warn_of(write_prediction(prediction, warnings, draft.path, command.pdf))
     for rows in tables(prediction):
         console.print(_table(rows))
     if prediction.why_not:

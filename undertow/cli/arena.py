@@ -17,6 +17,7 @@ from undertow.arena.vehicles import VEHICLES
 from undertow.campaign.prepare import Prepared
 from undertow.campaign.run_campaign import STORE
 from undertow.cli import results_folder
+from undertow.cli.commands.understand import ArenaCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -70,27 +71,20 @@ class _Asked(NamedTuple):
     overwrite: bool
 
 
-def arena(
-    entries: Sequence[str],
-    out: Path | None,
-    trials: int,
-    tasks: str | None,
-    vehicles: str | None,
-    budget: int | None,
-    robustness: bool,
-    workers: int | None,
-    overwrite: bool,
-    pdf: str | None,
-) -> int:
+def arena(command: ArenaCommand) -> int:
     """Run laws through the tasks, those that are missing in the folder, and write the leader board; the exit code."""
-    check_pdf(pdf)
+    entries, trials, budget = command.controllers or [], command.trials, command.tune
+    tasks, vehicles, robustness = command.tasks, command.vehicles, command.robustness
+    check_pdf(command.pdf)
     checks.positive("--trials", trials)
     if budget is not None:
         check_budget(budget)
     found = laws([word for entry in entries or EVERY for word in entry.split(",")])
-    asked = _Asked(trials, _cells(tasks, vehicles), budget, robustness, worker_count(workers), overwrite)
+    asked = _Asked(
+        trials, _cells(tasks, vehicles), budget, robustness, worker_count(command.workers), command.overwrite
+    )
     console = wide_console()
-    with output_folder(out or Path("runs") / "arena", Path()) as folder:
+    with output_folder(command.out or Path("runs") / "arena", Path()) as folder:
         _check_place(folder)
         again = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
         again += ["--tune", str(budget)] if budget is not None else []
@@ -104,7 +98,7 @@ def arena(
         except (KeyboardInterrupt, OSError):
             typer.echo(f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *again])}", err=True)
             raise
-        return _conclude(console, folder, pdf)
+        return _conclude(console, folder, command.pdf)
 
 
 def _check_place(folder: Path) -> None:

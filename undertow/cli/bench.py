@@ -8,6 +8,7 @@ from rich.table import Table
 
 from undertow.bench.measure import measure
 from undertow.bench.waiting import waiting_times
+from undertow.cli.commands.inspection import BenchCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
@@ -31,16 +32,16 @@ _WORKLOADS = {
 }
 
 
-def bench(as_json: bool, users: bool) -> int:
+def bench(command: BenchCommand) -> int:
     """Measure workloads W1 and W2, or how long users wait, and print tables or JSON."""
-    console, work = wide_console(), waiting_times if users else measure
-    if as_json:
+    console, work = wide_console(), waiting_times if command.users else measure
+    if command.as_json:
         found = interruptible(lambda: work(lambda what, share: None))
         typer.echo(json.dumps({key: _short(value) for key, value in found.items()}, indent=1))
         return DONE
     with shares(console) as progress:
         found = interruptible(lambda: work(progress))
-    if users:
+    if command.users:
         console.print(_waiting_table(found))
         return DONE
     if "simd_unavailable" in found:

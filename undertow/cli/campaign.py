@@ -1,8 +1,6 @@
 """`undertow campaign`: run a Monte Carlo study or a parameter sweep, and summarise it."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from rich.console import Console
 from rich.table import Table
@@ -13,6 +11,7 @@ from undertow.campaign.campaign_summary import endings, summary
 from undertow.campaign.prepare import Prepared, prepare
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import Results, load
+from undertow.cli.commands.understand import CampaignCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
@@ -27,30 +26,29 @@ from undertow.scenario.part_cache import PartCache
 from undertow.simulation.executors import check_cluster
 
 
-def campaign(
-    path: Path,
-    out: Path | None,
-    resume: bool,
-    workers: int | None,
-    where: str | None,
-    overwrite: bool,
-    allow_code: bool,
-    pdf: str | None,
-    replay: bool,
-) -> int:
-    """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code."""
-    check_pdf(pdf)
-    count = worker_count(workers)
-    if where is not None:
-        check_cluster(where)
-    with trials_folder(out, path.stem, _WRITTEN, resume, overwrite) as folder:
+def campaign(command: CampaignCommand) -> int:
+    """Run a campaign and write the results to `out`, or to a free folder under runs/; return the exit code.
+
+    With the word `status` in place of a campaign, print the progress of one.
+    """
+    if str(command.campaign) == "status":
+        return _status(command)
+    if command.folder is not None:
+        hint = f"To choose the results folder, use `--out {command.folder}`"
+        raise BadInput("DIR", "follow the word `status`", str(command.folder), hint=hint)
+    path, resume, replay = command.campaign, command.resume, command.replay
+    check_pdf(command.pdf)
+    count = worker_count(command.workers)
+    if command.cluster is not None:
+        check_cluster(command.cluster)
+    with trials_folder(command.out, path.stem, _WRITTEN, resume, command.overwrite) as folder:
         console = wide_console()
-        prepared = built_with_advice(console, lambda: prepare(path, allow_code))
+        prepared = built_with_advice(console, lambda: prepare(path, command.allow_code))
         if replay:
             check_replay([prepared.first])
         with resumable(folder, ["campaign", str(path), *(["--replay"] if replay else [])]):
-            run_trials(console, prepared, folder, None if resume else _WRITTEN, where, count)
-            return _conclude(console, prepared, folder, pdf, replay)
+            run_trials(console, prepared, folder, None if resume else _WRITTEN, command.cluster, count)
+            return _conclude(console, prepared, folder, command.pdf, replay)
 
 
 def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None, replay: bool) -> int:
@@ -74,17 +72,13 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | Non
     return DONE if set(found["status"]) <= {"completed"} else RUN_FAILED
 
 
-def refuse_second(argument: Path) -> NoReturn:
-    """Reject a second argument, which only `status` takes."""
-    raise BadInput(
-        "DIR", "follow the word `status`", str(argument), hint=f"To choose the results folder, use `--out {argument}`"
-    )
-
-
-def status(folder: Path, options: Sequence[str]) -> int:
-    """Print the progress of the campaign in a folder; `options` are those given by mistake: `status` takes none."""
-    if options:
-        raise BadInput(options[0], "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
+def _status(command: CampaignCommand) -> int:
+    """Print the progress of the campaign in a folder."""
+    folder = command.folder or Path()
+    for name in _OF_RUNS:
+        if getattr(command, name):
+            option = f"--{name.replace('_', '-')}"
+            raise BadInput(option, "be left out with `status`", "given", hint="Run: undertow campaign status DIR")
     try:
         results = load(folder)
     except FileNotFoundError:
@@ -105,6 +99,7 @@ def _write_worst(prepared: Prepared, trials: list[int], folder: Path) -> None:
             (new / f"trial-{trial:07d}.yaml").write_text(text, encoding="utf-8")
 
 
+_OF_RUNS = ("out", "resume", "workers", "cluster", "overwrite", "allow_code", "pdf", "replay")  # options
 _REPLAYED = 3  # trials in the replay
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 

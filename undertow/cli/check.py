@@ -8,6 +8,7 @@ from rich.text import Text
 
 from undertow.campaign.prepare import prepare
 from undertow.checks import check as checks
+from undertow.cli.commands.inspection import CheckCommand
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
@@ -17,11 +18,12 @@ from undertow.scenario.vehicle_file import is_vehicle_file
 from undertow.scenario.yaml_text import load
 
 
-def check(thing: str, options: Sequence[str], allow_code: bool) -> int:
+def check(command: CheckCommand) -> int:
     """Print the findings of a check and the derived quantities; return the exit code."""
+    thing, options = command.thing, command.option or []
     if is_vehicle_file(thing) and Path(thing).is_file() and kind_of(read(Path(thing)).data) == "campaign":
-        return _check_campaign(Path(thing), options, allow_code)
-    report = checks.check(thing, dict(map(_option, options)), allow_code)
+        return _check_campaign(Path(thing), options, command.allow_code)
+    report = checks.check(thing, dict(map(_option, options)), command.allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)

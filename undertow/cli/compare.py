@@ -12,6 +12,7 @@ from undertow.campaign.build_trials import build_trial
 from undertow.campaign.run_campaign import STORE
 from undertow.campaign.store_results import load
 from undertow.cli import results_folder
+from undertow.cli.commands.understand import CompareCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -40,24 +41,14 @@ _TIMES = "step_times.json"
 _WRITTEN = (STORE, "comparison.html", "comparison.json", *_TABLES.values(), _TIMES, "figures", "scenarios")
 
 
-def compare(
-    paths: Sequence[Path],
-    entries: str | None,
-    trials: int | None,
-    out: Path | None,
-    resume: bool,
-    workers: int | None,
-    overwrite: bool,
-    allow_code: bool,
-    pdf: str | None,
-    replay: bool,
-    budget: int | None = None,
-) -> int:
+def compare(command: CompareCommand) -> int:
     """Run a comparison and write the results to `out`, or to a free folder under runs/; return the exit code."""
-    check_pdf(pdf)
+    paths, entries, trials = command.scenarios, command.controllers, command.trials
+    budget, resume, replay = command.tune, command.resume, command.replay
+    check_pdf(command.pdf)
     if budget is not None:
         check_budget(budget)
-    count = worker_count(workers)
+    count = worker_count(command.workers)
     if trials is not None:
         checks.positive("--trials", trials)
     several = None if entries is None else [one for one in map(str.strip, entries.split(",")) if one]
@@ -65,18 +56,19 @@ def compare(
     again += ["--trials", str(trials)] if trials is not None else []
     again += ["--replay"] if replay else []
     again += ["--tune", str(budget)] if budget is not None else []
-    with trials_folder(out, f"{paths[0].stem}-comparison", (*_WRITTEN, FOLDER), resume, overwrite, FOLDER) as folder:
+    name, written = f"{paths[0].stem}-comparison", (*_WRITTEN, FOLDER)
+    with trials_folder(command.out, name, written, resume, command.overwrite, FOLDER) as folder:
         console = wide_console()
         if not resume:
             results_folder.remove(folder / FOLDER)
         with _tuning(console, folder, budget, again) as tuner:
-            prepare = lambda: prepare_comparison(paths, several, trials, allow_code, tuner)
+            prepare = lambda: prepare_comparison(paths, several, trials, command.allow_code, tuner)
             ready = built_with_advice(console, prepare)
         if replay:
             check_replay(ready.built)
         with resumable(folder, again):
             run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count)
-            return _conclude(console, ready, folder, pdf, replay)
+            return _conclude(console, ready, folder, command.pdf, replay)
 
 
 @contextlib.contextmanager

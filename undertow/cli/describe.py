@@ -9,6 +9,7 @@ from rich.table import Column, Table
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
 from undertow.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
+from undertow.cli.commands.inspection import DescribeCommand, ListCommand
 from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
@@ -29,13 +30,13 @@ _PARTS = (
 )
 
 
-def describe(name: str, json_schema: bool = False) -> None:
+def describe(command: DescribeCommand) -> None:
     """Print the description of a part, the keys of a scenario or campaign, the metrics, or the signals of every run.
 
     With `json_schema`, print the keys as a JSON schema.
     """
-    console = wide_console()
-    if json_schema:
+    console, name = wide_console(), command.name
+    if command.json_schema:
         if name not in _SCHEMAS:
             raise BadInput("--json-schema", f"follow `describe {' or '.join(_SCHEMAS)}`", f"given for `{name}`")
         print(json.dumps(_SCHEMAS[name](), indent=1))
@@ -91,8 +92,9 @@ def _show_table(console: Console, title: str, columns: tuple[str, ...], rows: li
     console.print(table)
 
 
-def list_parts(kind: str | None, as_json: bool = False) -> None:
+def list_parts(command: ListCommand) -> None:
     """Print the parts of one kind, or of all kinds, with one line each; of faults every pair of target and mode."""
+    kind, as_json = command.kind, command.as_json
     if kind is not None and kind not in catalogue.KINDS:
         raise BadInput("KIND", "be a kind of part", kind, hint=did_you_mean(kind, catalogue.KINDS))
     if kind == "faults":

@@ -1,9 +1,9 @@
 """`undertow export`: controller, navigation filter and vehicle for other places than undertow."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
+from undertow.cli.commands.deploy import ExportCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
@@ -20,32 +20,14 @@ from undertow.scenario.reading import read
 _PARTS = ("controller", "navigation", "vehicle")
 
 
-def export(
-    scenario: Path,
-    c99: Path | None,
-    fmu: Path | None,
-    part: str,
-    name: str | None,
-    output: str,
-    overwrite: bool,
-    allow_code: bool,
-    formats: dict[str, Any],
-) -> int:
+def export(command: ExportCommand) -> int:
     """Write a part of a scenario as C99, or controller and vehicle as FMUs, to folders; return the exit code.
-
-    Args:
-        scenario: file.
-        c99, fmu: folders; None for none.
-        part: that is written as C99.
-        name: begins the names in C; None for the usual one.
-        output: what the vehicle takes, as for `Autopilot`.
-        overwrite: whether to replace the files of an earlier export.
-        allow_code: whether the Python code that a result file names may run.
-        formats: precision, attitude and velocity, as for `export_controller`.
 
     Raises:
         BadInput: no folder is given, or something cannot be exported.
     """
+    c99, fmu, part, name, output = command.c99, command.fmu, command.part, command.name, command.output
+    formats = {"precision": command.precision, "attitude": command.attitude, "velocity": command.velocity}
     if c99 is None and fmu is None:
         raise BadInput("--c99", "be given: the folder for the files", hint="Or --fmu for units of co-simulation")
     checks.choice("--part", part, _PARTS)
@@ -59,17 +41,17 @@ def export(
     console = wide_console()
     say: Callable[[str], None] = lambda text: console.print(text, highlight=False, soft_wrap=True)
     with stage(console, "reading and building"):
-        built = build(read(scenario, allow_code=allow_code))
+        built = build(read(command.scenario, allow_code=command.allow_code))
     if c99 is not None:
         with stage(console, "C99 and its test"):
             exported = _in_c(built, part, name or part, output, formats)
-        exported.write(c99, overwrite)
+        exported.write(c99, command.overwrite)
         say(f"{len(exported.files)} files, {_kilobytes(exported)}: {c99}")
         say(f"To compile and test them: make -C {c99} test")
     if fmu is not None:
         with stage(console, "FMUs and their library"):
             units = export_fmu(built, output=output, **formats)
-        units.exported.write(fmu, overwrite, "--fmu")
+        units.exported.write(fmu, command.overwrite, "--fmu")
         say(f"{' and '.join(units.exported.files)}, {_kilobytes(units.exported)}: {fmu}")
         if units.without_library:
             say(f"They hold their sources only, because {units.without_library}. Compile these where they are used.")

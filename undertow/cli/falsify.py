@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from undertow.cli.commands.understand import FalsifyCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -28,29 +29,22 @@ _WRITTEN = ("falsify.json", "counterexample.yaml", "figures")
 _CHECKPOINT = "falsify.jsonl"
 
 
-def falsify_scenario(
-    scenario: Path,
-    out: Path | None,
-    method: str,
-    budget: int,
-    seed: int,
-    resume: bool,
-    overwrite: bool,
-    allow_code: bool,
-    pdf: str | None,
-) -> int:
+def falsify_scenario(command: FalsifyCommand) -> int:
     """Falsify a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
-    check_pdf(pdf)
+    scenario, resume = command.scenario, command.resume
+    method, budget, seed = command.method, command.budget, command.seed
+    check_pdf(command.pdf)
     checks.choice("--method", method, METHODS)
     if budget < 1:
         raise BadInput("--budget", "be at least 1 run", budget)
     if not 0 <= seed < 2**32:
         raise BadInput("--seed", "be between 0 and 2^32 - 1", seed)
-    console = wide_console()
-    text, first = read(scenario, allow_code=allow_code), Path("runs") / f"{scenario.stem}-falsified"
+    console, first = wide_console(), Path("runs") / f"{scenario.stem}-falsified"
+    text = read(scenario, allow_code=command.allow_code)
+    out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
-        output_folder(unfinished(first, _CHECKPOINT) if resume and out is None else out, first) as folder,
-        results_folder(folder, _WRITTEN, "falsify.json", overwrite) as draft,
+        output_folder(out, first) as folder,
+        results_folder(folder, _WRITTEN, "falsify.json", command.overwrite) as draft,
         checkpoint_in(folder, _CHECKPOINT, "falsify") as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
@@ -68,7 +62,7 @@ def falsify_scenario(
         if found.violation is not None:
             nominal, broken = (one.dataset for one in found.single_runs)
             plots["counterexample"] = lambda: beside_nominal_figure(nominal, broken)
-        warn_of(save_all(lambda: plots, draft.path / "figures", pdf).failures)
+        warn_of(save_all(lambda: plots, draft.path / "figures", command.pdf).failures)
     if found.violation is not None:
         console.print(_table(found))
     for line in _sentences(found, folder):

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
+from undertow.cli.commands.start import InitCommand
 from undertow.core import catalogue
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean
@@ -26,31 +27,25 @@ _THRUSTERS = {
 _DEFAULT = "bluerov2_heavy"  # of the template
 
 
-def init(path: Path, vehicle: str | None, controller: str | None, own_vehicle: bool, own_controller: bool) -> None:
+def init(command: InitCommand) -> None:
     """Write a scenario, its JSON schema for editors, and the files of own parts. No file is replaced.
-
-    Args:
-        path: folder, in which the scenario is called scenario.yaml; or the name of the scenario, ending in .yaml.
-        vehicle: of the catalogue, or a vehicle file; None for bluerov2_heavy.
-        controller: FILE.py:FUNCTION; None for pid.
-        own_vehicle: whether to write a vehicle file too, which the scenario names.
-        own_controller: whether to write a Python file with a controller too, which the scenario names.
 
     Raises:
         BadInput: options that do not go together, or a file of such a name is there.
         OSError: the files cannot be written; none of them is left.
     """
+    path, vehicle, controller = command.path, command.vehicle, command.controller
     scenario = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
     folder = scenario.parent
-    if own_vehicle and vehicle is not None:
+    if command.own_vehicle and vehicle is not None:
         raise BadInput("--vehicle", "be left out with --own-vehicle", vehicle)
-    if own_controller and controller is not None:
+    if command.own_controller and controller is not None:
         raise BadInput("--controller", "be left out with --own-controller", controller)
-    law = f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}" if own_controller else _law(controller, folder)
-    body = _VEHICLE if own_vehicle else _body(vehicle or _DEFAULT, folder)
+    law = f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}" if command.own_controller else _law(controller, folder)
+    body = _VEHICLE if command.own_vehicle else _body(vehicle or _DEFAULT, folder)
     contents = {scenario.name: _scenario(scenario.name, body, _THRUSTERS.get(body, _THRUSTERS[_DEFAULT]), law)}
-    contents |= {_VEHICLE: _template(_VEHICLE)} if own_vehicle else {}
-    contents |= {_CONTROLLER: _template(_CONTROLLER)} if own_controller else {}
+    contents |= {_VEHICLE: _template(_VEHICLE)} if command.own_vehicle else {}
+    contents |= {_CONTROLLER: _template(_CONTROLLER)} if command.own_controller else {}
     _check_free(folder, contents)
     if not (folder / _SCHEMA).exists():  # an earlier scenario brought it
         contents[_SCHEMA] = json.dumps(scenario_schema(), indent=1) + "\n"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from undertow.cli.commands.inspection import LogsCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder, results_folder
@@ -24,17 +25,17 @@ _UNIX = (9e8, 4.1e9)  # s since 1970, from 1998 to 2099
 _SCORED = ("score.json", "figures")
 
 
-def logs(words: Sequence[str], mapping: Path | None, out: Path | None, overwrite: bool, allow_code: bool) -> int:
+def logs(command: LogsCommand) -> int:
     """Do what the words say: FILE; `score` SCENARIO FILE; or `layout`. Return the exit code."""
-    first, *rest = words
+    first, *rest = command.words
     if first == "layout" and not Path(first).exists():
         _count(rest, 0, "layout")
-        return _layout(out or _LAYOUT, overwrite)
+        return _layout(command.out or _LAYOUT, command.overwrite)
     if first == "score" and not Path(first).exists():
         _count(rest, 2, "score SCENARIO FILE")
-        return _score(Path(rest[0]), Path(rest[1]), mapping, out, overwrite, allow_code)
+        return _score(Path(rest[0]), Path(rest[1]), command)
     _count(rest, 0, "FILE")
-    return _described(Path(first), mapping, out, overwrite)
+    return _described(Path(first), command.mapping, command.out, command.overwrite)
 
 
 def _count(rest: Sequence[str], number: int, form: str) -> None:
@@ -115,9 +116,7 @@ def _layout(out: Path, overwrite: bool) -> int:
     return DONE
 
 
-def _score(
-    scenario: Path, path: Path, mapping: Path | None, out: Path | None, overwrite: bool, allow_code: bool
-) -> int:
+def _score(scenario: Path, path: Path, command: LogsCommand) -> int:
     """Score the model of a scenario against a log, and write score.json and figures/ to a folder."""
     from undertow.core.json_text import to_json
     from undertow.interop.log_score import AXES, UNITS, score
@@ -128,11 +127,12 @@ def _score(
 
     console = wide_console()
     with (
-        output_folder(out, Path("runs") / f"{scenario.stem}-score") as folder,
-        results_folder(folder, _SCORED, "score.json", overwrite) as draft,
+        output_folder(command.out, Path("runs") / f"{scenario.stem}-score") as folder,
+        results_folder(folder, _SCORED, "score.json", command.overwrite) as draft,
     ):
         with stage(console, "reading and building"):
-            log, built = read_log(path, mapping), build(read(scenario, allow_code=allow_code))
+            log = read_log(path, command.mapping)
+            built = build(read(scenario, allow_code=command.allow_code))
         with stage(console, "predicting"):
             found = interruptible(lambda: score(built, log))
         summary = {"log": log.source} | found.summary()

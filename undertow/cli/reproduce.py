@@ -1,8 +1,8 @@
 """`undertow reproduce`: reproduce the paper."""
 
 import json
-from pathlib import Path
 
+from undertow.cli.commands.paper import ReproduceCommand
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
@@ -13,12 +13,12 @@ from undertow.simulation.processes import worker_processes
 _WRITTEN = ("report.html", "ablations.html", "results.json", "figures", "runs", "scenarios", "campaigns")
 
 
-def reproduce(out: Path, quick: bool, pdf: str | None) -> None:
+def reproduce(command: ReproduceCommand) -> None:
     """Write the report to `out`, with PDF figures of a width where one is given, and print its verdicts."""
-    check_pdf(pdf)
+    check_pdf(command.pdf)
     console = wide_console()
     with (
-        output_folder(out, out) as folder,
+        output_folder(command.out, command.out) as folder,
         results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
         shares(console) as progress,
         worker_processes(preload="undertow.reproduction.reproduce") as pool,
@@ -27,11 +27,11 @@ def reproduce(out: Path, quick: bool, pdf: str | None) -> None:
         from undertow.report.reproduction.report import write
         from undertow.reproduction.reproduce import reproduce as run
 
-        found = interruptible(lambda: run(draft.path, quick, progress, pool))
+        found = interruptible(lambda: run(draft.path, command.quick, progress, pool))
         progress("figures and report", 0.9)
         draft.publish()  # before the figures, which may fail
-        page = interruptible(lambda: write(found, draft.path, pdf, pool))
-    for claim in json.loads((out / "results.json").read_text(encoding="utf-8"))["claims"]:
+        page = interruptible(lambda: write(found, draft.path, command.pdf, pool))
+    for claim in json.loads((command.out / "results.json").read_text(encoding="utf-8"))["claims"]:
         line = f"{claim['id']:<4}{claim['verdict']}: {claim['claim']}"
         console.print(line, highlight=False, soft_wrap=True)
     console.print(f"Report: {folder / page.relative_to(draft.path)}", highlight=False, soft_wrap=True)

@@ -3,9 +3,9 @@
 import contextlib
 import os
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+from undertow.cli.commands.deploy import Ros2Command
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain, report
 from undertow.cli.interruptible import interruptible
 from undertow.core import checks
@@ -18,63 +18,41 @@ ROLES = ("controller", "vehicle")
 Run = Callable[[Any], int]  # runs a node over a link until it ends
 
 
-class Options(NamedTuple):
-    """Options of the command, as given; None where one was not."""
-
-    role: str
-    output: str | None
-    pace: str | None
-    use_sim_time: bool
-    remap: list[str]
-    rate: float | None
-    duration: float | None
-    max_age: float
-    domain: int | None
-    localhost: bool
-    reliability: str
-    world_frame: list[str]
-    body_frame: str
-    bag: Path | None
-    storage: str
-    unsupervised: bool
-    allow_code: bool
-
-
-def ros2(scenario: Path, options: Options) -> int:
+def ros2(command: Ros2Command) -> int:
     """Run a node until it ends or is interrupted; return the exit code."""
-    checks.choice("--as", options.role, ROLES)
+    checks.choice("--as", command.role, ROLES)
     for name, role, value in (
-        ("--pace", "vehicle", options.pace),
-        ("--output", "controller", options.output),
-        ("--use-sim-time", "controller", options.use_sim_time or None),
-        ("--unsupervised", "controller", options.unsupervised or None),
+        ("--pace", "vehicle", command.pace),
+        ("--output", "controller", command.output),
+        ("--use-sim-time", "controller", command.use_sim_time or None),
+        ("--unsupervised", "controller", command.unsupervised or None),
     ):
-        if value is not None and role != options.role:
-            raise BadInput(name, f"be left out with --as {options.role}", value)
+        if value is not None and role != command.role:
+            raise BadInput(name, f"be left out with --as {command.role}", value)
     try:
-        return _run(scenario, options)
+        return _run(command)
     except ModuleNotFoundError as error:  # the extra is missing
         if error.name not in ("cyclonedds", "rosbags"):
             raise
         raise BadInput("", "", str(error)) from None
 
 
-def _run(scenario: Path, options: Options) -> int:
+def _run(command: Ros2Command) -> int:
     from undertow.interop.ros2.from_messages import Frames
     from undertow.interop.ros2.link import Link
     from undertow.interop.ros2.node import Reporter, Topics
     from undertow.interop.ros2.write_bag import BagWriter
 
-    names = Topics().remapped(options.remap)
-    frames = Frames(tuple(options.world_frame) or Frames().world, options.body_frame)
+    names = Topics().remapped(command.remap or [])
+    frames = Frames(tuple(command.world_frame or ()) or Frames().world, command.body_frame)
     reporter = Reporter(report)
-    domain, localhost = _domain(options.domain), options.localhost or _environment_says_localhost()
-    bag = None if options.bag is None else BagWriter(options.bag, options.storage)
-    reporter.say(f"compiling the {options.role}")
-    compiled = _compiled_controller if options.role == "controller" else _compiled_vehicle
-    run = compiled(scenario, options, names, frames, reporter)
+    domain, localhost = _domain(command.domain), command.localhost or _environment_says_localhost()
+    bag = None if command.bag is None else BagWriter(command.bag, command.storage)
+    reporter.say(f"compiling the {command.role}")
+    compiled = _compiled_controller if command.role == "controller" else _compiled_vehicle
+    run = compiled(command, names, frames, reporter)
     missing: list[str] = []
-    with _recording(bag, missing) as recording, Link(domain, localhost, options.reliability, recording) as link:
+    with _recording(bag, missing) as recording, Link(domain, localhost, command.reliability, recording) as link:
         link.on_trouble = reporter.trouble
         code = run(link)
     return max(code, FILES_FAILED if missing else DONE)
@@ -96,43 +74,43 @@ def _recording(bag: Any, missing: list[str]) -> Iterator[BackgroundWriter | None
             complain(f"{bag.folder}: {sentence}")
 
 
-def _compiled_controller(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
+def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
     from undertow.cli.paced_loop import run_until_signal
     from undertow.interop.ros2.compiled_controller import CompiledController
     from undertow.interop.ros2.controller_link import ControllerLink, ControllerSettings
     from undertow.realtime.loop_settings import LoopSettings
 
-    if options.duration is not None:
-        checks.positive("--duration", options.duration, "s", finite=False)
-    options_of_law = {"unsupervised": options.unsupervised, "allow_code": options.allow_code}
-    made = lambda: CompiledController(scenario, options.output or "input", options.rate, **options_of_law)
+    if command.duration is not None:
+        checks.positive("--duration", command.duration, "s", finite=False)
+    options_of_law = {"unsupervised": command.unsupervised, "allow_code": command.allow_code}
+    made = lambda: CompiledController(command.scenario, command.output or "input", command.rate, **options_of_law)
     controller = interruptible(made)
-    settings = ControllerSettings(options.max_age, options.use_sim_time, names, frames)
+    settings = ControllerSettings(command.max_age, command.use_sim_time, names, frames)
 
     def run(link: Any) -> int:
         topics = ControllerLink(controller, link, settings, reporter)
         reporter.say(f"{names.odom}, {names.target_pose} -> {topics.topic}. To end: Ctrl-C")
-        loop = LoopSettings(max_age=options.max_age)
-        return run_until_signal(controller.autopilot, topics, loop, options.duration, reporter.say)
+        loop = LoopSettings(max_age=command.max_age)
+        return run_until_signal(controller.autopilot, topics, loop, command.duration, reporter.say)
 
     return run
 
 
-def _compiled_vehicle(scenario: Path, options: Options, names: Any, frames: Any, reporter: Any) -> Run:
+def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
     from undertow.autopilot.vehicle import Vehicle
     from undertow.interop.ros2.checked_scenario import check_vehicle
     from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
     from undertow.scenario.build import build
     from undertow.scenario.reading import read
 
-    if options.rate is not None:
-        checks.positive("--rate", options.rate, "Hz")
-    period = None if options.rate is None else 1 / options.rate
-    pace, duration = options.pace or "real-time", options.duration
-    settings = VehicleSettings(pace, duration, options.max_age, topics=names, frames=frames)
+    if command.rate is not None:
+        checks.positive("--rate", command.rate, "Hz")
+    period = None if command.rate is None else 1 / command.rate
+    pace, duration = command.pace or "real-time", command.duration
+    settings = VehicleSettings(pace, duration, command.max_age, topics=names, frames=frames)
 
     def made() -> Vehicle:
-        built = build(read(scenario, allow_code=options.allow_code))
+        built = build(read(command.scenario, allow_code=command.allow_code))
         check_vehicle(built)
         return Vehicle(built, sampling_time=period, attitude="quaternion")
 

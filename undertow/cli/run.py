@@ -10,13 +10,14 @@ import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import typer
 
 from undertow.autopilot.autopilot import Autopilot
 from undertow.autopilot.measured_motion import Format
+from undertow.cli.commands.deploy import RunCommand
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import EndingSignal, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
@@ -45,94 +46,74 @@ _BEFORE = ".unbegun"  # where the log is before the first step, when an earlier 
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
 
 
-class Options(NamedTuple):
-    """Options of the command, as given; None where one was not."""
-
-    link: str
-    serve: str | None
-    fast: bool
-    duration: float | None
-    safe: str
-    deadline: float | None
-    max_age: float
-    patience: float
-    priority: int | None
-    cpu: int | None
-    out: Path | None
-    overwrite: bool
-    json: bool
-    unsupervised: bool
-    allow_code: bool
-
-
-def run(scenario: Path, options: Options) -> int:
+def run(command: RunCommand) -> int:
     """Run until the end of the scenario, of the link, or Ctrl-C; return the exit code."""
-    _check(options)
-    text = read_for_link(scenario, allow_code=options.allow_code, unsupervised=options.unsupervised)
+    _check(command)
+    text = read_for_link(command.scenario, allow_code=command.allow_code, unsupervised=command.unsupervised)
     built = interruptible(lambda: build(text))
     if built.scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled for `undertow run`", built.scenario.loop.kind)
-    if options.serve is not None:
-        return _serve(built, options)
-    if options.link.startswith("log:"):
-        return _replay(text, built, options)
-    return _controlled(scenario, built, options)
+    if command.serve is not None:
+        return _serve(built, command)
+    if command.link.startswith("log:"):
+        return _replay(text, built, command)
+    return _controlled(built, command)
 
 
-def _check(options: Options) -> None:
-    kind, colon, rest = options.link.partition(":")
-    if not (options.link == "vehicle" or (kind in ("udp", "log") and colon and rest)):
-        raise BadInput("--link", "be vehicle, udp:HOST:PORT or log:FILE", repr(options.link))
-    if options.fast and kind == "udp":
-        raise BadInput("--fast", "be left out with a link to a real vehicle", options.link)
+def _check(command: RunCommand) -> None:
+    kind, colon, rest = command.link.partition(":")
+    if not (command.link == "vehicle" or (kind in ("udp", "log") and colon and rest)):
+        raise BadInput("--link", "be vehicle, udp:HOST:PORT or log:FILE", repr(command.link))
+    if command.fast and kind == "udp":
+        raise BadInput("--fast", "be left out with a link to a real vehicle", command.link)
     for name in ("duration", "deadline", "max_age", "patience"):
-        value = getattr(options, name)
+        value = getattr(command, name)
         if value is not None:
             checks.positive(f"--{name.replace('_', '-')}", value, "s", finite=name != "duration")
 
 
-def _controlled(path: Path, built: Built, options: Options) -> int:
+def _controlled(built: Built, command: RunCommand) -> int:
     """The loop with the vehicle of the scenario, or one behind UDP, with a log."""
-    own, period, stop = options.link == "vehicle", float(built.scenario.loop.dt), EndingSignal()
-    duration = options.duration or (built.scenario.loop.duration if own else math.inf)
+    own, period, stop = command.link == "vehicle", float(built.scenario.loop.dt), EndingSignal()
+    duration = command.duration or (built.scenario.loop.duration if own else math.inf)
     steps = duration if math.isinf(duration) else round(duration / period)
     if steps < 1:
         raise BadInput("--duration", f"be at least one sampling time ({period:g} s)", f"{duration:g} s")
-    safe = _safe(options.safe, built.closed_loop.plant.inputs())
-    settings = LoopSettings(safe, options.deadline, options.max_age, options.patience)
-    clock = SimulatedClock() if options.fast else MonotonicClock()
-    with scheduled(options.priority, options.cpu):  # whether it is permitted, before anything is written
+    safe = _safe(command.safe, built.closed_loop.plant.inputs())
+    settings = LoopSettings(safe, command.deadline, command.max_age, command.patience)
+    clock = SimulatedClock() if command.fast else MonotonicClock()
+    with scheduled(command.priority, command.cpu):  # whether it is permitted, before anything is written
         pass
-    with output_folder(options.out, Path("runs") / path.stem) as folder:
-        check_folder(folder, _WRITTEN, "run.mcap", options.overwrite)
+    with output_folder(command.out, Path("runs") / command.scenario.stem) as folder:
+        check_folder(folder, _WRITTEN, "run.mcap", command.overwrite)
         for one in built.advice():
             typer.echo(f"Advice: {one.sentence}", err=True)
-        link = VehicleLink(built) if own else UdpVehicleLink(options.link.removeprefix("udp:"), built)
+        link = VehicleLink(built) if own else UdpVehicleLink(command.link.removeprefix("udp:"), built)
         given, troubles = built if own else _starting_anywhere(built), list[str]()
-        with contextlib.nullcontext() if options.json else stage(wide_console(), "compiling"):
+        with contextlib.nullcontext() if command.as_json else stage(wide_console(), "compiling"):
             autopilot = interruptible(lambda: _autopilot(given, link.form or Format()))
         with _logging(autopilot, folder, troubles):
             loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked, lambda: _begin_log(folder))
-            say = (lambda line: None) if options.json else typer.echo
-            say(f"Link {options.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
-            with stop.listening(), scheduled(options.priority, options.cpu):
+            say = (lambda line: None) if command.as_json else typer.echo
+            say(f"Link {command.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
+            with stop.listening(), scheduled(command.priority, command.cpu):
                 reason = loop.run(periods=steps)
         if loop.statistics.steps:
-            found = _data(loop.statistics, link, autopilot, reason, options)
+            found = _data(loop.statistics, link, autopilot, reason, command)
             texts = {"scenario.yaml": dump(built.resolved), "statistics.json": json.dumps(found, indent=2) + "\n"}
             for name, text in texts.items():
                 try:
                     write_whole(folder / name, text)
                 except OSError as error:
                     troubles.append(f"{folder / name} could not be written: {error.strerror or error}")
-            _print(found, folder, options.json)
+            _print(found, folder, command.as_json)
         else:
             remove(folder / _BEFORE)
             with contextlib.suppress(OSError):  # it held something before
                 folder.rmdir()
     for trouble in troubles:
         complain(trouble)
-    return max(_ending(reason, link, options, stop), FILES_FAILED if troubles else DONE)
+    return max(_ending(reason, link, command, stop), FILES_FAILED if troubles else DONE)
 
 
 def _safe(text: str, actuators: int) -> Any:
@@ -183,22 +164,22 @@ def _autopilot(built: Built, form: Format) -> Autopilot:
 
 
 def _data(
-    seen: LoopStatistics, link: AbstractLink, autopilot: Autopilot, reason: Reason, options: Options
+    seen: LoopStatistics, link: AbstractLink, autopilot: Autopilot, reason: Reason, command: RunCommand
 ) -> dict[str, Any]:
     """Everything about a run as JSON; times in s."""
     machine = {"python": platform.python_version(), "system": platform.platform(), "processors": os.cpu_count()}
     return {
-        "link": options.link,
-        "clock": "simulated" if options.fast else "monotonic",
+        "link": command.link,
+        "clock": "simulated" if command.fast else "monotonic",
         "ended": link.ended or reason.value,
         "sampling_time": autopilot.sampling_time,
-        "deadline": options.deadline or autopilot.sampling_time,
+        "deadline": command.deadline or autopilot.sampling_time,
         "backend": autopilot.backend,
         **seen.as_data(),
         **_supervision(autopilot),
         "link_counts": dict(link.counts()),
         "autopilot_counts": autopilot.counts,
-        "machine": machine | {"priority": options.priority, "processor": options.cpu},
+        "machine": machine | {"priority": command.priority, "processor": command.cpu},
     }
 
 
@@ -237,26 +218,26 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
     console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 
 
-def _ending(reason: Reason, link: AbstractLink, options: Options, stop: EndingSignal) -> int:
+def _ending(reason: Reason, link: AbstractLink, command: RunCommand, stop: EndingSignal) -> int:
     """The exit code, with a line about a failure."""
     if reason is Reason.STOPPED:
         return 128 + stop.number
     if link.failed:
         complain(link.ended)
     elif reason is Reason.LINK_LOST:
-        complain(f"no measurement for {options.max_age:g} s: the safe output was sent, and the run ended")
+        complain(f"no measurement for {command.max_age:g} s: the safe output was sent, and the run ended")
     elif reason is Reason.STALLED:
         said = "the controller stood still for longer than --max-age"
-        complain(f"{said} ({options.max_age:g} s): the safe output was sent, and the run ended")
+        complain(f"{said} ({command.max_age:g} s): the safe output was sent, and the run ended")
     elif reason is Reason.NO_START:
-        complain(f"no first measurement within {options.patience:g} s over {options.link}; nothing was written")
+        complain(f"no first measurement within {command.patience:g} s over {command.link}; nothing was written")
     failed = (Reason.LINK_LOST, Reason.STALLED, Reason.NO_START)
     return RUN_FAILED if link.failed or reason in failed else DONE
 
 
-def _replay(text: Text, built: Built, options: Options) -> int:
+def _replay(text: Text, built: Built, command: RunCommand) -> int:
     """Feed a log to the controller, and compare the commands."""
-    link = LogLink(Path(options.link.removeprefix("log:")), built.closed_loop.plant)
+    link = LogLink(Path(command.link.removeprefix("log:")), built.closed_loop.plant)
     form = link.form or Format()
     if link.precision != built.scenario.precision:
         raise BadInput("precision", f"be {link.precision}, as in the log", built.scenario.precision)
@@ -267,7 +248,7 @@ def _replay(text: Text, built: Built, options: Options) -> int:
     reason = RealTimeLoop(autopilot, link, SimulatedClock()).run()
     replayed, apart = link.counts()["replayed"], link.differences()
     data = {"replayed": replayed, "ended": reason.value, "differences": [one._asdict() for one in apart]}
-    if options.json:
+    if command.as_json:
         typer.echo(json.dumps(data, indent=2))
     elif apart:
         unit = autopilot.unit
@@ -282,11 +263,11 @@ def _replay(text: Text, built: Built, options: Options) -> int:
     return RUN_FAILED if apart else DONE
 
 
-def _serve(built: Built, options: Options) -> int:
+def _serve(built: Built, command: RunCommand) -> int:
     """Be the simulated vehicle at the other end of a link by UDP."""
-    stop, server = EndingSignal(), interruptible(lambda: UdpVehicleServer(built, str(options.serve)))
-    typer.echo(f"The vehicle listens on {options.serve}. To end: Ctrl-C")
-    end = math.inf if options.duration is None else time.monotonic() + options.duration
+    stop, server = EndingSignal(), interruptible(lambda: UdpVehicleServer(built, str(command.serve)))
+    typer.echo(f"The vehicle listens on {command.serve}. To end: Ctrl-C")
+    end = math.inf if command.duration is None else time.monotonic() + command.duration
     try:
         with stop.listening():
             server.serve(lambda: stop.asked() or time.monotonic() >= end)

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from undertow.checks.flow_stability import flow_advice
 from undertow.checks.vehicle_lint import vehicle_advice
+from undertow.cli.commands.start import SimulateCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -33,48 +34,40 @@ if TYPE_CHECKING:
 _WRITTEN = ("run.nc", "run.mcap", "metrics.json", "scenario.yaml", "figures", "run.html")
 
 
-def simulate(
-    scenario: Path,
-    out: Path | None,
-    overwrite: bool,
-    prediction: bool | None,
-    allow_code: bool,
-    pdf: str | None,
-    video: Path | None,
-    rerun: Path | None,
-) -> int:
+def simulate(command: SimulateCommand) -> int:
     """Run a scenario and write the results to `out`, or to a free folder under runs/; return the exit code.
 
     Without `prediction` (None) there is one where it says something.
     """
-    check_pdf(pdf)
+    scenario, video, rerun = command.scenario, command.video, command.rerun
+    check_pdf(command.pdf)
     console = wide_console()
     with (
-        output_folder(out, Path("runs") / scenario.stem) as folder,
-        results_folder(folder, _WRITTEN, "run.nc", overwrite) as draft,
+        output_folder(command.out, Path("runs") / scenario.stem) as folder,
+        results_folder(folder, _WRITTEN, "run.nc", command.overwrite) as draft,
         plotting_process() as plotting,
         ThreadPoolExecutor(1) as thread,
     ):
         if video is not None:
             from undertow.report.replay.video import check_video
 
-            check_video(video, folder, overwrite)
+            check_video(video, folder, command.overwrite)
         if rerun is not None:
             from undertow.interop.rerun_file import check_rerun
 
-            check_rerun(rerun, folder, overwrite)
-        result = _run(scenario, console, allow_code, video is not None)
+            check_rerun(rerun, folder, command.overwrite)
+        result = _run(scenario, console, command.allow_code, video is not None)
         write(result, draft.path)
         repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-        plotting.plot(folder / "run.nc", pdf)
-        predicting = None if prediction is False else thread.submit(_predicted, result)
+        plotting.plot(folder / "run.nc", command.pdf)
+        predicting = None if command.prediction is False else thread.submit(_predicted, result)
         _print_results(result, folder, console)
         code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
         # What only the rest needs is imported now: users read the results meanwhile.
         from undertow.cli.run_presentation import present
 
-        replay = present(result, plotting, predicting, bool(prediction), draft, folder, console)
+        replay = present(result, plotting, predicting, bool(command.prediction), draft, folder, console)
     if video is not None and replay is not None:
         from undertow.report.replay.video import write_video
 

@@ -5,11 +5,10 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from undertow.cli import exit_codes
+from undertow.cli.commands.inspection import SoakCommand
 from undertow.cli.interruptible import interruptible
 from undertow.cli.kept_commands import kept
 from undertow.core.errors import BadInput
@@ -18,51 +17,23 @@ _WRITTEN = ("soak.json", "soak.html", "failures")
 _SHOWN = 20  # failures that are printed
 
 
-def soak(
-    parts: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[PART]...", help="inputs, kills, hours, faults, controls, links. Default: all."),
-    ] = None,
-    inputs: Annotated[int | None, typer.Option(metavar="N", help="Hostile inputs. Default: 2000.")] = None,
-    kills: Annotated[int | None, typer.Option(metavar="N", help="Ended processes. Default: 5.")] = None,
-    hours: Annotated[float | None, typer.Option(metavar="H", help="Simulated vehicle-hours. Default: 4.")] = None,
-    faults: Annotated[int | None, typer.Option(metavar="N", help="Runs with random faults. Default: 500.")] = None,
-    links: Annotated[int | None, typer.Option(metavar="N", help="Runs of each link command. Default: 20.")] = None,
-    minutes: Annotated[
-        float | None, typer.Option(metavar="M", help="Begin nothing further after this time. Default: no limit.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Default: from the clock; it is printed.")] = None,
-    short: Annotated[bool, typer.Option("--short", help="A little of each, in three minutes.")] = False,
-    replay: Annotated[
-        str | None,
-        typer.Option(metavar="WHAT", help="Repeat failures alone: a file soak.json, or an identity from one."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder for the results. Default: runs/soak, or the next free one."),
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier soak in DIR.")] = False,
-) -> int:
-    """Attack undertow itself, and count what must never happen.
-
-    The command tries thousands of hostile files and command lines, kills campaigns and resumes them, simulates hours in
-    waves and noise, injects random faults, checks that an unprotected law fails where it must, and attacks the commands
-    that control a vehicle. It writes soak.json, soak.html, and the files of each failed input. The exit code is 1 if
-    there was a never-event.
-    """
+def soak(command: SoakCommand) -> int:
+    """Attack undertow itself; the exit code is 1 if there was a never-event."""
     from undertow.soak import soak as soaking
 
-    if replay is not None:
-        return _replayed(replay)
-    amounts = soaking.SHORT if short else soaking.Amounts()
-    given = {"inputs": inputs, "kills": kills, "hours": hours, "faults": faults, "links": links}
-    amounts = amounts._replace(**{name: _count(name, value) for name, value in given.items() if value is not None})
-    asked = [part for part in soaking.check_parts(parts or []) if getattr(amounts, part, 1)]
+    if command.replay is not None:
+        return _replayed(command.replay)
+    amounts, parts = soaking.SHORT if command.short else soaking.Amounts(), command.parts or []
+    for name in ("inputs", "kills", "hours", "faults", "links"):
+        value = getattr(command, name)
+        if value is not None:
+            amounts = amounts._replace(**{name: _count(name, value)})
+    asked = [part for part in soaking.check_parts(parts) if getattr(amounts, part, 1)]
     if not asked:
-        raise BadInput("PART", "be a part of which there is more than nothing", ", ".join(parts or []) or None)
-    seed = int(time.time()) if seed is None else seed
-    limit = float("inf") if minutes is None else _count("minutes", minutes)
-    return _soak(asked, amounts, seed, limit, out, overwrite)
+        raise BadInput("PART", "be a part of which there is more than nothing", ", ".join(parts) or None)
+    seed = int(time.time()) if command.seed is None else command.seed
+    limit = float("inf") if command.minutes is None else _count("minutes", command.minutes)
+    return _soak(asked, amounts, seed, limit, command.out, command.overwrite)
 
 
 def attacked(arguments: Sequence[str]) -> int:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from undertow.cli.commands.fit import TuneCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
@@ -28,40 +29,29 @@ _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _CHECKPOINT = "tuning.jsonl"
 
 
-def tune_scenario(
-    scenario: Path,
-    out: Path | None,
-    method: str,
-    budget: float,
-    resume: bool,
-    overwrite: bool,
-    allow_code: bool,
-    pdf: str | None,
-    started: float,
-) -> int:
-    """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code.
-
-    The budget begins at `started`, of `time.perf_counter()`.
-    """
-    check_pdf(pdf)
+def tune_scenario(command: TuneCommand) -> int:
+    """Tune a scenario and write the results to `out`, or to a free folder under runs/; return the exit code."""
+    method, budget, resume = command.method, command.budget, command.resume
+    check_pdf(command.pdf)
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
-    console = wide_console()
-    text, first = read(scenario, allow_code=allow_code), Path("runs") / f"{scenario.stem}-tuned"
+    console, first = wide_console(), Path("runs") / f"{command.scenario.stem}-tuned"
+    text = read(command.scenario, allow_code=command.allow_code)
+    out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
-        output_folder(unfinished(first, _CHECKPOINT) if resume and out is None else out, first) as folder,
-        results_folder(folder, _WRITTEN, "tuning.json", overwrite) as draft,
+        output_folder(out, first) as folder,
+        results_folder(folder, _WRITTEN, "tuning.json", command.overwrite) as draft,
         checkpoint_in(folder, _CHECKPOINT, "tune") as checkpoint,
     ):
         with _live(console, budget) as (say, watch):
-            options: dict[str, Any] = {"method": method, "budget": budget, "started": started, "resume": resume}
+            options: dict[str, Any] = {"method": method, "budget": budget, "started": command.since, "resume": resume}
             found = interruptible(lambda: tune(text, checkpoint, **options, say=say, watch=watch))
         data = as_data(found)
         (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         draft.publish()  # before the figure, which may fail
         checkpoint.unlink()
-        warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures", pdf).failures)
+        warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures", command.pdf).failures)
     console.print(_table(found))
     for line in _sentences(found):
         console.print(line, highlight=False, soft_wrap=True)

@@ -1,7 +1,7 @@
 """Options that several commands have, as typer declares them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -40,3 +40,16 @@ Replay = Annotated[
         "controller. With --resume, add the replay to existing results.",
     ),
 ]
+
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")]
+
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Continue what was interrupted in DIR, or add trials; what is done is kept.")
+]
+
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")]
+
+
+def results(default: str) -> Any:
+    """The option `--out` of a command whose results are in a folder; `default` says which one without it."""
+    return typer.Option(metavar="DIR", help=f"Folder for the results. Default: {default}, or the next free one.")

@@ -1,0 +1,57 @@
+"""A command of the command line: options, help, and the function that is imported when it runs."""
+
+import dataclasses
+import importlib
+import inspect
+import time
+from collections.abc import Callable
+from typing import Any, ClassVar, get_type_hints
+
+
+@dataclasses.dataclass(frozen=True)
+class Command:
+    """A command. Its fields are its arguments and options, as typer declares them; its docstring is its help.
+
+    The function gets the command, with what was given, and returns the exit code or None for 0. Nothing but typer is
+    imported before, so that help and mistakes are answered at once.
+
+    Attributes:
+        runs: `module:function`.
+        named: the word after `undertow`; "" for that of the function.
+        since: when the command line was read, s, of `time.perf_counter`.
+    """
+
+    runs: ClassVar[str]
+    named: ClassVar[str] = ""
+    since: float = dataclasses.field(init=False, default_factory=time.perf_counter)
+
+    @classmethod
+    def word(cls) -> str:
+        """The word after `undertow`."""
+        return cls.named or cls.runs.rpartition(":")[2]
+
+    @classmethod
+    def sentence(cls) -> str:
+        """What the command does."""
+        return (cls.__doc__ or "").partition("\n")[0]
+
+    @classmethod
+    def callback(cls) -> Callable[..., int | None]:
+        """The function that typer makes a command of."""
+
+        def run(**given: Any) -> int | None:
+            module, _, function = cls.runs.partition(":")
+            return getattr(importlib.import_module(module), function)(cls(**given))
+
+        hints = get_type_hints(cls, include_extras=True)
+        fields = [field for field in dataclasses.fields(cls) if field.init]
+        run.__name__, run.__doc__ = cls.word(), cls.__doc__
+        run.__annotations__ = {field.name: hints[field.name] for field in fields}
+        run.__signature__ = inspect.Signature([_parameter(field, hints[field.name]) for field in fields])  # type: ignore[attr-defined]
+        return run
+
+
+def _parameter(field: dataclasses.Field, annotation: Any) -> inspect.Parameter:
+    missing = field.default is dataclasses.MISSING
+    default = inspect.Parameter.empty if missing else field.default
+    return inspect.Parameter(field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
