@@ -203,14 +203,15 @@ class Autopilot(Uncopied):
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
-        held = np.full_like(before, np.nan) if applied is None else before
+        held = np.full_like(before, np.nan) if applied is None else before.copy()  # the caller's may change
         self._received = ReceivedStep(motion, report, self._target(target), self._health(health), held, 0.0)
         put(self._begin.inputs, self._received[:4])
         self._begin()
         self._clock.begin()
         if target is None:  # the reference begins here
             self._place_reference(self._begin.outputs[0].y.position)
-            put(self._begin.inputs.target, self._target(None))
+            self._received = self._received._replace(target=self._target(None))
+            put(self._begin.inputs.target, self._received.target)
             self._begin()
         if not np.isfinite(self._begin.outputs[1].command).all():
             raise BadInput(

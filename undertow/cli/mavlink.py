@@ -39,4 +39,5 @@ def mavlink(command: MavlinkCommand) -> int:
         link.drain()  # what came while the controller was compiled
         report(f"MAVLink on UDP port {link.port}. Channels of the thrusters: {companion.channels}")
         settings = LoopSettings(max_age=command.timeout, from_safe=True)
-        return run_until_signal(companion.autopilot, CompanionLink(companion, link), settings, command.duration, report)
+        paced = CompanionLink(companion, link)
+        return run_until_signal(companion.autopilot, paced, settings, command.duration, report, command.log)

@@ -26,6 +26,7 @@ def ros2(command: Ros2Command) -> int:
         ("--output", "controller", command.output),
         ("--use-sim-time", "controller", command.use_sim_time or None),
         ("--unsupervised", "controller", command.unsupervised or None),
+        ("--log", "controller", command.log),
     ):
         if value is not None and role != command.role:
             raise BadInput(name, f"be left out with --as {command.role}", value)
@@ -91,7 +92,7 @@ def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter
         topics = ControllerLink(controller, link, settings, reporter)
         reporter.say(f"{names.odom}, {names.target_pose} -> {topics.topic}. To end: Ctrl-C")
         loop = LoopSettings(max_age=command.max_age)
-        return run_until_signal(controller.autopilot, topics, loop, command.duration, reporter.say)
+        return run_until_signal(controller.autopilot, topics, loop, command.duration, reporter.say, command.log)
 
     return run
 

@@ -7,8 +7,6 @@ import math
 import os
 import platform
 import time
-import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +20,7 @@ from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import EndingSignal, interruptible
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
+from undertow.cli.step_logs import logging_to
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.core import checks
 from undertow.core.atomic_io import sync, write_whole
@@ -92,7 +91,8 @@ def _controlled(built: Built, command: RunCommand) -> int:
         given, troubles = built if own else _starting_anywhere(built), list[str]()
         with contextlib.nullcontext() if command.as_json else stage(wide_console(), "compiling"):
             autopilot = interruptible(lambda: _autopilot(given, link.form or Format()))
-        with _logging(autopilot, folder, troubles):
+        (folder / _BEFORE).mkdir(parents=True, exist_ok=True)
+        with logging_to(folder / _BEFORE / "run.mcap", autopilot, troubles):  # see `_begin_log`
             loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked, lambda: _begin_log(folder))
             say = (lambda line: None) if command.as_json else typer.echo
             say(f"Link {command.link}, {1 / period:g} Hz, log {folder / 'run.mcap'}. To end: Ctrl-C")
@@ -131,24 +131,6 @@ def _safe(text: str, actuators: int) -> Any:
 def _starting_anywhere(built: Built) -> Built:
     """With the reference as the scenario gives it: it begins where the vehicle is found."""
     return built._replace(closed_loop=dataclasses.replace(built.closed_loop, reference=built.reference))
-
-
-@contextlib.contextmanager
-def _logging(autopilot: Autopilot, folder: Path, troubles: list[str]) -> Iterator[None]:
-    """Inside, an autopilot logs to a folder; see `_begin_log`.
-
-    What goes wrong with the log is added to `troubles`: it does not stop the controller.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with warnings.catch_warnings(record=True) as noted:
-        warnings.simplefilter("always")
-        try:
-            (folder / _BEFORE).mkdir(exist_ok=True)
-            autopilot.log_to(folder / _BEFORE / "run.mcap")
-            yield
-        finally:
-            autopilot.close_log()
-            troubles.extend(str(one.message) for one in noted)
 
 
 def _begin_log(folder: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.commands.command import Command
-from undertow.cli.commands.options import AllowCode, Overwrite, ScenarioFile, Unsupervised
+from undertow.cli.commands.options import AllowCode, Overwrite, ScenarioFile, StepLog, Unsupervised
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,6 +185,7 @@ class Ros2Command(Command):
         Path | None, typer.Option(metavar="DIR", help="Record all messages that the node sends and receives.")
     ] = None
     storage: Annotated[str, typer.Option(metavar="WORD", help="Of the bag: mcap or sqlite3.")] = "mcap"
+    log: StepLog = None
     unsupervised: Unsupervised = False
     allow_code: AllowCode = False
 
@@ -238,6 +239,7 @@ class MavlinkCommand(Command):
     duration: Annotated[float | None, typer.Option(metavar="S", help="End after this time, s. Default: at Ctrl-C.")] = (
         None
     )
+    log: StepLog = None
     unsupervised: Unsupervised = False
     allow_code: AllowCode = False
 

@@ -47,6 +47,13 @@ Resume = Annotated[
     bool, typer.Option("--resume", help="Continue what was interrupted in DIR, or add trials; what is done is kept.")
 ]
 
+StepLog = Annotated[
+    Path | None,
+    typer.Option(
+        "--log", metavar="FILE.mcap", help="Log every step to this file; `undertow run --link log:FILE` replays it."
+    ),
+]
+
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of threads. Default: all cores.")]
 
 

@@ -97,7 +97,7 @@ class Companion:
         self.timeout = float(timeout)
         self._reader, self._target = OdometryReader(source), Target(target_system, target_component)
         text = read_for_link(Path(scenario), allow_code=allow_code, unsupervised=unsupervised)
-        self.autopilot = Autopilot(text, attitude="quaternion")
+        self.autopilot = Autopilot(text, attitude="quaternion", log_later=True)
         self._driver = ThrusterDriver(self.autopilot, output, self._target, frame, channels)
         self.channels = self._driver.channels
         self.counts, self.complaint = dict.fromkeys(_COUNTS, 0), ""

@@ -53,7 +53,7 @@ class ThrusterDriver:
     @property
     def applied(self) -> np.ndarray:
         """Volts that the pulses of the last command give."""
-        return self._drive.outputs[1]
+        return self._drive.outputs[1].copy()
 
     def _made(self, pulses: Any, time_usec: int) -> list[Any]:
         neutral, span = float(self._esc.neutral), float(self._esc.span)

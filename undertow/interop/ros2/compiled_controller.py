@@ -55,7 +55,7 @@ class CompiledController:
         built = build(text)
         check_vehicle(built)
         plant, law = built.closed_loop.plant, built.closed_loop.controller
-        self.autopilot = Autopilot(text, attitude="quaternion", velocity="body")
+        self.autopilot = Autopilot(text, attitude="quaternion", velocity="body", log_later=True)
         self.output, self.thrusters = output, plant.inputs()
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             conversion = output_of(output, plant, law, None)
