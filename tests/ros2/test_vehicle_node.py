@@ -165,7 +165,7 @@ def test_lock_step_ends_without_a_controller(setup, vehicle, empty_domain):
     with pytest.raises(BadInput, match=r"No command came for the odometry of 0 s within 0.3 s"):
         node.run()
     with Link(empty_domain, True) as alone:
-        node = VehicleNode(vehicle, alone, VehicleSettings("lock-step", patience=0.3), Reporter(Said()))
+        node = VehicleNode(vehicle, alone, VehicleSettings("lock-step", first_patience=0.3), Reporter(Said()))
         with pytest.raises(BadInput, match="No controller: "):
             node.run()
 

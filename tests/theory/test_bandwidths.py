@@ -12,6 +12,7 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 
 from undertow.controllers import bandwidths
 from undertow.controllers.bandwidths import MARGINS, Axis, pid_frequency, robust_bandwidths
+from undertow.controllers.options import LOAD_RATE, DesignConditions
 from undertow.controllers.pid import pid
 from undertow.controllers.presets.robust import robust
 from undertow.core.errors import BadInput
@@ -169,7 +170,7 @@ def test_noise_and_delay_slow_a_law_and_limits_price_its_chattering():
 
 
 def test_dead_zone_without_a_lag_slows_a_law():
-    axis = AXES[0]._replace(load_rate=bandwidths.LOAD_RATE)
+    axis = AXES[0]._replace(load_rate=LOAD_RATE)
     ignoring, knowing = (robust_bandwidths(axis._replace(dead_zone=zone)) for zone in (0.0, 1.2 / 16))
     assert knowing.tracking < ignoring.tracking / 5 and knowing.bandwidth < ignoring.bandwidth / 2
     assert pid_frequency(axis._replace(dead_zone=1.2 / 16)) < pid_frequency(axis) / 4
@@ -222,7 +223,7 @@ def test_laws_take_them():
     model = hybrid_vehicle(bluerov2_heavy(), t200()).model()
     noise = [0.5, 0.5, 0.5, 1e-3, 1e-3, 1e-3]
     law = robust(model, sampling_time=0.01, velocity_noise=noise)
-    axes = bandwidths.axes_of(model.in_body_axes(), 0.01, 0.0, noise, bandwidths.LOAD_RATE)
+    axes = bandwidths.axes_of(model.in_body_axes(), DesignConditions(0.01, noise))
     np.testing.assert_allclose(law.estimator.bandwidth, [robust_bandwidths(axis).bandwidth for axis in axes])
     np.testing.assert_allclose(law.feedback[..., 1] / 2, [robust_bandwidths(axis).tracking for axis in axes])
     assert robust_bandwidths(axes[0]).tracking < robust_bandwidths(axes[5]).tracking
@@ -233,8 +234,8 @@ def test_laws_take_them():
     np.testing.assert_allclose(np.sqrt(slow.feedback[..., 0]), 1.5)
     assert float(slow.actuator_rate) == pytest.approx(9.0)
     lagged = hybrid_vehicle(bluerov2_heavy(), first_order(time_constant=0.2)).model()
-    assert bandwidths.axes_of(lagged.in_body_axes(), 0.01, 0.0, 0.0, 1.0)[0].lag == pytest.approx(0.2)
-    still = bandwidths.axes_of(double_integrator(1).model(), 0.01, 0.0, 0.0, 1.0)[0]
+    assert bandwidths.axes_of(lagged.in_body_axes(), DesignConditions(0.01))[0].lag == pytest.approx(0.2)
+    still = bandwidths.axes_of(double_integrator(1).model(), DesignConditions(0.01))[0]
     assert still.lag == 0.0 and np.isinf(still.authority)
 
 

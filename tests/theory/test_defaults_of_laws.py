@@ -10,6 +10,7 @@ from undertow.controllers.bandwidths import Axis, Law, axes_of, bandwidth_grid, 
 from undertow.controllers.integral_sliding_mode import _inside_the_layer as sliding_law
 from undertow.controllers.lqi import lqi_frequency
 from undertow.controllers.mrac import _load_alone
+from undertow.controllers.options import DesignConditions
 from undertow.controllers.slotine_li import _small_errors
 from undertow.controllers.super_twisting import _inside_the_layer as twisting_law
 from undertow.core.errors import BadInput
@@ -19,7 +20,7 @@ from undertow.plants import double_integrator
 DT = 0.02
 W = np.array([2.0, 6.0])
 LIMITED, UNLIMITED = double_integrator(2, limit=4.0).model(), double_integrator(2).model()
-AXIS = axes_of(LIMITED, DT, 0.0, 0.0, 1.0)[0]
+AXIS = axes_of(LIMITED, DesignConditions(DT, load_rate=1.0))[0]
 LAGGED = Axis(DT, 0.3, 0.35 / DT, 0.0, 0.0, 1.0, 4.0)
 
 # Law: main option, defaults of the others, and the natural frequency on which the filter of jumps depends.

@@ -14,6 +14,7 @@ from undertow.controllers.actuation import ActuatedState, Given
 from undertow.controllers.bandwidths import axes_of
 from undertow.controllers.decentralised import decentralised
 from undertow.controllers.law_signals import share_given
+from undertow.controllers.options import DesignConditions
 from undertow.controllers.reference_filter import FilterState
 from undertow.core.actuator_model import LaggedActuator
 from undertow.core.composite_model import composite_model
@@ -119,12 +120,12 @@ def test_no_demand_is_attained_in_full():
 
 
 def test_data_of_the_axes_of_a_model():
-    first, second = axes_of(LAGGED, DT, 0.1, [0.01, 0.02], 2.0)
+    first, second = axes_of(LAGGED, DesignConditions(DT, [0.01, 0.02], 2.0, 0.1))
     assert (first.sampling_time, first.lag, first.max_bandwidth, first.delay) == (DT, TAU, 0.35 / DT, 0.1)
     assert (first.velocity_noise, second.velocity_noise, first.load_rate) == (0.01, 0.02, 2.0)
     np.testing.assert_allclose((first.authority, second.authority), np.abs(G).sum(1) * LIMIT)
     assert first.response_time == DT + 0.1 + TAU
-    slow = axes_of(LAGGED, 2.0, 0.0, 0.0, 1.0)[0]
+    slow = axes_of(LAGGED, DesignConditions(2.0, load_rate=1.0))[0]
     np.testing.assert_allclose(slow.max_bandwidth, 1 / TAU)
 
 

@@ -12,6 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from undertow.controllers.options import ActuationOptions
 from undertow.controllers.reference_filter import FilterState, ReferenceFilter
 from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core import checks
@@ -153,38 +154,25 @@ class AbstractAccelerationLaw(AbstractInformedController):
         return Plan(estimated, off, desired, dynamics.invert(y, desired), signals)
 
 
-def actuation_for(
-    sampling_time: float,
-    frequency,
-    *,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
-) -> Actuation:
+def actuation_for(sampling_time: float, frequency, options: ActuationOptions = ActuationOptions()) -> Actuation:
     """The path of a law, with its defaults.
 
     Args:
         sampling_time: that of the loop, s.
         frequency: natural frequency of the closed loop, rad/s; one number or one per axis.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
-            most; 0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
+        options: of the law.
 
     Raises:
         BadInput: a value is out of its range.
     """
+    reference_frequency = options.reference_frequency
     if reference_frequency is None:
         reference_frequency = jnp.minimum(jnp.asarray(frequency, dtype=float) / 2, 2.0)
     unfiltered = not checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return Actuation(
         filter=None if unfiltered else ReferenceFilter(reference_frequency),
-        actuator_rate=0.15 / sampling_time if actuator_rate is None else actuator_rate,
-        direction=direction,
-        feedforward=feedforward,
-        motor=motor,
+        actuator_rate=0.15 / sampling_time if options.actuator_rate is None else options.actuator_rate,
+        direction=options.direction,
+        feedforward=options.feedforward,
+        motor=options.motor,
     )

@@ -8,10 +8,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Axis, Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import Axis, Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
@@ -119,21 +121,17 @@ def steps(error, rate, acceleration, load, given, c, inner, adaptation, lag) -> 
     return Steps(second, third, learning, given + lag * (inner * third + c**2 * second + of_alpha))
 
 
+@flat_options("motor", "actuator_rate")
 def adaptive_backstepping(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     rate=None,
     inner_rate=None,
     adaptation=None,
     bound=None,
     lag: float | None = None,
-    feedforward: bool = True,
-    reference_frequency=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> AdaptiveBackstepping:
     """Adaptive backstepping with tuning functions: Krstic, Kanellakopoulos and Kokotovic (1995), ch. 4. Body axes.
 
@@ -141,11 +139,6 @@ def adaptive_backstepping(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         rate: c, rate of the first two steps, 1/s; one number or one per axis. None: the one of least predicted cost
             that keeps the margins of `bandwidths.py` with the other defaults.
         inner_rate: c_3, rate of the third step, 1/s. None: four times c.
@@ -154,18 +147,16 @@ def adaptive_backstepping(
             they have no limit.
         lag: nominal time constant of the actuators, s; None: that of the model. The third step falls away where it is
             less than eight sampling times: there the margins leave more to the law without it.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of c, 2 at most; 0 for no filter.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     known = (axes[0].lag or 0.0) if lag is None else lag
     checks.not_negative("lag", known, "s")
-    lagged = known >= _SHORT * sampling_time
+    lagged = known >= _SHORT * conditions.sampling_time
     if rate is None:
         rate = alike([backstepping_rate(axis, known if lagged else None) for axis in axes])
     if bound is None:
@@ -175,9 +166,7 @@ def adaptive_backstepping(
     c = jnp.asarray(rate, dtype=float)
     return AdaptiveBackstepping(
         model=model,
-        actuation=actuation_for(
-            sampling_time, rate, feedforward=feedforward, reference_frequency=reference_frequency, direction=direction
-        ),
+        actuation=actuation_for(conditions.sampling_time, rate, actuation),
         rate=rate,
         inner_rate=_INNER * c if inner_rate is None else inner_rate,
         adaptation=_ADAPTATION * c**2 if adaptation is None else adaptation,

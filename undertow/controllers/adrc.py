@@ -6,12 +6,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
-from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.controllers.observer_gains import gains_with_feedback
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.tracking_error import check_gains
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
@@ -67,58 +68,35 @@ class ADRC(AbstractAccelerationLaw):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE
 
 
+@flat_options()
 def adrc(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     bandwidth=None,
     damping=1.0,
     tracking=None,
     feedback=None,
-    feedforward: bool = True,
-    motor: str = "computed",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(motor="computed"),
 ) -> ADRC:
     """Active disturbance rejection control (ADRC): Han (2009), with the bandwidths of Gao (2003). Body axes.
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         bandwidth: natural frequency of the extended-state observer, rad/s; one number or one per axis. None: as
             in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
         damping: its damping ratio; one number or one per axis.
         tracking: natural frequency of the tracking error, critically damped, rad/s; None: chosen with the bandwidth;
             with a given bandwidth between a quarter and half of it.
         feedback: K = (k1, k2) instead of `tracking`, 1/s^2 and 1/s; one pair or one per axis.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most, or none
             with a given `feedback`; 0 for no filter.
         actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth; with a
             given bandwidth three times that, if sampling allows.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range, or two options set the same quantity.
     """
     model = model.in_body_axes()
-    bandwidth, feedback, path = gains_with_feedback(
-        model,
-        sampling_time,
-        (velocity_noise, load_rate, delay),
-        (bandwidth, tracking, feedback, actuator_rate),
-        feedforward=feedforward,
-        motor=motor,
-        reference_frequency=reference_frequency,
-        direction=direction,
-    )
+    bandwidth, feedback, path = gains_with_feedback(model, conditions, actuation, (bandwidth, tracking, feedback))
     return ADRC(model=model, actuation=path, bandwidth=bandwidth, damping=damping, feedback=feedback)

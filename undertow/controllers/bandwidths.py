@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.controllers.options import DesignConditions
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.arrays import as_array
@@ -39,9 +40,6 @@ MARGINS = (
 UNKNOWN_LAG = 1.5  # share of the unknown delay; assumed for an actuator of unknown lag
 # What sensors, link and drives may take beyond what is known: they are made for the rate of the loop, up to a point.
 _UNKNOWN_SAMPLES, _UNKNOWN_TIME = 4.0, 0.02  # sampling times; s
-
-# Random walk of the loads that a law assumes unless it is given, m/s^2 and rad/s^2 per sqrt(s).
-LOAD_RATE = 0.25
 
 # An error of so many metres or radians costs as much as an input that moves by this share of its limit at each step.
 _ERROR_SCALE, _STEP_SCALE = 0.05, 0.02
@@ -107,19 +105,18 @@ class Law(NamedTuple):
     of_velocity: np.ndarray
 
 
-def axes_of(model: Model, sampling_time: float, delay: float, velocity_noise, load_rate) -> list[Axis]:
+def axes_of(model: Model, conditions: DesignConditions) -> list[Axis]:
     """Data of each axis of a model for the rule.
 
     Args:
         model: of the controller, in the coordinates of the law.
-        sampling_time: s.
-        delay: known delay that is not compensated, s.
-        velocity_noise: one number or one per axis, m/s and rad/s.
-        load_rate: one number or one per axis, m/s^2 per sqrt(s) and rad/s^2 per sqrt(s).
+        conditions: what the law is designed for.
 
     Raises:
         BadInput: a value is out of its range.
     """
+    sampling_time, delay = conditions.sampling_time, conditions.delay
+    velocity_noise, load_rate = conditions.velocity_noise, conditions.load_rate
     checks.positive("sampling_time", sampling_time, "s")
     checks.not_negative("delay", delay, "s")
     checks.not_negative("velocity_noise", velocity_noise, "m/s, rad/s")

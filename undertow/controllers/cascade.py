@@ -7,12 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.controllers.actuation import actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.cascade_law import Cascade
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.catalogue import by_preset
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.runtime import double_outside_runs
 
 # p / w of a cascade with the double pole of `pid`: 2 p^2 - w p + w^2 / 10 = 0; then k = 2 w and k_i = w^3 / (10 p).
@@ -26,34 +28,23 @@ _UNLIMITED = 1e6  # m/s^2, rad/s^2
 _BLUEROV2_HEAVY = np.array([6.85, 6.60, 5.98, 119.2, 94.9, 61.4])  # m/s^2, rad/s^2: vonbenzon2022, T200s at 16 V
 
 
+@flat_options()
 def placed(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     outer=None,
     inner=None,
     integral=None,
     derivative=0.0,
     derivative_filter=_UNFILTERED,
     rate_limit=jnp.inf,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> Cascade:
     """Cascade with the poles of `pid`: critically damped, with the frequency of least predicted cost.
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         outer: p, rate demanded per error, 1/s; one number or one per axis. None: 0.36 w, with the frequency w that
             `pid` chooses.
         inner: k, acceleration per error of the rate, 1/s; None: 2 w.
@@ -61,42 +52,39 @@ def placed(
         derivative: k_d, acceleration per derivative of the error of the rate.
         derivative_filter: bandwidth of its filter, rad/s; by default far beyond that of the sampling: none.
         rate_limit: largest rate demanded for an error, m/s and rad/s.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of sqrt(k p), 2 at most; 0 for
             no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
     if any(gain is None for gain in (outer, inner, integral)):
-        axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+        axes = axes_of(model, conditions)
         w = jnp.asarray(alike([pid_frequency(axis) for axis in axes]), dtype=float)
         outer = _OUTER_SHARE * w if outer is None else outer
         inner = 2 * w if inner is None else inner
         integral = 0.1 / _OUTER_SHARE * w**2 if integral is None else integral
     return _cascade(
         model,
-        sampling_time,
+        conditions.sampling_time,
+        actuation,
         outer=outer,
         inner=inner,
         integral=integral,
         derivative=derivative,
         derivative_filter=derivative_filter,
         rate_limit=rate_limit,
-        feedforward=feedforward,
-        motor=motor,
-        reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
-        direction=direction,
     )
 
 
+@flat_options("velocity_noise", "load_rate", "delay", "feedforward", "motor", "actuator_rate")
 def ardusub(
-    model: Model, *, sampling_time: float = 1e-3, authority=None, reference_frequency=None, direction=1.0
+    model: Model,
+    *,
+    conditions: DesignConditions = DesignConditions(),
+    authority=None,
+    actuation: ActuationOptions = ActuationOptions(feedforward=False),
 ) -> Cascade:
     """Position and attitude control of ArduSub 4.5 with its default gains, for a vehicle with six degrees of freedom.
 
@@ -121,25 +109,24 @@ def ardusub(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
         authority: acceleration of a demand of 1 in each axis, m/s^2 and rad/s^2; one number or six. None: from the
             nominal model, or that of a BlueROV2 Heavy at 16 V where nothing limits the inputs.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of sqrt(k p), 2 at most; 0 for
             no filter.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a plant that is not a vehicle with six axes, or a value is out of its range.
     """
     model = model.in_body_axes()
-    most = _authority(model, sampling_time, authority)
+    most = _authority(model, conditions, authority)
     level, vertical, tilt, yaw = most[:2] / (_LEAN * _GRAVITY), most[2:3], most[3:5], most[5:]
     loop = 1 + _THROTTLE * 0.5 * vertical
     joined = lambda *parts: jnp.concatenate([jnp.broadcast_to(jnp.asarray(one, dtype=float), n) for one, n in parts])
     each = lambda a, b, c, d: joined((a, 2), (b, 1), (c, 2), (d, 1))
     return _cascade(
         model,
-        sampling_time,
+        conditions.sampling_time,
+        actuation,
         outer=each(1.0, 3.0, 6.0, 6.0),
         inner=each(6.0 * level, 8.0 * (loop - 1) / loop, 0.135 * tilt, 0.18 * yaw),
         integral=each(0.5 * level, 8.0 * _THROTTLE * 0.1 * vertical / loop, 0.09 * tilt, 0.018 * yaw),
@@ -147,19 +134,17 @@ def ardusub(
         derivative_filter=2 * math.pi * 30.0,
         rate_limit=each(1.0, 1.0, jnp.inf, math.pi),
         integral_limit=each(10.0 * level, vertical, 0.444 * tilt, 0.222 * yaw),
-        reference_frequency=reference_frequency,
-        direction=direction,
     )
 
 
+@flat_options("velocity_noise", "load_rate", "delay", "feedforward", "motor", "actuator_rate")
 def px4(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
+    conditions: DesignConditions = DesignConditions(),
     authority=None,
     saturation=(0.1, 0.3),
-    reference_frequency=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(feedforward=False),
 ) -> Cascade:
     """Position and attitude control of PX4 for underwater vehicles with its default gains, for six degrees of freedom.
 
@@ -179,31 +164,28 @@ def px4(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
         authority: acceleration of a demand of 1 in each axis, m/s^2 and rad/s^2; one number or six. None: from the
             nominal model, or that of a BlueROV2 Heavy at 16 V where nothing limits the inputs.
         saturation: largest demands of thrust and of torque; earlier releases have 1 and 1.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of sqrt(k p), 2 at most; 0 for
             no filter.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a plant that is not a vehicle with six axes, or a value is out of its range.
     """
     model = model.in_body_axes()
-    most = _authority(model, sampling_time, authority)
+    most = _authority(model, conditions, authority)
     proportional = jnp.asarray([1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
     damping = jnp.asarray([0.2, 0.2, 0.2, 1.5, 2.0, 2.0])
     checks.positive("saturation", saturation)
     checks.length("saturation", saturation, 2, "thrust and torque")
     return _cascade(
         model,
-        sampling_time,
+        conditions.sampling_time,
+        actuation,
         outer=proportional / damping,
         inner=damping * most,
         limit=jnp.repeat(jnp.asarray(saturation, dtype=float), 3) * most,
-        reference_frequency=reference_frequency,
-        direction=direction,
     )
 
 
@@ -231,7 +213,7 @@ def cascade(model: Model, *, preset: str = "placed", **options: Any) -> Cascade:
 cascade.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here
 
 
-def _authority(model: Model, sampling_time: float, given):
+def _authority(model: Model, conditions: DesignConditions, given):
     """Acceleration of a demand of 1 in each of the six axes."""
     if len(model.coordinates.axes) != _AXES:
         raise BadInput("preset", "be `placed` for a plant that is not a vehicle with six axes", "that of an autopilot")
@@ -239,13 +221,14 @@ def _authority(model: Model, sampling_time: float, given):
         checks.positive("authority", given, "m/s^2, rad/s^2")
         checks.per_axis("authority", given, _AXES)
         return jnp.broadcast_to(jnp.asarray(given, dtype=float), _AXES)
-    found = np.array([axis.authority for axis in axes_of(model, sampling_time, 0.0, 0.0, 1.0)])
+    found = np.array([axis.authority for axis in axes_of(model, conditions)])
     return jnp.asarray(found if (found < _UNLIMITED).all() else _BLUEROV2_HEAVY)
 
 
 def _cascade(
     model: Model,
     sampling_time: float,
+    actuation: ActuationOptions,
     *,
     outer,
     inner,
@@ -255,16 +238,14 @@ def _cascade(
     rate_limit: Any = jnp.inf,
     integral_limit: Any = jnp.inf,
     limit: Any = jnp.inf,
-    feedforward: bool = False,
-    **path: Any,
 ) -> Cascade:
-    """The law with its path; of the modelled forces only what `feedforward` says."""
+    """The law with its path."""
     for name, value in (("outer", outer), ("inner", inner)):
         checks.positive(name, value, "1/s")
     frequency = jnp.sqrt(jnp.asarray(outer, dtype=float) * jnp.asarray(inner, dtype=float))
     return Cascade(
         model=model,
-        actuation=actuation_for(sampling_time, frequency, feedforward=feedforward, **path),
+        actuation=actuation_for(sampling_time, frequency, actuation),
         outer=outer,
         inner=inner,
         integral=integral,

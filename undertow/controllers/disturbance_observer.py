@@ -6,12 +6,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
-from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.controllers.observer_gains import gains_and_path
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
@@ -70,21 +71,15 @@ class DisturbanceObserver(AbstractAccelerationLaw):
         return own.estimate + gain * (self.model.coordinates.velocity(y) - own.predicted)
 
 
+@flat_options()
 def disturbance_observer(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     bandwidth=None,
     tracking=None,
     damping=1.0,
-    feedforward: bool = True,
-    motor: str = "computed",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(motor="computed"),
 ) -> DisturbanceObserver:
     """Disturbance-observer-based control: Chen, Ballance, Gawthrop and O'Reilly (2000), Eqs. (7)-(13). Body axes.
 
@@ -92,36 +87,16 @@ def disturbance_observer(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         bandwidth: l, pole of the observer, rad/s; one number or one per axis. None: the one of least predicted cost
             that keeps the margins of `bandwidths.py`.
         tracking: natural frequency of the tracking error, rad/s; None: chosen with the bandwidth; with a given
             bandwidth between a quarter and half of it.
         damping: damping ratio of the tracking error.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
-            no filter.
         actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    bandwidth, tracking, path = gains_and_path(
-        model,
-        sampling_time,
-        (velocity_noise, load_rate, delay),
-        (bandwidth, tracking, actuator_rate),
-        order=1,
-        feedforward=feedforward,
-        motor=motor,
-        reference_frequency=reference_frequency,
-        direction=direction,
-    )
+    bandwidth, tracking, path = gains_and_path(model, conditions, actuation, (bandwidth, tracking), order=1)
     return DisturbanceObserver(model=model, actuation=path, bandwidth=bandwidth, tracking=tracking, damping=damping)

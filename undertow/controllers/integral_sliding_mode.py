@@ -7,10 +7,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 
@@ -78,50 +80,33 @@ class IntegralSlidingMode(AbstractAccelerationLaw):
         return surface, self.amplitude * jnp.clip(surface / self.layer, -1, 1)
 
 
+@flat_options()
 def integral_sliding_mode(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     frequency=None,
     damping=1.0,
     amplitude=None,
     layer=None,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> IntegralSlidingMode:
     """Integral sliding mode: Utkin and Shi (1996); boundary layer by Slotine and Li (1991), ch. 7. Body axes.
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         frequency: natural frequency w of the nominal loop, rad/s; one number or one per axis. None: the one of least
             predicted cost that keeps the margins of `bandwidths.py` inside the layer.
         damping: its damping ratio.
         amplitude: M, largest load that is rejected, m/s^2 and rad/s^2. None: half of the authority of the actuators,
             10 where they have no limit.
         layer: phi, boundary layer of s, m/s and rad/s. None: M / (0.3 w), a third as fast as the nominal loop.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
-            most; 0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     if frequency is None:
         frequency = alike([best_frequency(axis, _inside_the_layer) for axis in axes])
     if amplitude is None:
@@ -133,15 +118,7 @@ def integral_sliding_mode(
         layer = jnp.asarray(amplitude, dtype=float) / (_LAYER_RATE * jnp.asarray(frequency, dtype=float))
     return IntegralSlidingMode(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            frequency,
-            feedforward=feedforward,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, frequency, actuation),
         frequency=frequency,
         damping=damping,
         amplitude=amplitude,

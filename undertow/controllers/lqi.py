@@ -10,10 +10,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
+from undertow.controllers.bandwidths import Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.numerics.riccati import regulator_gain
 
@@ -129,20 +131,16 @@ def lqi_frequency(axis: Axis, integral_weight: float, rate_weight: float, lag: f
     return best_frequency(axis, law)
 
 
+@flat_options("motor", "actuator_rate")
 def lqi(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     frequency=None,
     integral_weight=_INTEGRAL,
     rate_weight=_RATE,
     lag: float | None = None,
-    feedforward: bool = True,
-    reference_frequency=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> LQI:
     """Linear-quadratic regulator with an integral, about trim: Anderson and Moore (1990). Body axes.
 
@@ -152,25 +150,18 @@ def lqi(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it. The gains are those of this sampling time.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         frequency: w, at which an error costs as much as the input, rad/s; one number or one per axis. None: the one of
             least predicted cost that keeps the margins of `bandwidths.py`.
         integral_weight: rho, weight of the integral of the error relative to w^3.
         rate_weight: sigma, weight of its rate relative to w.
         lag: nominal time constant of the actuators, s; None: that of the model. 0 for a double integrator alone.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of w, 2 at most; 0 for no filter.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     known = (axes[0].lag or 0.0) if lag is None else lag
     if frequency is None:
         given = ((integral_weight, _INTEGRAL), (rate_weight, _RATE), (known, 0.0))
@@ -182,20 +173,14 @@ def lqi(
     checks.not_negative("lag", known, "s")
     numbers = (jnp.asarray(value, dtype=float) for value in (frequency, integral_weight, rate_weight))
     rows = jnp.broadcast_arrays(jnp.zeros(len(axes)), *numbers)[1:]
-    gains = _gains_of_axes(*rows, *(jnp.asarray(value, dtype=float) for value in (known, sampling_time)))
+    gains = _gains_of_axes(*rows, *(jnp.asarray(value, dtype=float) for value in (known, conditions.sampling_time)))
     return LQI(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            frequency,
-            feedforward=feedforward,
-            reference_frequency=reference_frequency,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, frequency, actuation),
         frequency=frequency,
         integral_weight=integral_weight,
         rate_weight=rate_weight,
         lag=known,
-        sampling_time=sampling_time,
+        sampling_time=conditions.sampling_time,
         gains=gains,
     )

@@ -7,12 +7,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.tracking_error import pole_placement
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 
@@ -114,13 +116,11 @@ class MRAC(AbstractAccelerationLaw):
         return nominal, jnp.stack([jnp.ones_like(v), v, jnp.abs(v) * v, nominal / self.scale], -1)
 
 
+@flat_options()
 def mrac(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     frequency=None,
     damping=1.0,
     adaptation=None,
@@ -128,11 +128,7 @@ def mrac(
     bound=None,
     scale=None,
     filter_ratio=_SLOPE,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> MRAC:
     """Model reference adaptive control with projection: Lavretsky and Wise (2013), ch. 9 to 11. Body axes.
 
@@ -142,11 +138,6 @@ def mrac(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         frequency: natural frequency w of the reference model, rad/s; one number or one per axis. None: the one of least
             predicted cost that keeps the margins of `bandwidths.py` with the other defaults.
         damping: its damping ratio, more than half of `filter_ratio`.
@@ -158,18 +149,12 @@ def mrac(
             the bound, so that half of the effectiveness may be missing.
         filter_ratio: slope c of the filtered error s = e_dot + c e over w: with a larger one, position teaches more
             than velocity.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
-            most; 0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     if frequency is None:
         frequency = alike([best_frequency(axis, _load_alone) for axis in axes])
     if bound is None:
@@ -179,15 +164,7 @@ def mrac(
         checks.positive(name, value)
     return MRAC(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            frequency,
-            feedforward=feedforward,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, frequency, actuation),
         frequency=frequency,
         damping=damping,
         adaptation=_ADAPTATION * jnp.asarray(frequency, dtype=float) ** 2 if adaptation is None else adaptation,

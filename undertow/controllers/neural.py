@@ -9,11 +9,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, ROBUST_TERM
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.numerics.linear_algebra import matvec, safe_sqrt
@@ -109,13 +111,11 @@ class Neural(AbstractAccelerationLaw):
         return Seen(off.rate + self.slope * off.error, inputs, layer, size)
 
 
+@flat_options()
 def neural(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     hidden: int = 8,
     seed: int = 0,
     slope=None,
@@ -125,11 +125,7 @@ def neural(
     e_modification=0.1,
     robust_gain=0.02,
     weights_bound=10.0,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> Neural:
     """Neural-network control with e-modification: Lewis, Yesildirek and Liu (1996). Body axes.
 
@@ -140,11 +136,6 @@ def neural(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         hidden: neurons of the hidden layer.
         seed: of the hidden weights at the start, uniform within 0.5 over the root of the number of inputs.
         slope: Lambda, pole of the filtered error, 1/s; one number or one per axis. None: the frequency of `pid`.
@@ -155,12 +146,8 @@ def neural(
         e_modification: kappa, decay of the weights with the size of the filtered error.
         robust_gain: K_z, gain of the robust term per size of the weights, 1/s.
         weights_bound: Z_M, bound of the size of the ideal weights.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of sqrt(K_v Lambda), 2 at most;
             0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
@@ -169,7 +156,7 @@ def neural(
         raise BadInput("hidden", "be at least 1", hidden)
     model = model.in_body_axes()
     if slope is None or gain is None:
-        axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+        axes = axes_of(model, conditions)
         w = alike([pid_frequency(axis) for axis in axes])
         slope, gain = w if slope is None else slope, w if gain is None else gain
     for name, value in (("slope", slope), ("gain", gain)):
@@ -181,15 +168,7 @@ def neural(
     spread = 0.5 / np.sqrt(count)
     return Neural(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            jnp.sqrt(stiffness),
-            feedforward=feedforward,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, jnp.sqrt(stiffness), actuation),
         start=jnp.asarray(np.random.default_rng(seed).uniform(-spread, spread, (count, hidden))),
         slope=slope,
         gain=gain,

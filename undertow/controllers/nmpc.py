@@ -8,13 +8,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
-from undertow.controllers.bandwidths import LOAD_RATE
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.controllers.observer_gains import gains_and_path
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.receding_horizon import Horizon, Improved, improved, regulator
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
 
@@ -130,22 +131,17 @@ class NMPC(AbstractAccelerationLaw):
         return motion
 
 
+@flat_options("feedforward")
 def nmpc(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     bandwidth=None,
     tracking=None,
     horizon=None,
     steps: int = 10,
     iterations: int = 2,
-    motor: str = "computed",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(motor="computed"),
 ) -> NMPC:
     """Nonlinear model predictive control with a fixed number of operations per step: Diehl et al. (2005). Body axes.
 
@@ -154,11 +150,6 @@ def nmpc(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         bandwidth: l, pole of the disturbance observer, rad/s; one number or one per axis. None: as of
             `disturbance_observer`.
         tracking: w, natural frequency of the tracking error where no limit binds, rad/s; None: as of
@@ -167,11 +158,7 @@ def nmpc(
         steps: its number of steps.
         iterations: Gauss-Newton steps per sampling time. With one, a plan for which limits begin to bind or cease to
             bind is used before it has converged.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
-            no filter.
         actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: chosen with the bandwidth.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
@@ -183,16 +170,7 @@ def nmpc(
     if horizon is not None:
         checks.positive("horizon", horizon, "s")
     model = model.in_body_axes()
-    bandwidth, tracking, path = gains_and_path(
-        model,
-        sampling_time,
-        (velocity_noise, load_rate, delay),
-        (bandwidth, tracking, actuator_rate),
-        order=1,
-        motor=motor,
-        reference_frequency=reference_frequency,
-        direction=direction,
-    )
+    bandwidth, tracking, path = gains_and_path(model, conditions, actuation, (bandwidth, tracking), order=1)
     if horizon is None:
         horizon = jnp.minimum(_TIMES / jnp.min(jnp.asarray(tracking, dtype=float)), _LONGEST)
     return NMPC(

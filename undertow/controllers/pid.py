@@ -5,11 +5,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, alike, axes_of, pid_frequency
+from undertow.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
@@ -61,22 +63,16 @@ class PID(AbstractAccelerationLaw):
         return ESTIMATE | ATTAINED_SHARE
 
 
+@flat_options()
 def pid(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     frequency=None,
     damping=1.0,
     integral_share=0.1,
     gains=None,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> PID:
     """PID with acceleration as output, by pole placement, Fossen (2021), ch. 15. Body axes and quaternions.
 
@@ -84,30 +80,20 @@ def pid(
         model: nominal model, from `plant.model()`.
         sampling_time: that of the loop, s; a scenario sets it. From Python, give the `dt` of `simulate`: gains for a
             shorter one track more closely, but with less margin and more chattering than the rule allows.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         frequency: natural frequency w of the closed loop without its integral, rad/s; one number or one per axis. None:
             as in preset `robust`, the one of least predicted cost that keeps the margins of `bandwidths.py`.
         damping: damping ratio of the closed loop without its integral.
         integral_share: k_i = share w k_p with k_p = w^2; a tenth is Fossen's. 0 for PD.
         gains: (k_p, k_i, k_d) instead of these three, 1/s^2, 1/s^3 and 1/s; one triple or one per axis.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of the natural frequency, 2 at
-            most; 0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
-    checks.positive("sampling_time", sampling_time, "s")
+    checks.positive("sampling_time", conditions.sampling_time, "s")
     model = model.in_body_axes()
     if gains is None:
         if frequency is None:
-            axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+            axes = axes_of(model, conditions)
             frequency = alike([pid_frequency(axis) for axis in axes])
         for name, value, check in (
             ("frequency", frequency, checks.positive),
@@ -123,15 +109,7 @@ def pid(
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
     return PID(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            jnp.sqrt(proportional),
-            feedforward=feedforward,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, jnp.sqrt(proportional), actuation),
         proportional=proportional,
         integral=integral,
         derivative=derivative,

@@ -6,10 +6,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import AbstractDynamics, Measurement, Model, Outputs, Target, TrackingError
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.core.parametric_dynamics import AbstractParametricDynamics, Parameters, Parametrization
 from undertow.core.signals import Signal
@@ -138,21 +140,16 @@ class SlotineLi(AbstractAccelerationLaw):
         return self.regressor.generalized_force(y, parameters, velocity, off.acceleration + self.slope * counting)
 
 
+@flat_options("feedforward")
 def slotine_li(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     slope=None,
     gain=None,
     adaptation_rate=None,
     reach=None,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> SlotineLi:
     """Passivity-based adaptive control: Slotine and Li (1987; 1991, section 9.2). Body axes and quaternions.
 
@@ -162,11 +159,6 @@ def slotine_li(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         slope: l, rate of decay on the surface, 1/s; one number or one per axis. None: the one of least predicted cost
             that keeps the margins of `bandwidths.py` with the other defaults.
         gain: k, rate of decay of s, 1/s; one number or one per axis. None: the slope.
@@ -174,17 +166,14 @@ def slotine_li(
             slope. 0 for none.
         reach: largest error that counts, m and rad. None: the one at which feedback asks for half of
             the authority of the actuators, and 1e6 where they have no limit.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: half of the slope, 2 at most; 0 for no
             filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     if slope is None:
         slope = alike([best_frequency(axis, _small_errors) for axis in axes])
     checks.per_axis("slope", slope, len(axes))
@@ -200,14 +189,7 @@ def slotine_li(
     regressor = dynamics if isinstance(dynamics, AbstractParametricDynamics) else DiagonalDynamics(dynamics, len(axes))
     return SlotineLi(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            slope,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, slope, actuation),
         regressor=regressor,
         slope=slope,
         gain=gain,

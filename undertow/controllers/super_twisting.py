@@ -6,11 +6,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.controllers.bandwidths import LOAD_RATE, Law, alike, axes_of, best_frequency
+from undertow.controllers.bandwidths import Law, alike, axes_of, best_frequency
 from undertow.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 
@@ -109,33 +111,22 @@ def least_second(first):
     return high
 
 
+@flat_options()
 def super_twisting(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     slope=None,
     rate_bound=None,
     layer=None,
     first=_FIRST,
     second=_SECOND,
-    feedforward: bool = True,
-    motor: str = "steady",
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
 ) -> SuperTwisting:
     """Super-twisting control: Levant (1993); gains by Moreno and Osorio (2012). Body axes and quaternions.
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each sampling time, m/s and rad/s; one number
-            or one per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: that of measurement and input together, s.
         slope: l, rate of decay on the surface, 1/s; one number or one per axis. None: the one of least predicted cost
             that keeps the margins of `bandwidths.py` where the law is linear.
         rate_bound: L, largest rate of the load that the model does not know, m/s^3 and rad/s^3; one number or one per
@@ -144,17 +135,13 @@ def super_twisting(
             A layer of 1e-9 is none.
         first: c_1 of the first gain c_1 L^(1/2); Levant (1998) has 1.5.
         second: c_2 of the second gain c_2 L; Levant (1998) has 1.1.
-        feedforward: whether weight, buoyancy, drag and the other modelled forces are compensated.
-        motor: steady, the voltage is that of the thrust in steady state, or computed, the motor's lag is compensated.
         reference_frequency: that of the filter of reference jumps, rad/s; None: the slope, 2 at most; 0 for no filter.
-        actuator_rate: with motor = computed, bandwidth of the motor loop, 1/s; None: 0.15 per sampling time.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
 
     Raises:
         BadInput: a value is out of its range.
     """
     model = model.in_body_axes()
-    axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+    axes = axes_of(model, conditions)
     if slope is None:
         slope = alike([best_frequency(axis, _inside_the_layer) for axis in axes])
     if rate_bound is None:
@@ -167,15 +154,7 @@ def super_twisting(
         layer = bound * (factor / (_STEEP * steep)) ** 2
     return SuperTwisting(
         model=model,
-        actuation=actuation_for(
-            sampling_time,
-            2 * jnp.asarray(slope, dtype=float),
-            feedforward=feedforward,
-            motor=motor,
-            reference_frequency=reference_frequency,
-            actuator_rate=actuator_rate,
-            direction=direction,
-        ),
+        actuation=actuation_for(conditions.sampling_time, 2 * jnp.asarray(slope, dtype=float), actuation),
         slope=slope,
         rate_bound=rate_bound,
         layer=layer,

@@ -6,7 +6,7 @@ from typing import Annotated
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.controllers.bandwidths import LOAD_RATE
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.presets.robust import robust
 from undertow.controllers.robust.inertia import InertiaIdentification
 from undertow.controllers.robust.knowledge import Knowledge, load_knowledge
@@ -14,26 +14,23 @@ from undertow.controllers.robust.memory import memory
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import catalogue, checks
 from undertow.core.contracts import Model
+from undertow.core.option_groups import flat_options
 
 _PROBING = 0.2  # rad/s^2
 _SPREAD = 0.8, 1.2  # of the frequencies of the axes
 
 
+@flat_options("feedforward", "motor")
 def learning(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     bandwidth=None,
     damping=1.0,
     tracking=None,
     feedback=None,
     weights_bound=50.0,
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
     regressor: str = "both",
     rules: int = 5,
     speeds=0.5,
@@ -48,11 +45,6 @@ def learning(
 
     Args:
         model: nominal model, from `plant.model()`.
-        sampling_time: that of the loop, s; a scenario sets it.
-        velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
-            per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: uncompensated delay of measurement and input together, s.
         bandwidth: natural frequency of the observer, rad/s; None: chosen as in preset `robust`.
         damping: damping ratio of the observer.
         tracking: natural frequency of the tracking error, critically damped, rad/s; None: as in preset `robust`.
@@ -60,7 +52,6 @@ def learning(
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that the observer can estimate.
         reference_frequency: that of the filter of reference jumps, rad/s; None: as in preset `robust`; 0 for none.
         actuator_rate: bandwidth of the motor loop, 1/s; None: as in preset `robust`.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
         regressor: `rules`, fuzzy rules of each velocity, `linear`, v and v |v|, or `both`.
         rules: fuzzy sets of each velocity, an odd number from 3.
         speeds: velocity at the outermost sets, m/s and rad/s; one number or one per axis.
@@ -79,18 +70,13 @@ def learning(
     """
     law = robust(
         model,
-        sampling_time=sampling_time,
-        velocity_noise=velocity_noise,
-        load_rate=load_rate,
-        delay=delay,
+        conditions=conditions,
         bandwidth=bandwidth,
         damping=damping,
         tracking=tracking,
         feedback=feedback,
         weights_bound=weights_bound,
-        reference_frequency=reference_frequency,
-        actuator_rate=actuator_rate,
-        direction=direction,
+        actuation=actuation,
     )
     axes = len(law.model.coordinates.angles)
     learnt = None if knowledge is None else load_knowledge(knowledge)

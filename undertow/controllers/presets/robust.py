@@ -3,23 +3,23 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.controllers.bandwidths import LOAD_RATE, axes_of, completed
+from undertow.controllers.bandwidths import axes_of, completed
+from undertow.controllers.options import ActuationOptions, DesignConditions
 from undertow.controllers.reference_filter import ReferenceFilter
 from undertow.controllers.robust.estimator import Estimator, widened
 from undertow.controllers.robust.robust_law import RobustRCAF
 from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
+from undertow.core.option_groups import flat_options
 from undertow.estimation.fuzzy_system import gaussian_sets
 
 
+@flat_options("feedforward", "motor")
 def robust(
     model: Model,
     *,
-    sampling_time: float = 1e-3,
-    velocity_noise=0.0,
-    load_rate=LOAD_RATE,
-    delay: float = 0.0,
+    conditions: DesignConditions = DesignConditions(),
     bandwidth=None,
     damping=1.0,
     tracking_share=0.0,
@@ -33,9 +33,7 @@ def robust(
     layer=0.5,
     weights_bound=50.0,
     leakage=0.01,
-    reference_frequency=None,
-    actuator_rate=None,
-    direction=1.0,
+    actuation: ActuationOptions = ActuationOptions(),
     sets: int = 5,
     reach=None,
     width: float | None = None,
@@ -46,10 +44,6 @@ def robust(
         model: nominal model, from `plant.model()`.
         sampling_time: that of the loop, s; a scenario sets it. From Python, give the `dt` of `simulate`: gains for a
             shorter one track more closely, but with less margin and more chattering than the rule allows.
-        velocity_noise: standard deviation of the measured velocities at each step, m/s and rad/s; one number or one
-            per axis; a scenario sets it from its navigation.
-        load_rate: random walk of the loads, m/s^2 and rad/s^2 per sqrt(s); used only with noise.
-        delay: uncompensated delay of measurement and input together, s.
         bandwidth: natural frequency of the estimator, rad/s; None: the one of least predicted cost among those that
             keep the margins of `controllers/bandwidths.py` against unknown lag and delay.
         damping: damping ratio of the estimator.
@@ -65,11 +59,8 @@ def robust(
         layer: boundary layer of the robust term.
         weights_bound: theta_max, m/s^2 and rad/s^2: the largest uncertainty that can be estimated.
         leakage: decay rate of differences between the weights of an axis, which noise causes, 1/s; 0 for none.
-        reference_frequency: that of the filter of reference jumps, rad/s; None: half of `tracking`, 2 at most; 0 for
-            no filter.
         actuator_rate: bandwidth of the motor loop, 1/s; None: chosen with the bandwidth; with a given bandwidth three
             times that, if sampling allows.
-        direction: cost of a departure from the desired direction, where limits bind, relative to a loss of size.
         sets: fuzzy sets; any number from 1.
         reach: outermost centres, m/s and rad/s; None: so large that weights within their box add at most a tenth
             to the damping of the estimator.
@@ -85,8 +76,9 @@ def robust(
     model = model.in_body_axes()
     if feedback is not None and tracking is not None:
         raise BadInput("tracking", "be left out when there is `feedback`", tracking)
+    actuator_rate, reference_frequency = actuation.actuator_rate, actuation.reference_frequency
     if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
-        axes = axes_of(model, sampling_time, delay, velocity_noise, load_rate)
+        axes = axes_of(model, conditions)
         bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate)
     for name, value, unit in (("bandwidth", bandwidth, "rad/s"), ("tracking", tracking, "rad/s")):
         checks.positive(name, value, unit)
@@ -108,7 +100,7 @@ def robust(
         robust_gain=robust_gain,
         layer=layer,
         actuator_rate=actuator_rate,
-        direction=direction,
+        direction=actuation.direction,
     )
 
 

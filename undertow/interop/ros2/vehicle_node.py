@@ -33,7 +33,8 @@ class VehicleSettings(NamedTuple):
         pace: `real-time`, `lock-step` or `fast`.
         duration: s, simulated; None for the scenario's.
         max_age: s, without a command, until no input is applied.
-        patience: s, for which `lock-step` waits for a controller, or for a command.
+        patience: s, for which `lock-step` waits for a command.
+        first_patience: s, for which it waits for a controller, which may have to be compiled first.
         topics, frames: names.
     """
 
@@ -41,6 +42,7 @@ class VehicleSettings(NamedTuple):
     duration: float | None = None
     max_age: float = 0.5
     patience: float = 30.0
+    first_patience: float = 120.0
     topics: Topics = Topics()
     frames: Frames = Frames()
 
@@ -60,7 +62,7 @@ class VehicleNode:
 
     def __init__(self, vehicle: Vehicle, link: Link, settings: VehicleSettings, reporter: Reporter):
         checks.choice("pace", settings.pace, PACES)
-        for name in ("max_age", "patience"):
+        for name in ("max_age", "patience", "first_patience"):
             checks.positive(name, getattr(settings, name), "s", finite=False)
         self._vehicle = vehicle
         self._steps = self._steps_of(vehicle.duration if settings.duration is None else settings.duration)
@@ -137,7 +139,7 @@ class VehicleNode:
 
     def _await_controller(self) -> None:
         """Wait for a controller that takes odometry and gives commands."""
-        until = time.monotonic() + self._settings.patience
+        until = time.monotonic() + self._settings.first_patience
         while not (self._odometry.subscribers() and self._commands.publishers()):
             if time.monotonic() > until:
                 raise BadInput(

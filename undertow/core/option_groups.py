@@ -1,0 +1,74 @@
+"""Options that several functions have, declared once: a group is an object inside, and flat for whoever calls."""
+
+import dataclasses
+import functools
+import inspect
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar, get_type_hints
+
+Part = TypeVar("Part")
+
+
+@dataclasses.dataclass(frozen=True)
+class OptionGroup:
+    """A group of options; its docstring says in `Attributes:` what each means."""
+
+
+def flat_options(*without: str) -> Callable[[Callable[..., Part]], Callable[..., Part]]:
+    """Decorate a function whose keyword arguments have groups as defaults: callers give the options of a group by name.
+
+    Signature and docstring have them, too, so that scenarios, `undertow describe` and tuning see no difference. An
+    option that the docstring explains itself keeps that text.
+
+    Args:
+        without: options of the groups that the function does not have; they stay as the default of the group has them.
+    """
+
+    def decorate(function: Callable[..., Part]) -> Callable[..., Part]:
+        parameters = list(inspect.signature(function).parameters.values())
+        groups = {one.name: one.default for one in parameters if isinstance(one.default, OptionGroup)}
+        options = {name: _options_of(group, without) for name, group in groups.items()}
+
+        @functools.wraps(function)
+        def flat(*arguments: Any, **given: Any) -> Part:
+            for name, group in groups.items():
+                chosen = {option: given.pop(option) for option in options[name] if option in given}
+                given[name] = dataclasses.replace(given.get(name, group), **chosen)
+            return function(*arguments, **given)
+
+        hints, shown = get_type_hints(function, include_extras=True), []
+        for parameter in parameters:
+            shown += options[parameter.name].values() if parameter.name in groups else [parameter]
+        flat.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
+        own = {parameter.name for parameter in parameters} - set(groups)
+        flat.__annotations__ = {name: hint for name, hint in hints.items() if name in own or name == "return"}
+        flat.__annotations__ |= {one.name: one.annotation for one in shown if one.name not in own}
+        for name, group in groups.items():
+            flat.__doc__ = _explained(flat.__doc__ or "", group, options[name])
+        return flat
+
+    return decorate
+
+
+def _options_of(group: OptionGroup, without: tuple[str, ...]) -> dict[str, inspect.Parameter]:
+    """The options of a group as keyword arguments, with the values of the group as defaults."""
+    hints = get_type_hints(type(group), include_extras=True)
+    names = [field.name for field in dataclasses.fields(group) if field.name not in without]
+    kind = inspect.Parameter.KEYWORD_ONLY
+    return {name: inspect.Parameter(name, kind, default=getattr(group, name), annotation=hints[name]) for name in names}
+
+
+def _explained(text: str, group: OptionGroup, options: dict[str, inspect.Parameter]) -> str:
+    """A docstring with the options of a group at the end of `Args:`, but for those that it explains itself."""
+    attributes = inspect.getdoc(type(group)) or ""
+    entries = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", attributes.partition("Attributes:\n")[2], re.MULTILINE)
+    lines = [f"        {name}: {meaning.replace(chr(10), chr(10) + '    ')}" for name, meaning in entries]
+    wanted = [
+        line
+        for line, (name, _) in zip(lines, entries, strict=True)
+        if name in options and not re.search(rf"^ +{name}: ", text, re.MULTILINE)
+    ]
+    head, section, rest = text.partition("    Args:\n")
+    arguments, gap, after = rest.partition("\n\n")
+    return "\n".join([head + section + arguments, *wanted]) + gap + after
