@@ -11,7 +11,7 @@ LOAD_RATE = 0.25
 
 @dataclasses.dataclass(frozen=True)
 class DesignConditions(OptionGroup):
-    """What a law is designed for: the loop in which it runs, its measurements and the sea.
+    """What a law is designed for: the loop in which it runs, its measurements and its disturbances.
 
     Attributes:
         sampling_time: that of the loop, s; a scenario sets it.

@@ -64,11 +64,11 @@ def _explained(text: str, group: OptionGroup, options: dict[str, inspect.Paramet
     attributes = inspect.getdoc(type(group)) or ""
     entries = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", attributes.partition("Attributes:\n")[2], re.MULTILINE)
     lines = [f"        {name}: {meaning.replace(chr(10), chr(10) + '    ')}" for name, meaning in entries]
-    wanted = [
+    missing = [
         line
         for line, (name, _) in zip(lines, entries, strict=True)
         if name in options and not re.search(rf"^ +{name}: ", text, re.MULTILINE)
     ]
     head, section, rest = text.partition("    Args:\n")
     arguments, gap, after = rest.partition("\n\n")
-    return "\n".join([head + section + arguments, *wanted]) + gap + after
+    return "\n".join([head + section + arguments, *missing]) + gap + after
