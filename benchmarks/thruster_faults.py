@@ -26,7 +26,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.core import runtime
-from undertow.core.contracts import AbstractFaults, AbstractInformedController, Target
+from undertow.core.contracts import AbstractController, AbstractFaults, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
@@ -211,7 +211,7 @@ def moving(built: Built, law: Any, which: InputFault, chance: np.random.Generato
 LOSSES = ("lost_thrusters", "nominal_forces")
 
 
-class Watched(AbstractInformedController):
+class Watched(AbstractController):
     """A fault-tolerant law that also records the nominal forces of the applied inputs."""
 
     own: FaultTolerantController

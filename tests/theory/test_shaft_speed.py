@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.core.contracts import Load, known_acceleration
+from undertow.core.contracts import Load
 from undertow.thrusters.paper_table3 import paper_table3
 from undertow.vehicles.odin import odin
 
@@ -31,7 +31,7 @@ def left_over(speed_sensor):
 
     def d(z):
         acceleration = whole.acceleration(zero, x, volts, Load(jnp.zeros(6), jnp.zeros(6)))
-        return law.model.coordinates.acceleration(y, acceleration) - known_acceleration(law, z, y, volts)
+        return law.model.coordinates.acceleration(y, acceleration) - law.known_acceleration(z, y, volts)
 
     return np.asarray(jax.jit(d)(law.init(y, r)))
 

@@ -20,7 +20,7 @@ from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.authority import authority_of
 from undertow.core.checks import numbers
-from undertow.core.contracts import AbstractGatedController, Target, starting_at
+from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.loop.closed_loop import ClosedLoop
@@ -157,7 +157,7 @@ class Autopilot(Uncopied):
         self.backend = self._go_on.backend
         # What every step needs, looked up once. The arrays of the state are those of every step.
         self._supervisor = state_in(self._go_on.state)
-        self._gated = isinstance(self._loop.controller, AbstractGatedController)
+        self._takes_raw_readings = self._loop.controller.takes_raw_readings
         self._shapes = [place.shape for place in self._begin.inputs.motion]
         self._no_report = jax.tree.map(lambda place: np.full(place.shape, np.nan), self._begin.inputs.actuator)
 
@@ -268,7 +268,7 @@ class Autopilot(Uncopied):
         healthy = self._health(health)
         passed = self._clock.passed(dt)
         elapsed = self.sampling_time if dt is None else float(dt)
-        if self._gated:
+        if self._takes_raw_readings:
             passed = elapsed  # whatever it is: a supervisor knows what to do with it
         elif not passed:
             return self._convert.outputs.copy()

@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.autopilot.measured_motion import Format, Motion
 from undertow.autopilot.output import Output
-from undertow.core.contracts import AbstractController, AbstractGatedController, Measurement, Target
+from undertow.core.contracts import AbstractController, Measurement, Target
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.loop.controller_step import Answer, Memory, first_step, next_step
 from undertow.numerics.random_keys import key_of_seed
@@ -74,7 +74,7 @@ class Functions:
 
 def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
     """Health of actuators that all work; None where nobody announces anything, or would listen."""
-    if isinstance(loop.controller, AbstractGatedController):
+    if loop.controller.takes_raw_readings:
         return np.ones(loop.plant.inputs(), dtype=jax.dtypes.canonicalize_dtype(float))
     if loop.faults is None:
         return None

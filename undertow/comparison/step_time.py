@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core.contracts import AbstractGatedController, Target
+from undertow.core.contracts import Target
 from undertow.loop.controller_step import first_step, next_step
 from undertow.loop.stepped import Step
 from undertow.scenario.build import Built, in_its_precision
@@ -49,7 +49,7 @@ def step_time(built: Built) -> StepTime:
     numbers, rest = eqx.partition(law, eqx.is_array)
     own = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
     y = plant.output(jnp.zeros(()), plant.initial_state())
-    if isinstance(law, AbstractGatedController):
+    if law.takes_raw_readings:
         y = y._replace(health=jnp.ones(plant.inputs()))
     target: Target = loop.reference.at(jnp.zeros(()))
     applied, interval = jnp.zeros(plant.inputs()), jnp.asarray(dt)

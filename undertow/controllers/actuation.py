@@ -17,7 +17,7 @@ from undertow.controllers.reference_filter import FilterState, ReferenceFilter
 from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.contracts import AbstractInformedController, Measurement, Target, TrackingError
+from undertow.core.contracts import AbstractController, Measurement, Target, TrackingError
 from undertow.core.param import Param, param
 from undertow.numerics.linear_algebra import matvec
 
@@ -72,7 +72,7 @@ class Plan(NamedTuple):
     signals: dict[str, Array]
 
 
-class AbstractAccelerationLaw(AbstractInformedController):
+class AbstractAccelerationLaw(AbstractController):
     """A law given by the acceleration that it demands: `begin`, `demand` and `adapt`."""
 
     actuation: eqx.AbstractVar[Actuation]

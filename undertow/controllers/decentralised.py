@@ -8,16 +8,7 @@ from jaxtyping import Array, PyTree
 
 from undertow.controllers.presets.robust import robust
 from undertow.core.composite_model import composite_model, parts_of, split, split_measurement, split_target
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractInformedController,
-    Inputs,
-    Measurement,
-    Model,
-    Outputs,
-    Target,
-    known_acceleration,
-)
+from undertow.core.contracts import AbstractController, Inputs, Measurement, Model, Outputs, Target
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 
@@ -33,7 +24,7 @@ _REDUCED = {
 }
 
 
-class Decentralised(AbstractInformedController):
+class Decentralised(AbstractController):
     """u_i = law_i(y_i, r_i): states, measurements and references are those of the subsystem alone.
 
     All laws have the same signals. Those over axes or actuators are joined; numbers become one (parts of the Lyapunov
@@ -58,7 +49,7 @@ class Decentralised(AbstractInformedController):
 
     def known_acceleration(self, z: tuple[PyTree, ...], y: Measurement, u_applied: Inputs) -> Outputs:
         each = zip(self.laws, z, self._measured(y), split(u_applied, self._inputs()), strict=True)
-        return jnp.concatenate([known_acceleration(law, state, own, u) for law, state, own, u in each])
+        return jnp.concatenate([law.known_acceleration(state, own, u) for law, state, own, u in each])
 
     def signals(self):
         several = lambda one: one._replace(dimensions=("subsystem", *one.dimensions))

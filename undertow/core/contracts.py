@@ -307,7 +307,10 @@ class AbstractPlant(eqx.Module):
 
 
 class AbstractController(eqx.Module):
-    """A control law. `command` comes before `advance`, so that adaptation uses the input that was applied."""
+    """A control law. `command` comes before `advance`, so that adaptation uses the input that was applied.
+
+    What only some laws can do has a default: `known_acceleration`, `takes_raw_readings`, `knowledge` and `restarted`.
+    """
 
     model: eqx.AbstractVar[Model]
 
@@ -334,6 +337,24 @@ class AbstractController(eqx.Module):
     @abc.abstractmethod
     def signals(self) -> dict[str, Signal]:
         """Declarations of the signals of `command`, by name; {} for none."""
+
+    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
+        """The acceleration that the law models; d is the rest. F + G u, or F + g(x, u), unless it models more."""
+        dynamics = self.model.dynamics
+        return dynamics.drift(y) + forced_acceleration(dynamics, y, u_applied)
+
+    @property
+    def takes_raw_readings(self) -> bool:
+        """Whether it decides by itself what to do with readings that are not finite: it gets them as they are."""
+        return False
+
+    def knowledge(self, z: PyTree) -> PyTree:
+        """What of a state a restart must not lose, such as which thrusters have failed; () for nothing."""
+        return ()
+
+    def restarted(self, knowledge: PyTree, y: Measurement, r: Target) -> PyTree:
+        """State of a law that begins again from a measurement, with what was known."""
+        return self.init(y, r)
 
 
 class AbstractContinuousController(AbstractController):
@@ -362,37 +383,6 @@ class AbstractContinuousController(AbstractController):
             z = step(lambda _, z: self.flow(z, y, r, u_applied), start, z, dt / self.substeps)
             z = self.project(z)
         return z
-
-
-class AbstractInformedController(AbstractController):
-    """A law that models more of the acceleration than F + G u, such as the dynamics of its motors."""
-
-    @abc.abstractmethod
-    def known_acceleration(self, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-        """The acceleration that the law models; d is the rest."""
-
-
-class AbstractGatedController(AbstractInformedController):
-    """A controller that decides by itself what to do with readings that are not finite: it gets them as they are."""
-
-
-class AbstractRestartable(AbstractInformedController):
-    """A law with knowledge that a restart must not lose, such as which thrusters have failed."""
-
-    @abc.abstractmethod
-    def knowledge(self, z: PyTree) -> PyTree:
-        """What of a state a restart must not lose."""
-
-    @abc.abstractmethod
-    def restarted(self, knowledge: PyTree, y: Measurement, r: Target) -> PyTree:
-        """State of a law that begins again from a measurement, with what was known."""
-
-
-def known_acceleration(law: AbstractController, z: PyTree, y: Measurement, u_applied: Inputs) -> Outputs:
-    """The acceleration that a law models: F + G u, or F + g(x, u), unless it defines its own."""
-    if isinstance(law, AbstractInformedController):
-        return law.known_acceleration(z, y, u_applied)
-    return law.model.dynamics.drift(y) + forced_acceleration(law.model.dynamics, y, u_applied)
 
 
 class AbstractDisturbance(eqx.Module):

@@ -6,15 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Int
 
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractCoordinates,
-    Inputs,
-    Measurement,
-    Outputs,
-    Time,
-    known_acceleration,
-)
+from undertow.core.contracts import AbstractController, AbstractCoordinates, Inputs, Measurement, Outputs, Time
 from undertow.core.measurement import with_outputs
 
 
@@ -61,7 +53,7 @@ class Expected(NamedTuple):
         self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
         """One sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
-        known = known_acceleration(law, z, y, applied)
+        known = law.known_acceleration(z, y, applied)
         acceleration = known if estimate is None else known + estimate
         rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)

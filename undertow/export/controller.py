@@ -12,7 +12,7 @@ from undertow.autopilot.measured_motion import Format
 from undertow.autopilot.output import output_of
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
-from undertow.core.contracts import AbstractGatedController, starting_at
+from undertow.core.contracts import starting_at
 from undertow.core.errors import BadInput
 from undertow.export.c_program import Exported, Function, Program, System, made_from
 from undertow.loop.simd_batch import Unsupported
@@ -120,7 +120,7 @@ def _system(built: Built, name: str, of: Functions) -> System:
 
         A supervisor gets the time as it is.
         """
-        if isinstance(of.controller, AbstractGatedController):
+        if of.controller.takes_raw_readings:
             return answered(*of.following(of.controller, memory, Given(*inputs[:4]), inputs.applied, inputs.dt))
         usual = jnp.asarray(period, dtype=inputs.dt.dtype)
         passed = (inputs.dt > 0) & (inputs.dt < jnp.inf)

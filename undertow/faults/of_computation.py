@@ -7,14 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractGatedController,
-    AbstractInformedController,
-    Inputs,
-    Model,
-    known_acceleration,
-)
+from undertow.core.contracts import AbstractController, Inputs, Model
 from undertow.faults.mode import AbstractComputationFault, Instant
 from undertow.faults.occurrence import Occurrence
 
@@ -36,15 +29,15 @@ class ComputedState(NamedTuple):
     counts: tuple[Int[Array, ""], ...]  # control steps so far in which each fault was present
 
 
-class AbstractComputed(AbstractController):
+class FaultyComputer(AbstractController):
     """A controller on a computer that fails: it is computed late, twice, not at all, or its memory is altered.
 
     While it is not computed, the last input is held. The signals of such a step are those that the law would give.
     """
 
-    model: eqx.AbstractVar[Model]
-    law: eqx.AbstractVar[AbstractController]
-    faults: eqx.AbstractVar[tuple[ComputationFault, ...]]
+    model: Model
+    law: AbstractController
+    faults: tuple[ComputationFault, ...]
 
     def init(self, y, r):
         none = jnp.zeros((), dtype=int)
@@ -71,6 +64,13 @@ class AbstractComputed(AbstractController):
     def signals(self):
         return self.law.signals()
 
+    def known_acceleration(self, z: ComputedState, y, u_applied):
+        return self.law.known_acceleration(z.law, y, u_applied)
+
+    @property
+    def takes_raw_readings(self):
+        return self.law.takes_raw_readings
+
     def _now(self, z: ComputedState) -> list[Instant]:
         timings = [one.occurrence.fixed() for one in self.faults]
         return [
@@ -92,49 +92,16 @@ class AbstractComputed(AbstractController):
         return law, runs, dt, twice
 
 
-class Computed(AbstractComputed):
-    """A law on a computer that fails."""
-
-    model: Model
-    law: AbstractController
-    faults: tuple[ComputationFault, ...]
-
-
-class ComputedInformed(AbstractComputed, AbstractInformedController):
-    """The same of a law that models more of the acceleration."""
-
-    model: Model
-    law: AbstractController
-    faults: tuple[ComputationFault, ...]
-
-    def known_acceleration(self, z: ComputedState, y, u_applied):
-        return known_acceleration(self.law, z.law, y, u_applied)
-
-
-class ComputedGated(AbstractComputed, AbstractGatedController):
-    """The same of a controller that gets readings which are not finite."""
-
-    model: Model
-    law: AbstractController
-    faults: tuple[ComputationFault, ...]
-
-    def known_acceleration(self, z: ComputedState, y, u_applied):
-        return known_acceleration(self.law, z.law, y, u_applied)
-
-
 def computed(law: AbstractController, faults: tuple[ComputationFault, ...]) -> AbstractController:
     """The controller on a computer with these faults, which act in their order; itself without any."""
     if not faults:
         return law
-    if isinstance(law, AbstractGatedController):
-        return ComputedGated(law.model, law, faults)
-    kind = ComputedInformed if isinstance(law, AbstractInformedController) else Computed
-    return kind(law.model, law, faults)
+    return FaultyComputer(law.model, law, faults)
 
 
 def law_of_computed(controller: AbstractController) -> AbstractController:
     """The controller on a computer without faults."""
-    return controller.law if isinstance(controller, AbstractComputed) else controller
+    return controller.law if isinstance(controller, FaultyComputer) else controller
 
 
 def _where(condition, new, old):

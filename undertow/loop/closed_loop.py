@@ -13,7 +13,6 @@ from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
     AbstractFaults,
-    AbstractGatedController,
     AbstractInformedNavigation,
     AbstractNavigation,
     AbstractPlant,
@@ -24,7 +23,6 @@ from undertow.core.contracts import (
     Outputs,
     Target,
     Time,
-    known_acceleration,
     starting_at,
 )
 from undertow.core.errors import BadInput
@@ -176,8 +174,8 @@ class Realization(NamedTuple):
         if measuring.expected is None:
             return y, MeasurementState(state, None, faults)
         repaired, expected = measuring.expected.repaired(loop.controller.model.coordinates, y)
-        gated = isinstance(loop.controller, AbstractGatedController)
-        return (y if gated else repaired), MeasurementState(state, expected, faults)
+        received = y if loop.controller.takes_raw_readings else repaired
+        return received, MeasurementState(state, expected, faults)
 
     def failed(self, faults: PyTree, t: Time, x: PyTree, applied: Inputs) -> tuple[Inputs, PyTree]:
         """Input that acts on the plant, and the state of the faults, of a loop with faults."""
@@ -202,7 +200,7 @@ class Realization(NamedTuple):
             "error": controller.model.coordinates.difference(r.position, truth.position),
             # From the true acceleration; it includes Delta of Eq. (3).
             "uncertainty": controller.model.coordinates.acceleration(truth, acceleration)
-            - known_acceleration(controller, z, truth, applied),
+            - controller.known_acceleration(z, truth, applied),
             "input": applied,
             "commanded_input": command,
             "power": effort.power,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from jaxtyping import PyTree
 
-from undertow.core.contracts import AbstractController, AbstractGatedController, Inputs, Measurement, Target, Time
+from undertow.core.contracts import AbstractController, Inputs, Measurement, Target, Time
 from undertow.core.expected_measurement import Expected, at_start
 
 
@@ -51,7 +51,7 @@ def next_step(
     """
     state, before, _, estimate, expected = memory
     advanced = law.advance(state, before, memory.r, applied, dt)
-    if not isinstance(law, AbstractGatedController):
+    if not law.takes_raw_readings:
         expected = expected.after(law, state, before, None if isinstance(estimate, tuple) else estimate, applied, dt)
         y, expected = expected.repaired(law.model.coordinates, y)
     return _decided(law, advanced, y, r, expected)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 
-from undertow.core.contracts import AbstractGatedController, Outputs
+from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
 from undertow.core.returned import check_state
 from undertow.loop.closed_loop import ClosedLoop, Realization
@@ -136,7 +136,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
     check_state(law, new_z, z)
     remembered = decision.measuring
-    if remembered.expected is not None and not isinstance(law, AbstractGatedController):
+    if remembered.expected is not None and not law.takes_raw_readings:
         expected = remembered.expected.after(law, z, y, decision.signals.get("estimate"), decision.applied, dt)
         remembered = remembered._replace(expected=expected)
     new = (new_x, new_z, remembered)

@@ -57,7 +57,7 @@ _CONTRACTS = {
     "references": contracts.AbstractReference,
     "sensors": AbstractSensor,
     "navigation": contracts.AbstractNavigation,
-    "supervision": contracts.AbstractGatedController,
+    "supervision": contracts.AbstractController,
     "faults": AbstractFault,
     "metrics": AbstractMetric,
 }

@@ -10,14 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.controllers.bandwidths import largest_forces
 from undertow.core import checks
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractRestartable,
-    Measurement,
-    Model,
-    Target,
-    known_acceleration,
-)
+from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
 from undertow.core.runtime import double_outside_runs
@@ -44,7 +37,7 @@ class FaultTolerantState(NamedTuple):
     monitor: MonitorState
 
 
-class FaultTolerantController(AbstractRestartable):
+class FaultTolerantController(AbstractController):
     """A law whose failed actuators are detected and taken out of the allocation.
 
     A failed actuator gets the command 0, and the law a model without it. What a stuck one still gives is a load to the
@@ -93,7 +86,7 @@ class FaultTolerantController(AbstractRestartable):
         return FaultTolerantState(law, self.monitor.advance(z.monitor, self.body_model, y, u_applied, used, dt))
 
     def known_acceleration(self, z: FaultTolerantState, y: Measurement, u_applied):
-        return known_acceleration(self._reduced(self._used(z.monitor, y)), z.law, y, u_applied)
+        return self._reduced(self._used(z.monitor, y)).known_acceleration(z.law, y, u_applied)
 
     def signals(self):
         return self.law.signals() | _SIGNALS

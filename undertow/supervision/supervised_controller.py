@@ -9,17 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from undertow.core import checks
-from undertow.core.contracts import (
-    AbstractController,
-    AbstractGatedController,
-    AbstractRestartable,
-    Inputs,
-    Measurement,
-    Model,
-    Outputs,
-    Target,
-    known_acceleration,
-)
+from undertow.core.contracts import AbstractController, Inputs, Measurement, Model, Outputs, Target
 from undertow.core.expected_measurement import all_finite
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
@@ -104,7 +94,7 @@ class SupervisedState(NamedTuple):
     log: TransitionLog
 
 
-class Supervised(AbstractGatedController):
+class Supervised(AbstractController):
     """A controller between gates. Where nothing is wrong its input has the bits of the controller's own.
 
     Raises:
@@ -309,8 +299,13 @@ class Supervised(AbstractGatedController):
         )
         return jax.tree.map(lambda fresh, old: fresh.astype(old.dtype), new, after)
 
+    @property
+    def takes_raw_readings(self) -> bool:
+        """The gate judges them."""
+        return True
+
     def known_acceleration(self, z: SupervisedState, y: Measurement, u_applied: Inputs) -> Outputs:
-        return known_acceleration(self.law, z.law, y, u_applied)
+        return self.law.known_acceleration(z.law, y, u_applied)
 
     def signals(self):
         return self.law.signals() | SIGNALS
@@ -380,21 +375,21 @@ class Supervised(AbstractGatedController):
 
         def begun() -> tuple[PyTree, PyTree]:
             if self.fallback is None:
-                return _begun(self.law, self._knowledge(z), y, r), ()
-            return _begun(self.law, self._knowledge(z), y, r), _begun(self.fallback, self._knowledge(z), y, r)
+                return self.law.restarted(self._knowledge(z), y, r), ()
+            return self.law.restarted(self._knowledge(z), y, r), self.fallback.restarted(self._knowledge(z), y, r)
 
         held = lambda: (z.law, z.fallback)
         goes_on = view.controls & ~broken & ~again
         return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(again, begun, held))
 
     def _knowledge(self, z: SupervisedState) -> PyTree:
-        """What law and fallback know and must not lose: of the one that controls; () where they know nothing."""
-        if not isinstance(self.law, AbstractRestartable):
-            return ()
+        """What law and fallback know and must not lose: of the one that controls, where both know the same things."""
         known = _readable(self.law.knowledge(z.law))
-        if not isinstance(self.fallback, AbstractRestartable):
+        if self.fallback is None:
             return known
         own = _readable(self.fallback.knowledge(z.fallback))
+        if jax.tree.structure(own) != jax.tree.structure(known):
+            return known
         return jax.tree.map(lambda a, b: jnp.where((z.fallback_controls > 0), a, b), own, known)
 
     def _allowance(self, z: SupervisedState, view: View, elapsed: Scalar) -> AllowanceState:
@@ -450,7 +445,7 @@ class Supervised(AbstractGatedController):
     def _rate(self, z: SupervisedState, view: View, u: Inputs) -> Array:
         """Rate of the velocity by the model and the law's estimate of the uncertainty, m/s^2 and rad/s^2."""
         y = view.passed.measurement
-        known = known_acceleration(self.law, z.law, y, u)
+        known = self.law.known_acceleration(z.law, y, u)
         acceleration = known
         if "estimate" in view.signals:
             # One that has diverged would make a jump of every reading.
@@ -473,11 +468,6 @@ def _with_restart(times: Array, time: Scalar) -> Array:
 def _controls(state: Int[Array, ""]) -> Bool[Array, ""]:
     """Whether the command of a law leaves in this state."""
     return (state == int(State.ACTIVE)) | (state == int(State.DEGRADED))
-
-
-def _begun(law: AbstractController, knowledge: PyTree, y: Measurement, r: Target) -> PyTree:
-    """State of a law that begins again; a law that knows of failed thrusters does not forget them."""
-    return law.restarted(knowledge, y, r) if isinstance(law, AbstractRestartable) else law.init(y, r)
 
 
 def _cause(values: PerCondition, limits: PerCondition, reason: Int[Array, ""]) -> Float[Array, "2"]:

@@ -17,7 +17,7 @@ from jaxtyping import Array, PyTree
 
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractContinuousController, Load, Target, Water, known_acceleration
+from undertow.core.contracts import AbstractContinuousController, Load, Target, Water
 from undertow.core.measurement import with_outputs
 from undertow.loop.closed_loop import ClosedLoop
 
@@ -178,7 +178,7 @@ def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array
         "position": truth.position,
         "error": law.model.coordinates.difference(r.position, truth.position),
         "uncertainty": law.model.coordinates.acceleration(truth, plant.acceleration(zero, x, u, pushed))
-        - known_acceleration(law, z, truth, u),
+        - law.known_acceleration(z, truth, u),
     }
     values |= {name: of_law[name] for name in SIGNALS if name in of_law}
     if isinstance(law, AbstractContinuousController):

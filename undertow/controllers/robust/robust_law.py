@@ -15,7 +15,7 @@ from undertow.controllers.robust.memory import Memory, MemoryState, Observed
 from undertow.controllers.thruster_allocation import allocate, attained
 from undertow.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.core import checks
-from undertow.core.contracts import AbstractInformedController, Measurement, Model, Target, TrackingError
+from undertow.core.contracts import AbstractController, Measurement, Model, Target, TrackingError
 from undertow.core.param import Param, param
 from undertow.estimation.fuzzy_system import FuzzySystem
 from undertow.numerics.linear_algebra import companion_lyapunov, matvec
@@ -59,7 +59,7 @@ class Plan(NamedTuple):
     recalled: Recalled | None
 
 
-class RobustRCAF(AbstractInformedController):
+class RobustRCAF(AbstractController):
     """The paper's structure in body axes, with the applied input in the estimator and actuator limits.
 
     Unlike in Eq. (23), the drift is compensated as it is at the velocity of the target; the estimator takes the one at
