@@ -1,7 +1,7 @@
 """Catalogue of parts: each vehicle, thruster, plant, controller, ... is one file, and there is no list of them.
 
 A module of a part folder whose name is also the name of a callable inside it is a part: `vehicles/odin.py`
-with `def odin()`. Other parts are named `./my_rov.py:my_rov`, or come as Python entry points of the group
+with `def odin()`. A module with several small parts names them in `PARTS`. Other parts are named `./my_rov.py:my_rov`, or come as Python entry points of the group
 `undertow.<kind>`.
 """
 
@@ -67,10 +67,12 @@ def collect(package: ModuleType) -> dict[str, Part]:
     parts = {}
     for info in pkgutil.iter_modules(package.__path__):
         module = importlib.import_module(f"{package.__name__}.{info.name}")
-        part = getattr(module, info.name, None)
-        if callable(part):
-            parts[info.name] = double_outside_runs(_of_a_model(part))
-            setattr(module, info.name, parts[info.name])
+        by_name = {part.__name__: part for part in getattr(module, "PARTS", ())}
+        if callable(part := getattr(module, info.name, None)):
+            by_name[info.name] = part
+        for name, part in by_name.items():
+            parts[name] = double_outside_runs(_of_a_model(part))
+            setattr(module, name, parts[name])
     return parts
 
 

@@ -1,4 +1,4 @@
-"""Faults of sensors, thrusters, power, plant and computation. One file per mode; `undertow list faults` shows all."""
+"""Faults of sensors, thrusters, power, plant and computation. Modes by role; `undertow list faults` shows all."""
 
 from undertow.core.catalogue import publish
 
