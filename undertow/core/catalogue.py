@@ -1,8 +1,8 @@
 """Catalogue of parts: each vehicle, thruster, plant, controller, ... is one file, and there is no list of them.
 
-A module of a part folder whose name is also the name of a callable inside it is a part: `vehicles/odin.py`
-with `def odin()`. A module with several small parts names them in `PARTS`. Other parts are named `./my_rov.py:my_rov`, or come as Python entry points of the group
-`undertow.<kind>`.
+A module of a part folder whose name is also the name of a callable inside it is a part: `vehicles/odin.py` with `def
+odin()`. A module with several small parts names them in `PARTS`. Other parts are named `./my_rov.py:my_rov`, or come
+as Python entry points of the group `undertow.<kind>`.
 """
 
 import ast
