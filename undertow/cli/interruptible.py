@@ -15,6 +15,7 @@ Result = TypeVar("Result")
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 _AGAIN = 0.05  # s, until the next look whether modules are still being imported
+_STUCK = 5.0  # s, for which a loop may not have looked for a signal
 _LONGEST = 20.0  # s, longest wait for an import: a user's file may never end
 
 _asked: list[tuple[int, float]] = []  # the signals received, with their times
@@ -79,21 +80,25 @@ class EndingSignal:
     """
 
     def __init__(self) -> None:
-        self.number = 0
+        self.number, self._looked = 0, time.monotonic()
 
     def asked(self) -> bool:
-        """Whether one has come."""
+        """Whether one has come; a loop that has not looked for 5 s is interrupted instead."""
+        self._looked = time.monotonic()
         return self.number != 0
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[None]:
         """Inside, signals do not raise: the loop asks, and ends with its safe output."""
+        self._looked = time.monotonic()
 
         def note(number: int, frame: FrameType | None) -> None:
             if not self.number:
                 self.number = number
                 with contextlib.suppress(OSError):  # nobody reads it: the terminal is gone, or the pipe closed
                     os.write(2, b"\nInterrupted: stopping.\n")
+            if time.monotonic() - self._looked > _STUCK:  # as in a line that nobody reads
+                raise KeyboardInterrupt
 
         before = {one: signal.signal(one, note) for one in ending_signals()}
         try:

@@ -130,7 +130,8 @@ class ControllerLink(AbstractPacingLink):
         self._reporter.over("stopped")
 
     def note_stop(self, reason: str) -> None:
-        self._reporter.trouble("stopped", f"{reason} from {self._odometry.topic}: zero thrust until that is over")
+        hint = ". Where odometry is slow, give its rate as --rate" if "irregular" in reason else ""
+        self._reporter.trouble("stopped", f"{reason} from {self._odometry.topic}: zero thrust until that is over{hint}")
 
     def counts(self) -> dict[str, int]:
         counts = {"odometry": self._odometry.received, "targets": self._targets.received}
