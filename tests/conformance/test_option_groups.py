@@ -28,23 +28,23 @@ class Weather(OptionGroup):
 
 
 @flat_options("sun")
-def sail(boat: str, *, weather: Weather = Weather(rain=2), crew: Annotated[int, "people"] = 1) -> tuple:
+def sail(boat: str, *, weather: Weather = Weather(rain=2), sailors: Annotated[int, "people"] = 1) -> tuple:
     """Sail.
 
     Args:
         boat: name.
-        crew: number.
+        sailors: number.
         rain: of today.
 
     Raises:
         BadInput: never.
     """
-    return boat, weather, crew
+    return boat, weather, sailors
 
 
 def test_options_are_given_by_name():
     assert sail("Ida", wind=3.0) == ("Ida", Weather(3.0, 2), 1)
-    assert sail("Ida", crew=2, rain=0) == ("Ida", Weather(1.0, 0), 2)
+    assert sail("Ida", sailors=2, rain=0) == ("Ida", Weather(1.0, 0), 2)
     assert sail("Ida", weather=Weather(5.0), rain=1) == ("Ida", Weather(5.0, 1), 1)
 
 
@@ -56,11 +56,11 @@ def test_what_is_no_option_is_none():
 
 def test_signature_and_docstring_have_them():
     options = list(inspect.signature(sail).parameters.values())[1:]
-    assert [(option.name, option.default) for option in options] == [("wind", 1.0), ("rain", 2), ("crew", 1)]
+    assert [(option.name, option.default) for option in options] == [("wind", 1.0), ("rain", 2), ("sailors", 1)]
     people = Annotated[int, "people"]
-    assert sail.__annotations__ == {"boat": str, "wind": float, "rain": Any, "crew": people, "return": tuple}
+    assert sail.__annotations__ == {"boat": str, "wind": float, "rain": Any, "sailors": people, "return": tuple}
     assert inspect.getdoc(sail) == (
-        "Sail.\n\nArgs:\n    boat: name.\n    crew: number.\n    rain: of today.\n    wind: speed, m/s; and\n"
+        "Sail.\n\nArgs:\n    boat: name.\n    sailors: number.\n    rain: of today.\n    wind: speed, m/s; and\n"
         "        gusts, too.\n\nRaises:\n    BadInput: never."
     )
 

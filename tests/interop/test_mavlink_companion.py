@@ -41,16 +41,12 @@ class Talk:
 
     def hear(self, received):
         measurement, was_running = self.companion.receive(received, self.now), self.session.running
-        objection = self.companion.objection(self.now)
-        if measurement is None:
-            self.session.stop_if_lost(self.now, objection)
-            return []
-        volts = self.session.follow(measurement, self.now, objection)
+        volts = self.session.follow(measurement, self.now, self.companion.objection(self.now))
         if volts is None:
             return []
         if not was_running:
             self.companion.note_begin()
-        return self.companion.commands(volts, self.time_usec)
+        return self.companion.commands(volts, 1000 * self.time_usec)
 
     @property
     def state(self):
@@ -86,7 +82,7 @@ class Talk:
     def idle(self, passed=0.0):
         self.now += passed
         self.time_usec += round(1e6 * passed)
-        self.session.stop_if_lost(self.now, self.companion.objection(self.now))
+        self.session.follow(None, self.now, self.companion.objection(self.now))
         due = self.session.is_safe_output_due(self.now)
         return self.companion.due(self.now) + (self.companion.commands(np.zeros(8)) if due else [])
 

@@ -98,9 +98,9 @@ def test_silence_stops_it_and_the_next_measurement_starts_it_at_what_is_applied(
     session = Session()
     assert not session.is_safe_output_due(0.0)  # it has not run
     session.at(1.0)
-    session.stop_if_lost(1.0 + MAX_AGE)
+    session.follow(None, 1.0 + MAX_AGE)
     assert session.running
-    session.stop_if_lost(1.01 + MAX_AGE)
+    session.follow(None, 1.01 + MAX_AGE)
     assert not session.running and session.state() == "no valid measurement"
     due = [session.is_safe_output_due(1.51 + k * 1.01 * SAFE_PERIOD / 4) for k in range(9)]
     assert due == [True, False, False, False] * 2 + [True]
@@ -122,7 +122,7 @@ def test_what_a_supervisor_holds_is_the_operators_to_end(state):
     session.autopilot.state = state
     assert session.at(3.0) == ("step", 2.0)
     assert session.at(3.01) == ("step", None)
-    session.stop_if_lost(3.01, "disarmed")
+    session.follow(None, 3.01, "disarmed")
     assert session.state("disarmed") == "disarmed" and not session.running
     assert session.at(3.02, "disarmed") is None
     assert session.at(3.03) == ("start", list(APPLIED))

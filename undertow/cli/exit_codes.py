@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from undertow.cli.interruptible import interrupted_by, raise_if_interrupted
+from undertow.cli.interruptible import BY_SIGNAL, interrupted_by, raise_if_interrupted
 from undertow.core.errors import BadInput, printable
 
 DONE = 0
@@ -20,8 +20,7 @@ BAD_INPUT = 2
 INTERNAL_ERROR = 3
 FILES_FAILED = 4
 INTERRUPTED = 130  # by Ctrl-C; other signals have other codes
-_BY_SIGNAL = 128  # and the number of the signal
-NOBODY_READS = _BY_SIGNAL + signal.SIGPIPE
+NOBODY_READS = BY_SIGNAL + signal.SIGPIPE
 
 # What Python code of a user may end with, beside exceptions.
 _OF_PLUG_INS = (SystemExit, GeneratorExit)
@@ -35,10 +34,10 @@ MEANINGS = {
     FILES_FAILED: "Files could not be read or written.",
     INTERRUPTED: "Interrupted by Ctrl-C.",
     NOBODY_READS: "Nobody reads the output any more, as after `undertow list | head -3`; nothing is said.",
-    _BY_SIGNAL
+    BY_SIGNAL
     + signal.SIGTERM: "Ended by SIGTERM, for example by `kill` or the end of a SLURM job; otherwise like Ctrl-C.",
-    _BY_SIGNAL + signal.SIGHUP: "Ended by SIGHUP: the terminal or the ssh connection is gone; otherwise like Ctrl-C.",
-    _BY_SIGNAL + signal.SIGQUIT: "Ended by SIGQUIT, as by Ctrl-\\; otherwise like Ctrl-C.",
+    BY_SIGNAL + signal.SIGHUP: "Ended by SIGHUP: the terminal or the ssh connection is gone; otherwise like Ctrl-C.",
+    BY_SIGNAL + signal.SIGQUIT: "Ended by SIGQUIT, as by Ctrl-\\; otherwise like Ctrl-C.",
 }
 
 
@@ -47,9 +46,9 @@ def run_guarded(command: Any, arguments: Sequence[str]) -> int:
     try:
         code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
         raise_if_interrupted()
-        return _BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
+        return BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:
-        return _BY_SIGNAL + interrupted_by()
+        return BY_SIGNAL + interrupted_by()
     except (Exception, *_OF_PLUG_INS) as error:
         # Typer makes SystemExit of it.
         if isinstance(error.__context__, BrokenPipeError) and _nobody_reads():

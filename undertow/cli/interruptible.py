@@ -14,6 +14,8 @@ Result = TypeVar("Result")
 # Ctrl-C, `kill`, the end of the terminal or of an ssh connection, and Ctrl-\\.
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
+BY_SIGNAL = 128  # and the number of the signal: exit code of a command that one ends
+
 _AGAIN = 0.05  # s, until the next look whether modules are still being imported
 _STUCK = 5.0  # s, for which a loop may not have looked for a signal
 _LONGEST = 20.0  # s, longest wait for an import: a user's file may never end
@@ -81,6 +83,11 @@ class EndingSignal:
 
     def __init__(self) -> None:
         self.number, self._looked = 0, time.monotonic()
+
+    @property
+    def exit_code(self) -> int:
+        """That of a command which it ends; 0 without one."""
+        return BY_SIGNAL + self.number if self.number else 0
 
     def asked(self) -> bool:
         """Whether one has come; a loop that has not looked for 5 s is interrupted instead."""

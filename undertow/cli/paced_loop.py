@@ -37,4 +37,4 @@ def run_until_signal(
             report(f"Ended: {loop.counts_line(link)}. The last command is the safe output")
     for trouble in troubles:
         complain(trouble)
-    return 128 + stop.number if stop.number else FILES_FAILED if troubles else DONE
+    return stop.exit_code or (FILES_FAILED if troubles else DONE)

@@ -203,7 +203,7 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
 def _ending(reason: Reason, link: AbstractLink, command: RunCommand, stop: EndingSignal) -> int:
     """The exit code, with a line about a failure."""
     if reason is Reason.STOPPED:
-        return 128 + stop.number
+        return stop.exit_code
     if link.failed:
         complain(link.ended)
     elif reason is Reason.LINK_LOST:
@@ -259,4 +259,4 @@ def _serve(built: Built, command: RunCommand) -> int:
     typer.echo(f"Ended. Commands: {said or 'none'}. The last one: {np.array2string(server.last_command, precision=4)}")
     if server.ended:
         complain(server.ended)
-    return RUN_FAILED if server.ended else 128 + stop.number if stop.number else DONE
+    return RUN_FAILED if server.ended else stop.exit_code

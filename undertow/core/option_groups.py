@@ -39,16 +39,22 @@ def flat_options(*without: str) -> Callable[[Callable[..., Part]], Callable[...,
 
         hints, shown = get_type_hints(function, include_extras=True), []
         for parameter in parameters:
-            shown += options[parameter.name].values() if parameter.name in groups else [parameter]
-        flat.__signature__ = inspect.Signature(shown)  # type: ignore[attr-defined]
-        own = {parameter.name for parameter in parameters} - set(groups)
-        flat.__annotations__ = {name: hint for name, hint in hints.items() if name in own or name == "return"}
-        flat.__annotations__ |= {one.name: one.annotation for one in shown if one.name not in own}
+            own = [parameter.replace(annotation=hints.get(parameter.name, parameter.annotation))]
+            shown += options[parameter.name].values() if parameter.name in groups else own
+        set_signature(flat, inspect.Signature(shown, return_annotation=hints.get("return", inspect.Signature.empty)))
         for name, group in groups.items():
             flat.__doc__ = _explained(flat.__doc__ or "", group, options[name])
         return flat
 
     return decorate
+
+
+def set_signature(function: Callable[..., Any], signature: inspect.Signature) -> None:
+    """Let a function have a signature, also for those who read its annotations."""
+    function.__signature__ = signature  # type: ignore[attr-defined] - `inspect` reads it where it is there
+    annotations = {one.name: one.annotation for one in signature.parameters.values()}
+    annotations["return"] = signature.return_annotation
+    function.__annotations__ = {name: one for name, one in annotations.items() if one is not inspect.Signature.empty}
 
 
 def _options_of(group: OptionGroup, without: tuple[str, ...]) -> dict[str, inspect.Parameter]:

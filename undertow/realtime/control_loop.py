@@ -193,11 +193,7 @@ class RealTimeLoop:
         begun, was_running = self._clock.now(), self.session.running
         measurement = link.receive(elapsed)
         objection = link.objection()
-        if measurement is None:
-            self.session.stop_if_lost(now, objection)
-            command = None
-        else:
-            command = self.session.follow(measurement, now, objection)
+        command = self.session.follow(measurement, now, objection)
         if command is not None:
             if not was_running:
                 link.note_begin()

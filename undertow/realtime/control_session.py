@@ -72,15 +72,17 @@ class ControlSession:
         more |= {"target": measured.target, "propellers": measured.propellers, "health": measured.health}
         return method(*motion, **more)
 
-    def follow(self, measurement: LinkMeasurement, now: float, objection: str = "") -> np.ndarray | None:
-        """The command that answers a measurement; None where there is none.
+    def follow(self, measurement: LinkMeasurement | None, now: float, objection: str = "") -> np.ndarray | None:
+        """The command that answers a measurement; None where there is none. Call it often, also without one.
 
         Args:
-            measurement: of the present, with its stamp.
+            measurement: of the present, with its stamp; None where none came.
             now: s, of the clock by which measurements grow old.
             objection: why the controller may not run; "" where it may.
         """
-        self.stop_if_lost(now, objection)
+        self._stop_if_lost(now, objection)
+        if measurement is None:
+            return None
         before, self._stamp = self._stamp, measurement.stamp
         if measurement.elapsed == 0:
             self.running, before = False, None
@@ -89,7 +91,7 @@ class ControlSession:
             self.counts["irregular"] = self._rate.counted
         if measurement.has_pose:
             self._located = now
-        self.stop_if_lost(now, objection)
+        self._stop_if_lost(now, objection)
         if self._rate.irregular or objection:
             return None
         if before is None or not self.running:
@@ -104,8 +106,8 @@ class ControlSession:
         self._stepped, self.running, self._operator_objected = measurement.stamp, True, False
         return command
 
-    def stop_if_lost(self, now: float, objection: str = "") -> None:
-        """Stop the controller where it may not run any more; call it often. Arguments as those of `follow`."""
+    def _stop_if_lost(self, now: float, objection: str) -> None:
+        """Stop the controller where it may not run any more."""
         self._located = min(self._located, now)  # the clock of a simulation may be set back
         self._safe_sent = min(self._safe_sent, now)
         self._operator_objected |= bool(objection)

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any, ClassVar, get_type_hints
 
+from undertow.core.option_groups import set_signature
+
 
 @dataclasses.dataclass(frozen=True)
 class Command:
@@ -46,8 +48,7 @@ class Command:
         hints = get_type_hints(cls, include_extras=True)
         fields = [field for field in dataclasses.fields(cls) if field.init]
         run.__name__, run.__doc__ = cls.word(), cls.__doc__
-        run.__annotations__ = {field.name: hints[field.name] for field in fields}
-        run.__signature__ = inspect.Signature([_parameter(field, hints[field.name]) for field in fields])  # type: ignore[attr-defined]
+        set_signature(run, inspect.Signature([_parameter(field, hints[field.name]) for field in fields]))
         return run
 
 

@@ -157,9 +157,9 @@ class Companion:
         """The controller begins: in the flight mode that the vehicle has now."""
         self._permission.begin()
 
-    def commands(self, volts: np.ndarray, time_usec: int = 0) -> list[Any]:
-        """Commands to the thrusters for the volts of a controller; `time_usec` is that of the odometry they answer."""
-        return self._driver.commands(volts, time_usec)
+    def commands(self, volts: np.ndarray, stamp: int = 0) -> list[Any]:
+        """Commands to the thrusters for the volts of a controller; `stamp` (ns) is of the measurement they answer."""
+        return self._driver.commands(volts, stamp // _MICROSECOND)
 
     def neutral(self) -> list[Any]:
         """Commands that stop all thrusters."""

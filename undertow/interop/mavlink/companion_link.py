@@ -37,7 +37,7 @@ class CompanionLink(AbstractPacingLink):
         self._companion, self._link, self._clock = companion, link, clock or MonotonicClock()
         self._messages: list[tuple[Any, Any]] = []  # that have come and were not looked at, with their senders
         self._talked = self._held = -np.inf  # s, last message of the target; last words to the watchdog
-        self._answered_usec = 0  # time of the odometry that the next command answers
+        self._answered = 0  # stamp of the measurement that the next command answers, ns
         self._begun, self._superseded = False, 0
         self._watchdog: Watchdog | None = None
 
@@ -63,7 +63,7 @@ class CompanionLink(AbstractPacingLink):
             measurement = self._companion.receive(message, now)
             newest = newest if measurement is None else measurement
         if newest is not None:
-            self._answered_usec = newest.stamp // 1000
+            self._answered = newest.stamp
         return newest
 
     def objection(self) -> str:
@@ -75,8 +75,8 @@ class CompanionLink(AbstractPacingLink):
 
     def send(self, command: np.ndarray) -> None:
         self._hold_if_due()  # before the first command, too
-        self._link.send(self._companion.commands(command, self._answered_usec))
-        self._answered_usec = 0
+        self._link.send(self._companion.commands(command, self._answered))
+        self._answered = 0
 
     def finish(self, safe: np.ndarray) -> None:
         for _ in range(_LAST if self._begun else 0):
