@@ -197,9 +197,9 @@ class RealTimeLoop:
         if command is not None:
             if not was_running:
                 link.note_begin()
+            self.statistics.steps += 1  # whoever sees the command sees it counted
             link.send(command)
             self.statistics.computing.add(self._clock.now() - begun)
-            self.statistics.steps += 1
             self._autopilot.log_step()
         elif was_running and not self.session.running:
             link.note_stop(self.session.state(objection))
