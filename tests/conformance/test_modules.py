@@ -86,8 +86,14 @@ def is_abstract_method(method):
     return getattr(method, "__isabstractmethod__", False)
 
 
-# Of a thruster that is commanded in newtons and not in volts, and of one whose motor is known.
-STILL_OVERRIDDEN = {f"AbstractThruster.{name}" for name in ("limits", "terminal", "electrical_power", "actuator_model")}
+# Capabilities that a part may have, with the default of a part that has not:
+# a thruster that is commanded in newtons and not in volts, or whose motor is known;
+# a controller that knows its acceleration, has knowledge to carry over, or can be restarted.
+CAPABILITIES = {
+    "AbstractThruster": ("limits", "terminal", "electrical_power", "actuator_model"),
+    "AbstractController": ("known_acceleration", "knowledge", "restarted"),
+}
+STILL_OVERRIDDEN = {f"{part}.{capability}" for part in CAPABILITIES for capability in CAPABILITIES[part]}
 
 
 @pytest.mark.full
