@@ -13,8 +13,8 @@ from undertow.core import runtime
 from undertow.loop.loop_runs import numbers_of
 from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import from_data, read
-from undertow.simulation.prepared_run import loop_run
 
 pytestmark = pytest.mark.full
 

@@ -88,9 +88,11 @@ def is_abstract_method(method):
 
 # Capabilities that a part may have, with the default of a part that has not:
 # a thruster that is commanded in newtons and not in volts, or whose motor is known;
+# a navigation filter that simulates sensors;
 # a controller that knows its acceleration, has knowledge to carry over, or can be restarted.
 CAPABILITIES = {
     "AbstractThruster": ("limits", "terminal", "electrical_power", "actuator_model"),
+    "AbstractNavigation": ("simulated_sensors",),
     "AbstractController": ("known_acceleration", "knowledge", "restarted"),
 }
 STILL_OVERRIDDEN = {f"{part}.{capability}" for part in CAPABILITIES for capability in CAPABILITIES[part]}

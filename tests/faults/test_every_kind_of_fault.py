@@ -16,11 +16,11 @@ from undertow.core.contracts import Measurement, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.faults.kinds import list_kinds
 from undertow.faults.quantities import quantities_of
-from undertow.navigation.from_sensors import Received
 from undertow.navigation.kalman import kalman
 from undertow.scenario.build import build
 from undertow.scenario.faulted import faulted
 from undertow.scenario.schema import Fault
+from undertow.sensors.received import Received
 from undertow.thrusters.thruster import PropellerReport
 
 DT, FIRST, STOP, STEPS = 0.01, 3, 8, 11

@@ -8,13 +8,13 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.navigation.disagreement import distrusted
-from undertow.navigation.from_sensors import Received
 from undertow.navigation.inertial_gate import gate_for
 from undertow.navigation.kalman import kalman
 from undertow.navigation.observer import observer
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.sensors import compass, depth, dvl, imu, position_fix
+from undertow.sensors.received import Received
 
 STEP = 0.01  # s
 AT_REST = np.array([0, 0, 0, 0, 0, 0, 0, -9.81])

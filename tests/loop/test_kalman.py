@@ -15,11 +15,11 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
-from undertow.navigation.from_sensors import Received
 from undertow.navigation.kalman import ATTITUDE, FORCE_BIAS, GYRO_BIAS, POSITION, VELOCITY, Kalman, kalman
 from undertow.navigation.observability import Sensed, deviations, unobservable
 from undertow.sensors import compass, depth, dvl, imu, position_fix
 from undertow.sensors.imu import IMU
+from undertow.sensors.received import Received
 from undertow.sensors.sampling import Sampling
 from undertow.sensors.sensor import AbstractSensor
 

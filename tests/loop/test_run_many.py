@@ -8,7 +8,8 @@ from undertow.loop import batch_runner
 from undertow.loop.loop_runs import numbers_of
 from undertow.loop.simd_batch import Unsupported
 from undertow.scenario.build import build
-from undertow.simulation.prepared_run import PreparedRun, RunBatch, prepare
+from undertow.scenario.prepare import prepare
+from undertow.simulation.prepared_run import PreparedRun, RunBatch
 from undertow.simulation.programs import ProgramCache
 from undertow.simulation.run_many import in_order, run_many, run_together
 

@@ -7,8 +7,9 @@ import jax.numpy as jnp
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import AbstractPlant
 from undertow.core.measurement import measurement_of_pose
-from undertow.navigation.from_sensors import AbstractFilter, Received, sensor_names
+from undertow.navigation.from_sensors import AbstractFilter, sensor_names
 from undertow.sensors.motion import motion_of
+from undertow.sensors.received import Received
 
 
 class EstimatedMotion(NamedTuple):

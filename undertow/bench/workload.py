@@ -12,7 +12,7 @@ import numpy as np
 from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.loop.simd_batch import SimdBatchRunner
 from undertow.scenario.build import build
-from undertow.simulation.prepared_run import prepare
+from undertow.scenario.prepare import prepare
 
 # Table 1 except for gamma_eps and the weight bound: without it the weights drift, and the loop diverges at about 135 s.
 W1: dict[str, Any] = {

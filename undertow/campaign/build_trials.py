@@ -23,11 +23,12 @@ from undertow.campaign.trials import Trials
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput, within
-from undertow.loop.loop_runs import numbers_of
+from undertow.loop.loop_runs import numbers_of, structure
 from undertow.scenario.build import Built, build, build_scenario
-from undertow.scenario.part_cache import PartCache, structure
+from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import Text, key_path
-from undertow.simulation.prepared_run import RunBatch, batch_of, loop_run
+from undertow.simulation.prepared_run import RunBatch, batch_of
 
 # Trials of a kind that are built both ways: where one of them differs in one bit, all are built one by one. The
 # arithmetic of a constructor may be rounded in another way for many trials than for one: XLA divides by a number that

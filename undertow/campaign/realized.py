@@ -20,8 +20,8 @@ from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import key_path
-from undertow.simulation.prepared_run import loop_run
 
 # Trials that are built again, each in milliseconds. The standard error of a rank correlation is then 0.045.
 MOST = 500

@@ -10,7 +10,8 @@ from undertow.campaign.campaign_schema import Series
 from undertow.core import runtime
 from undertow.core.status import Status
 from undertow.scenario.build import Built
-from undertow.simulation.prepared_run import PreparedRun, RunBatch, prepare
+from undertow.scenario.prepare import prepare
+from undertow.simulation.prepared_run import PreparedRun, RunBatch
 from undertow.simulation.programs import ProgramCache
 from undertow.simulation.run_many import BatchResult, in_order, run_many
 

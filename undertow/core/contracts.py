@@ -476,6 +476,10 @@ class AbstractNavigation(eqx.Module):
     def measure(self, realization: PyTree, state: PyTree, t: Time, truth: Measurement) -> tuple[Measurement, PyTree]:
         """Measurement at time t and the state after it."""
 
+    def simulated_sensors(self) -> tuple[Any, ...]:
+        """Sensors whose readings it simulates and filters; () where it reads the true motion."""
+        return ()
+
 
 class AbstractInformedNavigation(AbstractNavigation):
     """A navigation filter that reports its noise and the readings that it ignored."""

@@ -11,8 +11,9 @@ from undertow.core import checks, runtime
 from undertow.core.errors import BadInput
 from undertow.export.c_program import Exported, Program, System, check_compiler, made_from
 from undertow.loop.simd_batch import Unsupported
-from undertow.navigation.from_sensors import Received, SensorNavigation
+from undertow.navigation.from_sensors import SensorNavigation
 from undertow.scenario.build import Built
+from undertow.sensors.received import Received
 
 _SPREAD = 0.01  # of the random readings of a test, in their units
 

@@ -17,8 +17,8 @@ from undertow.falsification.evaluator import Evaluator
 from undertow.loop import sampled
 from undertow.scenario.build import build_scenario
 from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import key_path
-from undertow.simulation.prepared_run import loop_run
 
 _SHARPNESS = 40.0  # of the smooth robustness, whose unit is the share of a bound
 _STEPS = ("resolution", "dead_zone")  # parameters that make a smooth function piecewise constant

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 from undertow.core.param import Param, param
 from undertow.faults.mode import AbstractMode, Moment, altered_by
 from undertow.faults.occurrence import Occurrence
-from undertow.navigation.from_sensors import AbstractSensorFaults, Received
+from undertow.sensors.received import AbstractSensorFaults, Received
 
 
 class SensorFault(eqx.Module):

@@ -17,7 +17,6 @@ from undertow.core.contracts import AbstractNavigation, AbstractPlant, Measureme
 from undertow.core.errors import BadInput, joined, nearest
 from undertow.core.user_code import MODULE_PREFIX
 from undertow.faults.quantities import OF_BODY, PROPELLER_SPEED, quantities_of
-from undertow.navigation.from_sensors import SensorNavigation
 from undertow.sensors.motion import motion_of
 from undertow.sensors.sensor import AbstractSensor
 from undertow.vehicles.thruster_labels import number_of, without_number
@@ -84,13 +83,13 @@ def targets_of(plant: AbstractPlant, navigation: AbstractNavigation) -> dict[str
         FaultTarget(name, "quantity", one.unit, one.size, len(jax.eval_shape(one.read, y)))
         for name, one in quantities_of(y).items()
     ]
-    if isinstance(navigation, SensorNavigation):
-        names = [_name_of(sensor) for sensor in navigation.filter.sensors]
+    if sensors := navigation.simulated_sensors():
+        names = [_name_of(sensor) for sensor in sensors]
         if "propeller_speed" not in names:  # then the controller gets none
             found = [one for one in found if one.name != "propeller_speed"]
         for name in dict.fromkeys(names):
             places = tuple(place for place, other in enumerate(names) if other == name)
-            sensor = navigation.filter.sensors[places[0]]
+            sensor = sensors[places[0]]
             reading = jax.eval_shape(lambda y, sensor=sensor: sensor.reading(_motion(y)), y)
             found.append(_sensor(name, len(reading), places)._replace(angles=tuple(sensor.angles)))
     found += _of_inputs("thruster" if y.body is not None else "input", plant.inputs())

@@ -65,6 +65,12 @@ def outcome_of(several: Outcome, run: int) -> Outcome:
     return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, several)
 
 
+def structure(tree: Any) -> Any:
+    """Everything about a tree of parts except its numbers; equal structures share a compiled program."""
+    leaves, form = jax.tree.flatten(tree)
+    return form, tuple((leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)
+
+
 def decides_structure(leaf: Any) -> bool:
     """Whether an array of a single run is built into its program, because its values decide what is left out there.
 

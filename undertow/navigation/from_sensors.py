@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
+from jaxtyping import Array, Float, Int, PyTree
 
 from undertow.core.contracts import AbstractInformedNavigation, Measurement
 from undertow.core.errors import BadInput
@@ -19,19 +19,12 @@ from undertow.numerics.random_keys import numbered
 from undertow.sensors.gauss_markov import Disturbed
 from undertow.sensors.imu import IMU
 from undertow.sensors.motion import motion_of
-from undertow.sensors.sampling import Reading, SensorState
+from undertow.sensors.received import AbstractSensorFaults, Received
+from undertow.sensors.sampling import SensorState
 from undertow.sensors.sensor import AbstractDisturbedSensor, AbstractSensor, AbstractVelocitySensor, error_slopes
 
 # (m/s)^2 s; smaller densities count as no noise.
 _NOISELESS = 1e-20
-
-
-class Received(NamedTuple):
-    """What one sensor has delivered."""
-
-    reading: Reading
-    fresh: Bool[Array, ""]  # whether it is new
-    age: Number  # s, since it was taken
 
 
 class AbstractFilter(eqx.Module):
@@ -79,20 +72,6 @@ class AbstractCovarianceFilter(AbstractFilter):
         """Covariance of these errors by the account of the filter."""
 
 
-class AbstractSensorFaults(eqx.Module):
-    """Faults of sensors: what a filter receives instead of what they deliver."""
-
-    @abc.abstractmethod
-    def init(self, readings: Sequence[Reading]) -> PyTree:
-        """State before the first step, for readings of these shapes."""
-
-    @abc.abstractmethod
-    def received(
-        self, key: PRNGKeyArray, state: PyTree, t: Number, received: tuple[Received, ...]
-    ) -> tuple[tuple[Received, ...], PyTree]:
-        """What reaches the filter at time t (s), and the state afterwards; `key` is that of the run."""
-
-
 class SensorNavigationState(NamedTuple):
     """State of the sensors and of the filter."""
 
@@ -116,6 +95,9 @@ class SensorNavigation(AbstractInformedNavigation):
         """A key for each sensor, then one for their faults and one for their correlated errors, where there are any."""
         count, disturbed = len(self.filter.sensors), any(count_errors(one) for one in self.filter.sensors)
         return jax.random.split(key, count + (self.faults is not None) + disturbed)
+
+    def simulated_sensors(self):
+        return self.filter.sensors
 
     def velocity_noise(self, dt):
         """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""

@@ -20,7 +20,7 @@ from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.navigation.consistency import innovation_monitor
 from undertow.navigation.disagreement import distrusted, no_disagreement
-from undertow.navigation.from_sensors import AbstractCovarianceFilter, Received, SensorNavigation, check_sensors
+from undertow.navigation.from_sensors import AbstractCovarianceFilter, SensorNavigation, check_sensors
 from undertow.navigation.inertial_covariance import (
     ATTITUDE,
     FORCE_BIAS,
@@ -51,6 +51,7 @@ from undertow.sensors.gauss_markov import CorrelatedErrors
 from undertow.sensors.imu import IMU
 from undertow.sensors.motion import gravity, motion_of
 from undertow.sensors.propeller_speed import PropellerSpeed
+from undertow.sensors.received import Received
 from undertow.sensors.sensor import AbstractSensor
 
 _USUAL_DELAY = 0.5  # s

@@ -12,7 +12,7 @@ from undertow.core.param import Param, param
 from undertow.core.signals import Signal
 from undertow.navigation.drift import drift_advice
 from undertow.navigation.estimate import Estimate, estimate_of
-from undertow.navigation.from_sensors import AbstractFilter, Received, SensorNavigation, check_sensors
+from undertow.navigation.from_sensors import AbstractFilter, SensorNavigation, check_sensors
 from undertow.navigation.inertial_gate import Inertial, InertialGate, InertialMemory, gate_for, inertial_deviation
 from undertow.numerics.linear_algebra import matvec
 from undertow.numerics.rotations import Vector3, quaternion_from_euler
@@ -23,6 +23,7 @@ from undertow.sensors.imu import IMU
 from undertow.sensors.motion import gravity
 from undertow.sensors.position_fix import PositionFix
 from undertow.sensors.propeller_speed import PropellerSpeed
+from undertow.sensors.received import Received
 from undertow.sensors.sensor import AbstractSensor
 
 

@@ -18,8 +18,9 @@ from undertow.numerics.random_keys import key_of_seed
 from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import prepare
 from undertow.scenario.reading import dump
-from undertow.simulation.prepared_run import PreparedRun, prepare
+from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.processes import Tasks, worker_processes
 from undertow.simulation.programs import ProgramCache, RunGroup
 from undertow.simulation.repetition import shortened

@@ -4,8 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import equinox as eqx
-import jax
+from undertow.loop.loop_runs import structure
 
 _MOST = 512  # parts that are remembered
 
@@ -49,9 +48,3 @@ class PartCache:
         if shape not in self._checked:
             check()
             self._checked.add(shape)
-
-
-def structure(tree: Any) -> Any:
-    """Everything about a tree of parts except its numbers; equal structures share a compiled program."""
-    leaves, form = jax.tree.flatten(tree)
-    return form, tuple((leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)

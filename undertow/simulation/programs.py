@@ -9,9 +9,8 @@ import numpy as np
 
 from undertow.core import runtime
 from undertow.loop.batch_runner import BatchRunner
-from undertow.loop.loop_runs import RunPlan, decides_structure, numbers_of, with_numbers
+from undertow.loop.loop_runs import RunPlan, decides_structure, numbers_of, structure, with_numbers
 from undertow.loop.simd_batch import simd_width
-from undertow.scenario.part_cache import structure
 from undertow.simulation.prepared_run import PreparedRun, RunBatch, batch_of
 
 Runs = Iterable[PreparedRun | RunBatch]

@@ -15,7 +15,8 @@ from undertow.core.status import Status
 from undertow.loop.outcome import Outcome
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.part_cache import PartCache
-from undertow.simulation.prepared_run import PreparedRun, prepare
+from undertow.scenario.prepare import prepare
+from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.run_many import run_many
 from undertow.soak.watching import Counts, Watch
 from undertow.supervision.conditions import state_of

@@ -13,8 +13,9 @@ from undertow.campaign.trials import trials
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
 from undertow.loop.closed_loop import ClosedLoop
+from undertow.loop.loop_runs import structure
 from undertow.scenario.build import Built
-from undertow.scenario.part_cache import PartCache, structure
+from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
 
 Vary = Mapping[str, Mapping[str, Any]]

@@ -100,7 +100,7 @@ def effort(title: str, runs: Controllers) -> Figure:
     first = next(iter(runs.values()))
     looks = [(run, *style.CONTROLLERS[key]) for key, run in runs.items()]
     curves = [recorded.curve(run, name, "input", look) for run, name, look in looks]
-    start, end = settled(first), float(first["time"].values[-1])
+    start, end = recorded.settled(first), float(first["time"].values[-1])
     labels = recorded.per_input(first, "voltage")
     return small_multiples(
         title,
@@ -139,7 +139,7 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
     true = recorded.curve(first, "true $d$", "uncertainty", style.TRUTH)
     estimates = [recorded.curve(run, name, "estimate", look) for run, name, look in looks]
     errors = [recorded.difference(run, name, "estimate", "uncertainty", look) for run, name, look in looks]
-    start = settled(first)
+    start = recorded.settled(first)
     rate = "/s^2"
     return small_multiples(
         title,
@@ -155,11 +155,6 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
             Block(errors, recorded.per_axis(first, r"$\hat{d} - d$", rate), height=0.85, limits_from=start),
         ],
     )
-
-
-def settled(run: xr.Dataset) -> float:
-    """Time, s, after which the y axes fit the values: the first twentieth of a run is start-up."""
-    return float(run["time"].values[-1]) / 20
 
 
 def tracking(title: str, runs: Controllers) -> Figure:

@@ -72,3 +72,8 @@ def difference(run: xr.Dataset, name: str, signal: str, other: str, look: Look) 
 def magnitude(curve: Curve) -> Curve:
     """Its absolute value."""
     return curve._replace(values=np.abs(curve.values))
+
+
+def settled(run: xr.Dataset) -> float:
+    """Time, s, after which the y axes fit the values: the first twentieth of a run is start-up."""
+    return float(run["time"].values[-1]) / 20

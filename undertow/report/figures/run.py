@@ -11,7 +11,6 @@ from undertow.report.figures.certificate import certificate, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
-from undertow.report.figures.paper import settled
 from undertow.simulation.run_facts import RunFacts
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
@@ -59,9 +58,9 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
         "estimate": plot(
             "Lumped uncertainty and its estimate",
             recorded.controller_axis_names(run),
-            lambda: [_block(run, curves, rates, settled(run))],
+            lambda: [_block(run, curves, rates, recorded.settled(run))],
         ),
-        "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, settled(run))]),
+        "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, recorded.settled(run))]),
     }
     if "lyapunov" in run:
         bound = weights_bound(None if facts is None else facts.certificate)

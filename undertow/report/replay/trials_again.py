@@ -8,7 +8,7 @@ from undertow.loop.dataset import to_dataset
 from undertow.report.replay.replay_data import COLOURS, FRAMES, Replay, replay_of
 from undertow.report.replay.replay_section import not_made
 from undertow.scenario.build import Built
-from undertow.simulation.prepared_run import prepare
+from undertow.scenario.prepare import prepare
 from undertow.simulation.run_facts import hull_of
 from undertow.simulation.run_many import run_many
 
