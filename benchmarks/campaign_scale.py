@@ -22,24 +22,24 @@ from typing import Any
 
 import numpy as np
 
-from undertow import process_setup
+from undertow.core import process_setup
 
 process_setup.prepare()
 
-from undertow.campaign import task
-from undertow.campaign.build_trials import build_trial, build_trials
-from undertow.campaign.campaign_summary import summary
-from undertow.campaign.columns import labels
-from undertow.campaign.fingerprint import Identity
-from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, run_campaign
-from undertow.campaign.store import Store
-from undertow.campaign.store_layout import Layout
-from undertow.campaign.store_results import load
+from undertow.paper.setup import scenario
 from undertow.report.campaign_page import write_campaign
-from undertow.reproduction.setup import scenario
 from undertow.scenario.reading import dump
 from undertow.simulation.executors import by_dask, cluster, in_threads
+from undertow.studies.campaign import task
+from undertow.studies.campaign.build_trials import build_trial, build_trials
+from undertow.studies.campaign.campaign_summary import summary
+from undertow.studies.campaign.columns import labels
+from undertow.studies.campaign.fingerprint import Identity
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.run_campaign import STORE, run_campaign
+from undertow.studies.campaign.store import Store
+from undertow.studies.campaign.store_layout import Layout
+from undertow.studies.campaign.store_results import load
 
 VARY = {"initial.position[0]": {"normal": [0.0, 0.1]}, "controller.composite": {"uniform": [10.0, 30.0]}}
 HEAVIER = {"plant.vehicle.mass": {"normal": [125.0, 3.0]}}

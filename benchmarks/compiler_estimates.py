@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from undertow import process_setup
+from undertow.core import process_setup
 
 process_setup.prepare()
 
@@ -23,9 +23,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from simdjit import Loop, estimate
-from undertow.bench import workload
 from undertow.core import runtime
-from undertow.loop.vmap_batch import XlaBatchRunner
+from undertow.simulation.loop.vmap_batch import XlaBatchRunner
+from undertow.studies.speed import workload
 
 RUNS, STEPS = 64, 200
 

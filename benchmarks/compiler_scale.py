@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from undertow import process_setup
+from undertow.core import process_setup
 
 process_setup.prepare()
 if hasattr(os, "sched_setaffinity"):
@@ -29,10 +29,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from simdjit import Loop, Unsupported
-from undertow.bench import workload
 from undertow.core import runtime
-from undertow.loop.vmap_batch import XlaBatchRunner
 from undertow.scenario.reading import parse
+from undertow.simulation.loop.vmap_batch import XlaBatchRunner
+from undertow.studies.speed import workload
 
 VEHICLE = Path(__file__).parents[1] / "examples" / "my_rov.yaml"  # BlueROV2 Heavy
 RUNS, STEPS, REPETITIONS = 64, 400, 5

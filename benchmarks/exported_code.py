@@ -19,10 +19,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from undertow.export.c_program import Exported
-from undertow.export.controller import export_controller
-from undertow.export.fmu import export_fmu
-from undertow.export.navigation import export_navigation
+from undertow.outside.export.c_program import Exported
+from undertow.outside.export.controller import export_controller
+from undertow.outside.export.fmu import export_fmu
+from undertow.outside.export.navigation import export_navigation
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 

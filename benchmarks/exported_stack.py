@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from undertow.export.controller import export_controller
+from undertow.outside.export.controller import export_controller
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from undertow.cli.trials import trial_text
-from undertow.falsification.evaluator import Evaluator
-from undertow.falsification.falsify import Falsified, evaluator_of, falsify
 from undertow.scenario.reading import Text, from_data, read
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.falsification.evaluator import Evaluator
+from undertow.studies.falsification.falsify import Falsified, evaluator_of, falsify
 
 # Bounds of the full box: nominal value, upper bound, unit. The nominal values are the lower bounds. At each upper bound
 # the law fails, with the other two at their nominal values.

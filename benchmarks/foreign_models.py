@@ -25,10 +25,10 @@ from learning import errors_of
 
 from undertow.analysis.metrics import Metrics
 from undertow.core.runtime import double_outside_runs
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.loop_runs import RunPlan, numbers_of, with_numbers
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import RunPlan, numbers_of, with_numbers
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
 

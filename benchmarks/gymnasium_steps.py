@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from undertow.interop import gymnasium as ug
+from undertow.outside import gymnasium as ug
 
 COUNTS = (1, 64, 4096)
 

@@ -28,17 +28,17 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics
-from undertow.controllers.law_signals import INERTIA
-from undertow.controllers.robust.knowledge import save_knowledge
+from undertow.control.controllers.law_signals import INERTIA
+from undertow.control.controllers.robust.knowledge import save_knowledge
+from undertow.control.references.lawn_mower import lawn_mower
+from undertow.control.references.lissajous import lissajous
 from undertow.core.contracts import AbstractReference, Target
-from undertow.loop import simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.dataset import to_dataset
-from undertow.loop.loop_runs import RunPlan
-from undertow.references.lawn_mower import lawn_mower
-from undertow.references.lissajous import lissajous
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.dataset import to_dataset
+from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
 

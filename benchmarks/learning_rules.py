@@ -18,7 +18,7 @@ from learning import LAWS, SEA, motions
 from learning_tasks import built
 from scipy.spatial.transform import Rotation
 
-from undertow.loop.loop_runs import RunPlan
+from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
 

@@ -18,9 +18,9 @@ import numpy as np
 from learning import LAWS, PROBING, motions, run_seeds, set_probing
 
 from undertow.core.contracts import AbstractReference
-from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 jax.config.update("jax_enable_x64", True)
 

@@ -18,11 +18,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.control.navigation.from_sensors import AbstractFilter
 from undertow.core.measurement import body_of, measurement_of_outputs, measurement_of_pose
-from undertow.navigation.from_sensors import AbstractFilter
+from undertow.physics.sensors.received import Received
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.sensors.received import Received
 
 STEP, BEFORE, AFTER = 0.01, 20.0, 60.0  # s
 LARGE = 0.2  # m/s, error of the velocity that is counted

@@ -19,11 +19,11 @@ import numpy as np
 
 from undertow.analysis.metrics import accumulators, results
 from undertow.analysis.observer_limit import LinearLaw, papers_law, slowest_observer
-from undertow.controllers.rcaf import rcaf
-from undertow.loop import simd_batch
-from undertow.plants.double_integrator import double_integrator
+from undertow.control.controllers.rcaf import rcaf
+from undertow.physics.plants.double_integrator import double_integrator
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
+from undertow.simulation.loop import simd_batch
 
 jax.config.update("jax_enable_x64", True)
 

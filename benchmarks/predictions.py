@@ -14,10 +14,10 @@ import itertools
 
 import numpy as np
 
-from undertow.arena.vehicles import VEHICLES
 from undertow.cli.run_presentation import comparison, predict
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.arena.vehicles import VEHICLES
 
 # Rate of the loop, Hz, and significant height of the waves as a share of that of the arena.
 CONDITIONS = ((20, 0.5), (100, 1.0))

@@ -23,14 +23,14 @@ import equinox as eqx
 import numpy as np
 from foreign_models import DURATION, RECORD, Errors, run_all
 
-from undertow.arena.vehicles import VEHICLES
-from undertow.checks.flow_stability import flow_advice
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, build
+from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import from_data
 from undertow.scenario.step_size import step_advice
+from undertow.studies.arena.vehicles import VEHICLES
 
 # Factors on the nominal vehicle: lowest, highest, and whether they are spread evenly in their logarithm.
 FACTORS = {

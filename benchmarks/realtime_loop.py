@@ -44,10 +44,10 @@ def busy(processes: int) -> Iterator[None]:
 def measured(seconds: float, priority: int | None) -> dict[str, Any]:
     """Statistics of one run."""
     import undertow as ut
-    from undertow.realtime.control_loop import RealTimeLoop
-    from undertow.realtime.loop_clock import MonotonicClock
-    from undertow.realtime.process_priority import scheduled
-    from undertow.realtime.vehicle_link import VehicleLink
+    from undertow.outside.realtime.control_loop import RealTimeLoop
+    from undertow.outside.realtime.loop_clock import MonotonicClock
+    from undertow.outside.realtime.process_priority import scheduled
+    from undertow.outside.realtime.vehicle_link import VehicleLink
     from undertow.scenario.build import build
     from undertow.scenario.reading import from_data
 

@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity
-from undertow.interop.ros2.link import Inlet, Link, Outlet
-from undertow.interop.ros2.to_messages import odometry_of, stamp_of
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.from_messages import SECOND, Frames, PoseAndVelocity
+from undertow.outside.ros2.link import Inlet, Link, Outlet
+from undertow.outside.ros2.to_messages import odometry_of, stamp_of
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests/ros2"))

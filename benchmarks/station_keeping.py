@@ -22,14 +22,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.sampled import AbstractAccumulator
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import TrainingRuns
-from undertow.tuning.training_runs import trials
-from undertow.tuning.tune import tune
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.sampled import AbstractAccumulator
+from undertow.studies.tuning.training_runs import trials
+from undertow.studies.tuning.tune import tune
 
 jax.config.update("jax_enable_x64", True)
 

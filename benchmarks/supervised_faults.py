@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from soak.judged_runs import Judged, judged_runs
 from undertow.core.status import Status
-from undertow.soak.judged_runs import Judged, judged_runs
 
 ONSET, WINDOW, WINDOWS = 20.0, 10.0, 6  # s
 T200 = {"kind": "t200", "supply": 16}

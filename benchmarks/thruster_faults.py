@@ -25,18 +25,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.control.supervision.fault_tolerant_law import FaultTolerantController, fault_tolerant
 from undertow.core import runtime
 from undertow.core.contracts import AbstractController, AbstractFaults, Target
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.loop_runs import RunPlan
-from undertow.loop.simd_batch import kept_step
 from undertow.scenario.build import Built, build
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import RunPlan
+from undertow.simulation.loop.simd_batch import kept_step
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
-from undertow.supervision.fault_tolerant_law import FaultTolerantController, fault_tolerant
 
 DT, ONSET, DURATION = 0.01, 20.0, 40.0  # s
 KINDS = {"off": (0.0, 0.0), "half": (0.5, 0.0), "stuck": (0.0, 1.0), "reversed": (-1.0, 0.0)}  # scale, held share

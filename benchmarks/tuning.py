@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from undertow.scenario.reading import from_data
-from undertow.tuning.tune import compare_gains, tune
+from undertow.studies.tuning.tune import compare_gains, tune
 
 # The paper's law tuned by hand: 2 and 4.5 rad/s, estimators of 3 and 2 rad/s, for motors with a lag of 0.1 s.
 BY_HAND = {

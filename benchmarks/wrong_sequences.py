@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 import undertow as ut
+from soak.links.driven_vehicle import DrivenVehicle
+from soak.links.scenario import SUPPLY
 from undertow.scenario.reading import dump
-from undertow.soak.links.driven_vehicle import DrivenVehicle
-from undertow.soak.links.scenario import SUPPLY
 
 DT, ONSET = 0.02, 5.0  # s
 ALWAYS = 1e9  # s

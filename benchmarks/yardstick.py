@@ -22,20 +22,20 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow import process_setup
+from undertow.core import process_setup
 
 process_setup.prepare()
 
 import numpy as np
 
 from undertow.analysis.metrics import results_of_batch
-from undertow.bench import workload
-from undertow.bench.workload import W1
 from undertow.core import runtime
 from undertow.core.errors import BadInput
-from undertow.loop.simd_batch import Unsupported
 from undertow.scenario.build import build
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop.simd_batch import Unsupported
+from undertow.studies.speed import workload
+from undertow.studies.speed.workload import W1
 
 SOURCE = Path(__file__).parent / "yardstick" / "w1.cpp"
 # No -ffast-math: sums keep their order. The compiler may use the vector units as it likes, and contract to fused
@@ -44,7 +44,7 @@ FLAGS = ("-std=c++17", "-O3", "-march=native")
 COMPARED_S = 0.2  # s of the trajectory
 SAME = 1e-9  # largest difference of trajectory and metrics; roundings make one of some 1e-12
 REPETITIONS = 7  # in a round
-TOGETHER = 64  # runs of a batch and thread, as in undertow/bench/measure.py
+TOGETHER = 64  # runs of a batch and thread, as in undertow/studies/speed/measure.py
 
 
 def constants() -> dict[str, Any]:
@@ -61,8 +61,8 @@ def constants() -> dict[str, Any]:
         return {
             "PI": math.pi,
             "DT": built.scenario.loop.dt,
-            "INWARD": 1e-9,  # undertow/numerics/integrators.py
-            "ENVELOPE": 1e3,  # m, m/s, rad/s; this and the next: undertow/plants/hybrid_vehicle.py
+            "INWARD": 1e-9,  # undertow/core/numerics/integrators.py
+            "ENVELOPE": 1e3,  # m, m/s, rad/s; this and the next: undertow/physics/plants/hybrid_vehicle.py
             "LEAST_COSINE": 1e-3,  # of the pitch
             "SETTLED": 0.02,  # undertow/analysis/metrics.py
             "TARGET": target.position,

@@ -7,7 +7,7 @@ import importlib.metadata
 import sys
 from pathlib import Path
 
-from undertow.process_setup import prepare
+from undertow.core.process_setup import prepare
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import undertow as ut
-from undertow.interop.mujoco_engine import MujocoRun, Submerged, Water, run_in_mujoco
+from undertow.outside.mujoco_engine import MujocoRun, Submerged, Water, run_in_mujoco
 
 CURRENT = [0.3, 0.2, 0.0]  # m/s: north, east, down
 

@@ -9,7 +9,7 @@ import os
 import re
 import threading
 
-from undertow.process_setup import prepare  # isort: skip  (before JAX is imported
+from undertow.core.process_setup import prepare  # isort: skip  (before JAX is imported
 
 GIVEN_XLA_FLAGS = os.environ.get("XLA_FLAGS", "")
 prepare()
@@ -34,23 +34,7 @@ MARK_OF_A_FILE = re.compile(r"^pytestmark = pytest\.mark\.(\w+)$", re.MULTILINE)
 
 # Annotations of arrays are checked at every call of the rooms that compute. `process` comes before JAX; the models of
 # `scenario` and the commands of `cli` are checked by pydantic and typer.
-CHECKED = (
-    "numerics",
-    "core",
-    "sensors",
-    "vehicles",
-    "thrusters",
-    "power",
-    "disturbances",
-    "references",
-    "navigation",
-    "estimation",
-    "plants",
-    "controllers",
-    "supervision",
-    "loop",
-    "analysis",
-)
+CHECKED = ("core", "physics", "control", "simulation.loop", "analysis")
 # Folders of tests where they are: together they trace every part and both loops. Elsewhere the same code runs again, and
 # checking it once more would cost time and find nothing. Arrays of different rank are an error everywhere.
 STRICT = ("numerics", "physics", "conformance")

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion, skew
+from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion, skew
 
 
 def wrap_angle(angle):

@@ -10,76 +10,65 @@ Names are loaded when first used: `import undertow` by itself is quick.
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from undertow.core.part_packages import PACKAGE_OF
+
 if TYPE_CHECKING:
-    from undertow import controllers as controllers
-    from undertow import disturbances as disturbances
-    from undertow import faults as faults
-    from undertow import navigation as navigation
-    from undertow import plants as plants
-    from undertow import power as power
-    from undertow import references as references
-    from undertow import sensors as sensors
-    from undertow import supervision as supervision
-    from undertow import thrusters as thrusters
-    from undertow import vehicles as vehicles
-    from undertow.autopilot.autopilot import Autopilot as Autopilot
-    from undertow.autopilot.navigation_filter import NavigationFilter as NavigationFilter
-    from undertow.autopilot.vehicle import Vehicle as Vehicle
-    from undertow.comparison.comparison import Comparison as Comparison
-    from undertow.comparison.comparison import compare as compare
-    from undertow.controllers.rcaf import rcaf as rcaf
+    from undertow.control import controllers as controllers
+    from undertow.control import navigation as navigation
+    from undertow.control import references as references
+    from undertow.control import supervision as supervision
+    from undertow.control.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
+    from undertow.core.process_setup import prepare as prepare
     from undertow.logs.frames import attitudes_of_quaternions as attitudes_of_quaternions
     from undertow.logs.frames import body_vectors as body_vectors
     from undertow.logs.frames import world_vectors as world_vectors
-    from undertow.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
-    from undertow.process_setup import prepare as prepare
+    from undertow.outside.autopilot.autopilot import Autopilot as Autopilot
+    from undertow.outside.autopilot.navigation_filter import NavigationFilter as NavigationFilter
+    from undertow.outside.autopilot.vehicle import Vehicle as Vehicle
+    from undertow.physics import disturbances as disturbances
+    from undertow.physics import faults as faults
+    from undertow.physics import plants as plants
+    from undertow.physics import power as power
+    from undertow.physics import sensors as sensors
+    from undertow.physics import thrusters as thrusters
+    from undertow.physics import vehicles as vehicles
+    from undertow.physics.plants.hybrid_vehicle import HybridVehicle as HybridVehicle
     from undertow.run import Run as Run
     from undertow.run import simulate as simulate
     from undertow.run import simulate_scenario as simulate_scenario
     from undertow.scenario.csv_table import read_samples as read_samples
     from undertow.scenario.log_file import read_log as read_log
+    from undertow.studies.comparison.comparison import Comparison as Comparison
+    from undertow.studies.comparison.comparison import compare as compare
 
     __version__: str
 
-# Public name -> module; packages of parts stand for themselves.
+# Public name -> module.
 _HOMES = {
-    "Autopilot": "undertow.autopilot.autopilot",
+    "Autopilot": "undertow.outside.autopilot.autopilot",
     "BadInput": "undertow.core.errors",
-    "Comparison": "undertow.comparison.comparison",
-    "HybridVehicle": "undertow.plants.hybrid_vehicle",
-    "NavigationFilter": "undertow.autopilot.navigation_filter",
+    "Comparison": "undertow.studies.comparison.comparison",
+    "HybridVehicle": "undertow.physics.plants.hybrid_vehicle",
+    "NavigationFilter": "undertow.outside.autopilot.navigation_filter",
     "Run": "undertow.run",
-    "Vehicle": "undertow.autopilot.vehicle",
+    "Vehicle": "undertow.outside.autopilot.vehicle",
     "attitudes_of_quaternions": "undertow.logs.frames",
     "body_vectors": "undertow.logs.frames",
-    "compare": "undertow.comparison.comparison",
-    "prepare": "undertow.process_setup",
-    "rcaf": "undertow.controllers.rcaf",
+    "compare": "undertow.studies.comparison.comparison",
+    "prepare": "undertow.core.process_setup",
+    "rcaf": "undertow.control.controllers.rcaf",
     "read_log": "undertow.scenario.log_file",
     "read_samples": "undertow.scenario.csv_table",
     "simulate": "undertow.run",
     "simulate_scenario": "undertow.run",
     "world_vectors": "undertow.logs.frames",
 }
-_PACKAGES = (
-    "controllers",
-    "disturbances",
-    "faults",
-    "navigation",
-    "plants",
-    "power",
-    "references",
-    "sensors",
-    "supervision",
-    "thrusters",
-    "vehicles",
-)
 
 
 def __getattr__(name: str) -> Any:
-    if name in _PACKAGES:
-        return importlib.import_module(f"undertow.{name}")
+    if name in PACKAGE_OF:
+        return importlib.import_module(PACKAGE_OF[name])
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
     if name == "__version__":
@@ -88,4 +77,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted((*_PACKAGES, *_HOMES, "__version__"))
+    return sorted((*PACKAGE_OF, *_HOMES, "__version__"))

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from undertow.analysis.metrics import for_people, infinite, meanings
 from undertow.analysis.success import Success, criterion_of
+from undertow.control.navigation.perfect import perfect
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import (
@@ -25,23 +26,22 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput, within
 from undertow.core.status import Status
-from undertow.disturbances.adding import Together
-from undertow.disturbances.none import none
-from undertow.faults.mode import AbstractFault
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.outcome import Outcome
-from undertow.navigation.perfect import perfect
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.none import none
+from undertow.physics.faults.mode import AbstractFault
 from undertow.scenario import factory
 from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.faulted import faulted
 from undertow.scenario.plausibility import angles_meant
 from undertow.scenario.reading import from_data, read
+from undertow.scenario.results.result_files import save
+from undertow.scenario.results.run_result import MetricsSettings, Origin, RunResult, make_result
+from undertow.scenario.results.run_scenario import run_loop, run_scenario
 from undertow.scenario.schema import Fault, Initial, Loop, Window, complaint
 from undertow.scenario.step_size import step_failure
-from undertow.simulation.result_files import save
-from undertow.simulation.run_result import MetricsSettings, Origin, RunResult, make_result
-from undertow.simulation.run_scenario import run_loop, run_scenario
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.outcome import Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

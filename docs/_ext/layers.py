@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 def layers() -> list[list[str]]:
     """Folders and modules from the top down; those of one layer do not import each other."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
-    (found,) = [one["layers"] for one in contracts if one["type"] == "layers"]
+    (found,) = [contract["layers"] for contract in contracts if contract.get("containers") == ["undertow"]]
     return [[name.strip() for name in layer.split("|")] for layer in found]
 
 

@@ -10,17 +10,17 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
-from undertow.campaign.campaign_schema import SECTIONS, Campaign
 from undertow.cli.exit_codes import MEANINGS as EXIT_CODES
 from undertow.cli.main import app as command_line
+from undertow.control.supervision.conditions import CONDITIONS, HEAD, State
 from undertow.core import catalogue
 from undertow.core.status import Status
-from undertow.faults.kinds import list_kinds, severity_cells
-from undertow.loop.recorded_signals import RECORDED
+from undertow.physics.faults.kinds import list_kinds, severity_cells
 from undertow.scenario import describing
 from undertow.scenario.describing import Description, text_of
 from undertow.scenario.schema import Scenario, keys
-from undertow.supervision.conditions import CONDITIONS, HEAD, State
+from undertow.simulation.loop.recorded_signals import RECORDED
+from undertow.studies.campaign.campaign_schema import SECTIONS, Campaign
 
 _PARAMETERS = ("parameter", "value", "unit", "symbol", "meaning", "source")
 

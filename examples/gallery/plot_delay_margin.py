@@ -13,7 +13,7 @@ import numpy as np
 import undertow as ut
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 
-from undertow.estimation.fuzzy_system import gaussian_sets
+from undertow.control.estimation.fuzzy_system import gaussian_sets
 
 jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import undertow as ut
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 

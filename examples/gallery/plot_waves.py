@@ -13,7 +13,7 @@ import numpy as np
 
 import undertow as ut
 from undertow.core.contracts import Load, Pose
-from undertow.disturbances.waves import spectrum
+from undertow.physics.disturbances.waves import spectrum
 
 jax.config.update("jax_enable_x64", True)  # outside of a run, the precision is yours to choose
 

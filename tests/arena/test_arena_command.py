@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from undertow.arena.entry import prepare_entry, read_entry
-from undertow.arena.tasks import VERSION
 from undertow.cli import arena as command
 from undertow.cli.main import run
-from undertow.comparison import step_time
-from undertow.comparison.candidates import laws
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import read
+from undertow.studies.arena.entry import prepare_entry, read_entry
+from undertow.studies.arena.tasks import VERSION
+from undertow.studies.comparison import step_time
+from undertow.studies.comparison.candidates import laws
 
 SMALL = ["--trials", "2", "--tasks", "payload,pitch_turn", "--vehicles", "odin,rexrov", "--out", "out"]
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from undertow.arena.entry import Entry
-from undertow.arena.leader_board import (
+from undertow.report.arena_page import write_board
+from undertow.report.figures.arena import robustness_figure, tasks_figure
+from undertow.studies.arena.entry import Entry
+from undertow.studies.arena.leader_board import (
     Board,
     Standing,
     as_csv,
@@ -19,13 +21,11 @@ from undertow.arena.leader_board import (
     ratio_rows,
     task_rows,
 )
-from undertow.arena.robustness import PARAMETERS, Curve
-from undertow.arena.scores import CellResult, scored
-from undertow.arena.tasks import CELLS as EVERY
-from undertow.arena.tasks import TASKS
-from undertow.comparison.step_time import StepTime
-from undertow.report.arena_page import write_board
-from undertow.report.figures.arena import robustness_figure, tasks_figure
+from undertow.studies.arena.robustness import PARAMETERS, Curve
+from undertow.studies.arena.scores import CellResult, scored
+from undertow.studies.arena.tasks import CELLS as EVERY
+from undertow.studies.arena.tasks import TASKS
+from undertow.studies.comparison.step_time import StepTime
 
 CELLS = (("payload", "odin"), ("payload", "rexrov"), ("delay", "odin"))
 

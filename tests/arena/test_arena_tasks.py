@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from undertow.arena.tasks import CELLS, TASKS, VERSION, motion_keys, scenarios, training_keys
-from undertow.arena.vehicles import VEHICLES
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.studies.arena.tasks import CELLS, TASKS, VERSION, motion_keys, scenarios, training_keys
+from undertow.studies.arena.vehicles import VEHICLES
 
 # Version -> what its tasks hash to. A change of a task or of a vehicle is a new version with a line of its own.
 DIGESTS = {1: "668496711786e5ab", 2: "008c90cf876e02f5"}

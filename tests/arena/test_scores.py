@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from undertow.arena.leader_board import as_markdown
-from undertow.arena.robustness import Curve
-from undertow.arena.scores import CellResult, geometric_mean, scored, trial_errors
-from undertow.comparison.tables import Rows
+from undertow.studies.arena.leader_board import as_markdown
+from undertow.studies.arena.robustness import Curve
+from undertow.studies.arena.scores import CellResult, geometric_mean, scored, trial_errors
+from undertow.studies.comparison.tables import Rows
 
 STATION, MOTION = ("station_keeping", "odin"), ("delay", "odin")  # tolerances: 0.05 m, 5 degrees
 

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from undertow.campaign.run_campaign import STORE
+from undertow.studies.campaign.run_campaign import STORE
 
 TYPED = (sys.executable, "-W", "ignore", "-m", "undertow")
 VEHICLE = {

@@ -4,10 +4,10 @@ import copy
 
 import pytest
 
-from undertow.campaign.task import site
-from undertow.loop import vmap_batch
 from undertow.report import campaign_page, run_page
 from undertow.report.figures import writing
+from undertow.simulation.loop import vmap_batch
+from undertow.studies.campaign.task import site
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 

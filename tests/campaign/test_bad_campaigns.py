@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from command import VEHICLE, contents
 
-from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 from undertow.core.file_lock import file_lock
 from undertow.scenario.reading import dump
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.run_campaign import STORE, run_campaign
 
 
 @pytest.fixture(scope="module")

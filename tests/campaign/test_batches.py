@@ -7,14 +7,14 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, nvidia
 from undertow.analysis.metrics import Metrics, results
-from undertow.campaign.campaign_schema import validate, whole
-from undertow.campaign.task import INVALID, run_trials, site
-from undertow.campaign.trials import Trials, trials
-from undertow.loop import simd_batch, vmap_batch
-from undertow.loop.sampled import simulate
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.loop import simd_batch, vmap_batch
+from undertow.simulation.loop.sampled import simulate
 from undertow.simulation.programs import ProgramCache
+from undertow.studies.campaign.campaign_schema import validate, whole
+from undertow.studies.campaign.task import INVALID, run_trials, site
+from undertow.studies.campaign.trials import Trials, trials
 
 
 def made(data) -> Trials:

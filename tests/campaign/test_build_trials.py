@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.campaign import build_trials as building
-from undertow.campaign.build_trials import build_trials, valid_trials
-from undertow.campaign.campaign_schema import validate
-from undertow.campaign.trials import trials
 from undertow.core import runtime
-from undertow.loop.loop_runs import numbers_of
 from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import from_data, read
+from undertow.simulation.loop.loop_runs import numbers_of
+from undertow.studies.campaign import build_trials as building
+from undertow.studies.campaign.build_trials import build_trials, valid_trials
+from undertow.studies.campaign.campaign_schema import validate
+from undertow.studies.campaign.trials import trials
 
 pytestmark = pytest.mark.full
 
@@ -148,7 +148,7 @@ def test_a_setting_of_the_run_is_built_one_by_one(campaign):
 OWN = """
 import jax.numpy as jnp
 import numpy as np
-from undertow.disturbances.sinusoid import sinusoid
+from undertow.physics.disturbances.sinusoid import sinusoid
 
 def by_numpy(amplitude=1.0):
     return sinusoid(amplitude=float(np.sqrt(amplitude)))

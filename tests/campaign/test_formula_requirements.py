@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.campaign.prepare import prepare
-from undertow.campaign.trials import Trials
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.trials import Trials
 
 FORMULA = "within 4 s always abs(error) < 0.3"
 CAMPAIGN = f"""\

@@ -16,10 +16,10 @@ import pytest
 from command import contents, typed
 from distributed import Client, LocalCluster
 
-from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, run_campaign
 from undertow.cli.main import run
 from undertow.simulation.executors import by_dask, cluster
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.run_campaign import STORE, run_campaign
 
 pytestmark = pytest.mark.full
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from undertow.campaign.campaign_schema import validate
-from undertow.campaign.store_layout import layout
 from undertow.scenario.reading import from_data
+from undertow.studies.campaign.campaign_schema import validate
+from undertow.studies.campaign.store_layout import layout
 
 SIZES = [((), 40, 16), ((2,), 40, 16), ((2, 3), 5, 16), ((7, 3), 1, 10), ((3, 1, 4), 9, 4), ((2,), 3, 256)]
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.trials import trials
-from undertow.campaign.varied_scenario import nominal_model_sentence, varied_scenario
 from undertow.core.errors import BadInput
-from undertow.falsification.box import scenario_at
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.studies.campaign.campaign_schema import Campaign
+from undertow.studies.campaign.trials import trials
+from undertow.studies.campaign.varied_scenario import nominal_model_sentence, varied_scenario
+from undertow.studies.falsification.box import scenario_at
 
 PLANT = {"kind": "inverted_pendulum"}
 SCENARIO = {"plant": PLANT, "controller": "pid", "reference": {"kind": "setpoint", "position": [0.1]}}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from undertow.campaign.campaign_schema import Distribution, validate
-from undertow.campaign.sampling import Samples, quantiles
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
+from undertow.studies.campaign.campaign_schema import Distribution, validate
+from undertow.studies.campaign.sampling import Samples, quantiles
 
 TWO = {"loop.duration": {"uniform": [1, 2]}, "plant.limit": {"uniform": [0, 1]}}
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from undertow.campaign.build_trials import build_trial
-from undertow.campaign.prepare import prepare
-from undertow.campaign.realized import realized_scalars
 from undertow.cli.main import run
-from undertow.numerics.random_keys import key_of_seed
+from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.part_cache import PartCache
+from undertow.studies.campaign.build_trials import build_trial
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.realized import realized_scalars
 
 pytestmark = pytest.mark.full
 

@@ -8,10 +8,10 @@ import pytest
 import xarray as xr
 from command import contents
 
-from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE
-from undertow.campaign.task import site
 from undertow.cli.main import run
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.run_campaign import STORE
+from undertow.studies.campaign.task import site
 
 pytestmark = pytest.mark.full
 

@@ -12,13 +12,13 @@ import xarray as xr
 import zarr
 from command import contents
 
-from undertow.campaign.fingerprint import identity
-from undertow.campaign.prepare import prepare
-from undertow.campaign.run_campaign import STORE, run_campaign
-from undertow.campaign.store_results import load
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.simulation.executors import in_threads
+from undertow.studies.campaign.fingerprint import identity
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.campaign.run_campaign import STORE, run_campaign
+from undertow.studies.campaign.store_results import load
 
 quiet = lambda tally: None
 threads = partial(in_threads, threads=2)

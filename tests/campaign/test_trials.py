@@ -2,10 +2,10 @@
 
 import pytest
 
-from undertow.campaign.campaign_schema import validate
-from undertow.campaign.trials import trials
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import from_data
+from undertow.studies.campaign.campaign_schema import validate
+from undertow.studies.campaign.trials import trials
 
 LIST = [{"kind": "current", "velocity": [0.1, 0.2, 0.3]}, "waves"]
 

@@ -8,18 +8,18 @@ import pytest
 from test_plausible_mistakes import EXAMPLES, PARTS
 
 import undertow as ut
-from undertow.campaign.campaign_schema import read_campaign
-from undertow.campaign.trials import trials
+from undertow.control.navigation.drift import drift_advice, drifts
+from undertow.control.navigation.observer import observer
 from undertow.core.measurement import BODY_OUTPUTS, measurement_of_outputs
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.drift import drift_advice, drifts
-from undertow.navigation.observer import observer
-from undertow.reproduction import ablations
+from undertow.paper import ablations
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix
+from undertow.physics.thrusters import commanded_thrust, t200
 from undertow.scenario.build import build
 from undertow.scenario.plausibility import held_speed, plausibility, top_speed
 from undertow.scenario.reading import read
-from undertow.sensors import compass, depth, dvl, imu, position_fix
-from undertow.thrusters import commanded_thrust, t200
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.studies.campaign.campaign_schema import read_campaign
+from undertow.studies.campaign.trials import trials
 
 SCENARIOS = [path for path in sorted(EXAMPLES.glob("*.yaml")) if path.stem != "my_rov"]
 ABLATIONS = sorted(next(iter(map(type(EXAMPLES), ablations.__path__))).glob("a*_*.yaml"))

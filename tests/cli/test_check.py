@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from good_scenario import SCENARIO, SMALL
 
-from undertow.checks import check
 from undertow.core import catalogue
+from undertow.scenario.checks import check
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SLOW = {("disturbances", "gauss_markov_current"), ("disturbances", "random_suite")}  # long to compile

@@ -6,12 +6,12 @@ import jsonschema
 import pytest
 
 from undertow.analysis.metrics import MEANINGS
-from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
-from undertow.loop.recorded_signals import RECORDED
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
+from undertow.simulation.loop.recorded_signals import RECORDED
+from undertow.studies.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
 
 PARTS = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(kind)]
 

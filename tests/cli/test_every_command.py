@@ -33,7 +33,6 @@ PATHS = {
     "falsify": [("falsify f.yaml --out broken", 2, "must hold in the nominal scenario, but is violated")],
     "tune": [("tune s.yaml --method luck", 2, "`--method` must be one of gradient, search, evolution")],
     "arena": [("arena --tasks hover", 2, "`--tasks` must name tasks of the arena, but is hover")],
-    "soak": [("soak hammers", 2, "hammers")],
     "bench": [("bench s.yaml", 2, "unexpected extra argument")],
     "reproduce": [("reproduce --out s.yaml", 2, "`--out` must")],
     "run": [("run s.yaml --priority 100", 2, "`--priority` must be from 1 to 99")],

@@ -10,7 +10,7 @@ import pytest
 from good_scenario import SCENARIO, SMALL
 
 from undertow.cli import simulate
-from undertow.simulation import result_files
+from undertow.scenario.results import result_files
 
 
 def write(tmp_path, text=SCENARIO):

@@ -82,7 +82,7 @@ def test_interrupted_and_resumed(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     command = ("falsify", "s.yaml", "--method", "search", "--budget", "60", "--out")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("undertow.falsification.falsify.shrink", interrupted)
+        patch.setattr("undertow.studies.falsification.falsify.shrink", interrupted)
         said = undertow(*command, "out")
     assert said.code == 130 and "--resume" in said.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["falsify.jsonl"]

@@ -13,9 +13,9 @@ from undertow.scenario.build import build
 from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
-from undertow.simulation.repetition import compare
-from undertow.simulation.result_files import save
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.repetition import compare
+from undertow.scenario.results.result_files import save
+from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 

@@ -5,8 +5,8 @@ import pytest
 
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.report.run_tables import certificate_rows
-from undertow.simulation.run_facts import facts_from
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_facts import facts_from
+from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 

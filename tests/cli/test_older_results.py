@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from undertow.scenario.provenance import checksum, content_hash
-from undertow.simulation.repetition import compare, shortened
+from undertow.scenario.results.repetition import compare, shortened
 
 
 def labelled(**columns):

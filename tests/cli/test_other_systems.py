@@ -14,7 +14,7 @@ for name in ("fcntl", "resource", "termios", "pwd", "grp", "syslog"):
 import simdjit, undertow
 for package in (undertow, simdjit):
     for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
-        if not module.name.startswith("undertow.soak") and not module.name.endswith("__main__"):
+        if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
 """
 

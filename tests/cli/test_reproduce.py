@@ -6,8 +6,8 @@ import json
 import pytest
 
 from undertow.cli import reproduce as command
-from undertow.report.reproduction import report
-from undertow.reproduction import reproduce as study
+from undertow.paper import reproduce as study
+from undertow.paper.pages import report
 
 
 @pytest.fixture

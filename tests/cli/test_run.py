@@ -16,7 +16,7 @@ import pytest
 import undertow as ut
 from undertow.cli.main import run
 from undertow.logs.read import read_log
-from undertow.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
 
 pytestmark = pytest.mark.full
 

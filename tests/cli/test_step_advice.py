@@ -7,14 +7,14 @@ import pytest
 
 import undertow as ut
 from undertow.core.status import Status
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters import first_order, linear_voltage, t200
+from undertow.physics.vehicles import bluerov2, bluerov2_heavy
 from undertow.scenario.build import build
 from undertow.scenario.consistency import rounded_times
+from undertow.scenario.results.run_scenario import run_scenario
 from undertow.scenario.schema import Loop
 from undertow.scenario.step_size import fastest_decay, step_advice
-from undertow.simulation.run_scenario import run_scenario
-from undertow.thrusters import first_order, linear_voltage, t200
-from undertow.vehicles import bluerov2, bluerov2_heavy
 
 SCENARIO = """
 plant: {{vehicle: odin, thruster: {{kind: t200, fidelity: electromechanical}}, ledger: false}}

@@ -1,9 +1,9 @@
 """The words that stand for keys: each of the table leads to a key that exists, and is none itself."""
 
-from undertow.campaign.campaign_schema import Campaign, Distribution, Requirement
 from undertow.scenario import vehicle_schema
 from undertow.scenario.schema import keys
 from undertow.scenario.synonyms import WORDS, hint_for
+from undertow.studies.campaign.campaign_schema import Campaign, Distribution, Requirement
 
 _CAMPAIGN = {*Campaign.model_fields}
 _CAMPAIGN |= {f"vary.*.{name}" for name in Distribution.model_fields}

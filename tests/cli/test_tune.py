@@ -8,9 +8,9 @@ from messages import named
 from ruamel.yaml import YAML
 
 from undertow.cli.tune import _sentences
-from undertow.tuning.cost import Shares
-from undertow.tuning.stability import Certificate
-from undertow.tuning.tune import Evaluated, Tuned
+from undertow.studies.tuning.cost import Shares
+from undertow.studies.tuning.stability import Certificate
+from undertow.studies.tuning.tune import Evaluated, Tuned
 
 pytestmark = pytest.mark.full
 
@@ -28,7 +28,7 @@ tune: {parameters: {frequency: [0.5, 8]}, iterations: 3, train: {seeds: 1}, held
 def test_interrupted_and_resumed_its_result_can_be_flown(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("undertow.tuning.tune.search", interrupted)
+        patch.setattr("undertow.studies.tuning.tune.search", interrupted)
         said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and "--resume" in said.err
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["tuning.jsonl"]
@@ -143,7 +143,7 @@ def test_a_ratio_is_said_in_its_direction():
 
 def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_path, monkeypatch):
     (tmp_path / "s.yaml").write_text(SCENARIO)
-    monkeypatch.setattr("undertow.tuning.evaluator.Evaluation.costs", interrupted)
+    monkeypatch.setattr("undertow.studies.tuning.evaluator.Evaluation.costs", interrupted)
     said = undertow("tune", "s.yaml", "--out", "out")
     assert said.code == 130 and said.err == "No results were written to out.\n"
     assert [path.name for path in tmp_path.iterdir()] == ["s.yaml"]

@@ -12,13 +12,13 @@ from messages import named
 from ruamel.yaml import YAML
 
 from undertow.core.errors import BadInput
-from undertow.loop.dataset import input_names
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.scenario.build import build
 from undertow.scenario.factory import make
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import read
 from undertow.scenario.vehicle_file import read_vehicle
-from undertow.vehicles import bluerov2_heavy
+from undertow.simulation.loop.dataset import input_names
 
 ROV = (Path(__file__).parents[2] / "examples" / "my_rov.yaml").read_text()
 FLIES = SCENARIO.replace("{kind: odin, mass: 125}", "my_rov.yaml").replace("position: [2, 3", "position: [0, 0")

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from undertow.comparison import step_time
 from undertow.report import comparison_page
 from undertow.scenario.reading import dump
+from undertow.studies.comparison import step_time
 
 AXIS = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 1e30},

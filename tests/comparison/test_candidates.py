@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from undertow.comparison.candidates import controllers
-from undertow.comparison.prepare import prepare_comparison
-from undertow.comparison.tuning_note import tuning_note
-from undertow.controllers import adrc, pid, rcaf, super_twisting
+from undertow.control.controllers import adrc, pid, rcaf, super_twisting
 from undertow.core.errors import BadInput
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
 from undertow.scenario.reading import dump, read
+from undertow.studies.comparison.candidates import controllers
+from undertow.studies.comparison.prepare import prepare_comparison
+from undertow.studies.comparison.tuning_note import tuning_note
 
 DT = 0.02
 

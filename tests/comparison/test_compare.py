@@ -16,8 +16,8 @@ from test_blocks import FILE, ROOT, blocks
 import undertow as ut
 from undertow.cli import compare
 from undertow.cli.main import run
-from undertow.comparison.prepare import prepare_comparison
 from undertow.scenario.reading import dump
+from undertow.studies.comparison.prepare import prepare_comparison
 
 pytestmark = pytest.mark.full
 

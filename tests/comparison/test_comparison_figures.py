@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.comparison.findings import find
 from undertow.report.figures.comparison import alike, comparison_plots
+from undertow.studies.comparison.findings import find
 
 pytestmark = pytest.mark.full
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.comparison.findings import Median, find
-from undertow.comparison.sentences import digits, sentences
-from undertow.comparison.step_time import StepTime
-from undertow.comparison.tables import even_digits, median, medians, table
 from undertow.core.metric import Metric
 from undertow.report.run_tables import metrics_rows
+from undertow.studies.comparison.findings import Median, find
+from undertow.studies.comparison.sentences import digits, sentences
+from undertow.studies.comparison.step_time import StepTime
+from undertow.studies.comparison.tables import even_digits, median, medians, table
 
 TRIALS = 10
 

@@ -6,21 +6,21 @@ from pathlib import Path
 import pytest
 
 import undertow as ut
-from undertow.campaign.campaign_schema import Campaign
-from undertow.campaign.trials import trials
 from undertow.cli.main import run
-from undertow.comparison import equal_budgets as budgets
-from undertow.comparison.candidates import controllers
-from undertow.comparison.equal_budgets import EqualBudgets, Runs, TunedLaw, check_budget, equal_budgets
-from undertow.comparison.held_out import SET, held_out
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
-from undertow.tuning.evaluator import Evaluation
+from undertow.studies.campaign.campaign_schema import Campaign
+from undertow.studies.campaign.trials import trials
+from undertow.studies.comparison import equal_budgets as budgets
+from undertow.studies.comparison.candidates import controllers
+from undertow.studies.comparison.equal_budgets import EqualBudgets, Runs, TunedLaw, check_budget, equal_budgets
+from undertow.studies.comparison.held_out import SET, held_out
+from undertow.studies.tuning.evaluator import Evaluation
 
 BUDGET = 20
 OPTIONAL = "def law(model, frequency=1.0):\n    return pid(model, frequency={})\n"
-FIXED = "def fixed(model):\n    from undertow.controllers import pid\n    return pid(model, frequency=2.0)\n"
+FIXED = "def fixed(model):\n    from undertow.control.controllers import pid\n    return pid(model, frequency=2.0)\n"
 
 
 @pytest.fixture
@@ -132,13 +132,13 @@ def test_trials_are_held_out():
 @pytest.mark.full
 def test_parameters_hold_for_the_scenarios_own_controller(scenario, capsys):
     """Its function is traced with arrays; one that is not made for that says so."""
-    Path("mine.py").write_text("from undertow.controllers import pid\n\n" + OPTIONAL.format("frequency"))
+    Path("mine.py").write_text("from undertow.control.controllers import pid\n\n" + OPTIONAL.format("frequency"))
     own = {"controller": {"kind": "mine.py:law", "frequency": 2.0}, "tune": {"parameters": {"frequency": [0.5, 8.0]}}}
     path = Path(scenario(**own))
     found = controllers(["scenario", "pid"], read(path), path)
     asked = [budgets._scenario_with(one, read(path)).data["tune"] for one in found]
     assert asked == [{"parameters": {"frequency": [0.5, 8.0]}}, {}]
-    Path("mine.py").write_text("from undertow.controllers import pid\n\n" + OPTIONAL.format("float(frequency)"))
+    Path("mine.py").write_text("from undertow.control.controllers import pid\n\n" + OPTIONAL.format("float(frequency)"))
     assert run(["compare", str(path), "--controllers", "scenario,pid", "--tune", "20", "--out", "out"]) == 2
     assert "takes as arrays of JAX, one number for each axis" in capsys.readouterr().err
     assert not Path("out").exists()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from undertow.comparison.paired import completions, differences, holm, median_interval, rank_test
+from undertow.studies.comparison.paired import completions, differences, holm, median_interval, rank_test
 
 NAN = math.nan
 

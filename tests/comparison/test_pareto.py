@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from undertow.comparison.pareto import fronts, on_front
+from undertow.studies.comparison.pareto import fronts, on_front
 
 
 def test_front_by_hand():

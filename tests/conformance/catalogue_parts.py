@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from undertow.controllers.pid import pid
+from undertow.control.controllers.pid import pid
 from undertow.core import catalogue
 from undertow.core.catalogue import presets_of
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.sensors import compass, depth, dvl, imu, position_fix
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
 
 
 @functools.cache

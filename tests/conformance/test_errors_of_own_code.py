@@ -4,12 +4,12 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from undertow import controllers
+from undertow.control import controllers
 from undertow.core.catalogue import find, maker_in
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
 from undertow.core.user_code import fault_of, place_of, python_says
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
 from undertow.scenario.factory import derive_hint
 
 OWN = '''"""A part."""

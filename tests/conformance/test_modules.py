@@ -9,6 +9,7 @@ import equinox as eqx
 import pytest
 
 import undertow
+from undertow.core.part_packages import PACKAGE_OF
 
 NAMES = sorted(info.name for info in pkgutil.walk_packages(undertow.__path__, "undertow."))
 
@@ -122,4 +123,4 @@ def test_the_check_sees_an_heir_of_a_final_class():
 @pytest.mark.parametrize("name", ["vehicles", "thrusters", "plants", "controllers"])
 def test_unknown_part_is_named_in_the_error(name):
     with pytest.raises(AttributeError, match="has no part `nothing_like_it`"):
-        _ = importlib.import_module(f"undertow.{name}").nothing_like_it
+        _ = importlib.import_module(PACKAGE_OF[name]).nothing_like_it

@@ -8,9 +8,9 @@ import pytest
 
 from undertow.core.arrays import in_present_precision
 from undertow.core.runtime import in_precision
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.thrusters import t200
 from undertow.scenario.vehicle_file import read_vehicle
-from undertow.thrusters import t200
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -7,7 +7,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.core.returned import check_command, check_state, difference, form, not_two
 from undertow.core.signals import Signal, check_declared
-from undertow.faults.mode import Altered, altered_by
+from undertow.physics.faults.mode import Altered, altered_by
 
 
 class Law:

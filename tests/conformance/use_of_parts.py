@@ -7,7 +7,7 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.faults.mode import (
+from undertow.physics.faults.mode import (
     AbstractComputationFault,
     AbstractPlantFault,
     AbstractThrustMode,
@@ -15,9 +15,9 @@ from undertow.faults.mode import (
     Moment,
     Presence,
 )
-from undertow.power import ESC
-from undertow.sensors.motion import motion_of
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.power import ESC
+from undertow.physics.sensors.motion import motion_of
+from undertow.physics.thrusters.thruster import PropellerReport
 
 NUMBERS = 64
 

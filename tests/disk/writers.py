@@ -24,16 +24,16 @@ import numpy as np
 import xarray as xr
 
 from undertow.cli.main import run as command
-from undertow.controllers.robust.knowledge import _SIGNALS, save_knowledge
+from undertow.control.controllers.robust.knowledge import _SIGNALS, save_knowledge
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
-from undertow.export.c_program import Exported
-from undertow.interop.rerun_file import write_rerun
-from undertow.interop.ros2.write_bag import write_rosbag2
 from undertow.logs.log import Log, Series
 from undertow.logs.read import read_log
+from undertow.outside.export.c_program import Exported
+from undertow.outside.rerun_file import write_rerun
+from undertow.outside.ros2.write_bag import write_rosbag2
+from undertow.scenario.results.result_files import save
 from undertow.simulation.checkpoint import Checkpoint
-from undertow.simulation.result_files import save
 
 _RESCUED = "out/out-rescued-1/"
 HOW = {"full": errno.ENOSPC, "error": errno.EIO, "killed": -1}

@@ -21,13 +21,13 @@ from typing import NamedTuple
 
 import pytest
 
-from undertow.campaign.prepare import prepare
 from undertow.cli.main import run
-from undertow.comparison.prepare import prepare_comparison
 from undertow.report import run_page
 from undertow.report.figures import writing
 from undertow.scenario.reading import read
 from undertow.scenario.schema import validate
+from undertow.studies.campaign.prepare import prepare
+from undertow.studies.comparison.prepare import prepare_comparison
 
 pytestmark = pytest.mark.docs
 

@@ -27,9 +27,7 @@ def test_citation_file():
     assert [author["family-names"] for author in paper["authors"]] == ["Ghavidel", "Kalat"]
 
 
-@pytest.mark.parametrize(
-    "page", ["README.md", "docs/reference/paper-map.md", "undertow/report/reproduction/background.py"]
-)
+@pytest.mark.parametrize("page", ["README.md", "docs/reference/paper-map.md", "undertow/paper/pages/background.py"])
 def test_pages(page):
     text = "".join((ROOT / page).read_text(encoding="utf-8").replace('"', "").replace(">", "").split())
     for words in ("Ghavidel and Kalat", TITLE, "Nonlinear Dynamics", "2017", DOI):

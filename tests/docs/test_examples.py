@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from undertow.cli.main import run
+from undertow.paper.all_outputs import with_all_outputs
 from undertow.report import run_page
 from undertow.report.figures import writing
-from undertow.reproduction.all_outputs import with_all_outputs
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from test_blocks import FILE, ROOT, blocks
 
-from undertow.checks.controller_check import check_stability
 from undertow.cli.main import run
 from undertow.core import catalogue
 from undertow.core.param import tuning_ranges
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
+from undertow.scenario.checks.controller_check import check_stability
 from undertow.scenario.reading import dump, from_data
-from undertow.tuning.problem import problem
+from undertow.studies.tuning.problem import problem
 
 pytestmark = pytest.mark.docs
 

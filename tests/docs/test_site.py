@@ -89,7 +89,7 @@ def test_layers_are_those_of_the_import_contract(monkeypatch):
 
 def test_fields_say_what_the_code_says_beside_them(monkeypatch):
     from undertow.core.contracts import Load, Target
-    from undertow.thrusters.motor import DCMotor
+    from undertow.physics.thrusters.motor import DCMotor
 
     meaning = extension("api", monkeypatch).field_meaning
     assert meaning(Load, "wrench").startswith("w_d of Eq. (2), on the left side: it opposes; N, N m")

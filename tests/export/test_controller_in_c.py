@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.export.controller import export_controller
+from undertow.outside.export.controller import export_controller
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

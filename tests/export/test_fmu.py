@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.export.fmu import compiled, export_fmu
+from undertow.outside.export.fmu import compiled, export_fmu
 from undertow.scenario.build import build
 from undertow.scenario.reading import dump
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.export.navigation import export_navigation
+from undertow.outside.export.navigation import export_navigation
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

@@ -10,9 +10,9 @@ from export.scenarios import HEAVY, ODIN, PENDULUM
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.export.controller import export_controller
-from undertow.export.fmu import export_fmu
-from undertow.export.vehicle import export_vehicle
+from undertow.outside.export.controller import export_controller
+from undertow.outside.export.fmu import export_fmu
+from undertow.outside.export.vehicle import export_vehicle
 from undertow.scenario.build import build
 from undertow.scenario.reading import dump
 
@@ -191,7 +191,7 @@ def test_random_calls_of_an_fmu_under_sanitizers(units, tmp_path, compiler, name
 
 SORTED = """
 import jax.numpy as jnp
-from undertow.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
 
 
 class Sorted(AbstractSmoothDisturbance):

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.falsification.box import Box, box_of
-from undertow.falsification.falsify import as_data, falsify, judged_alone
-from undertow.falsification.gradient import Gradient
-from undertow.falsification.objective import Objective, Violation
-from undertow.falsification.shrink import shrink
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.scenario.results.run_scenario import run_scenario
 from undertow.scenario.schema import Bounds
-from undertow.simulation.run_scenario import run_scenario
+from undertow.studies.falsification.box import Box, box_of
+from undertow.studies.falsification.falsify import as_data, falsify, judged_alone
+from undertow.studies.falsification.gradient import Gradient
+from undertow.studies.falsification.objective import Objective, Violation
+from undertow.studies.falsification.shrink import shrink
 
 pytestmark = pytest.mark.full
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from undertow.core import runtime
-from undertow.faults.kinds import list_kinds
-from undertow.loop.loop_runs import RunPlan
+from undertow.physics.faults.kinds import list_kinds
 from undertow.scenario.build import build
+from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from recorded import is_as_recorded
 
-from undertow import sensors
+from undertow.control.navigation.kalman import kalman
 from undertow.core.contracts import Measurement, Pose, Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.faults.kinds import list_kinds
-from undertow.faults.quantities import quantities_of
-from undertow.navigation.kalman import kalman
+from undertow.physics import sensors
+from undertow.physics.faults.kinds import list_kinds
+from undertow.physics.faults.quantities import quantities_of
+from undertow.physics.sensors.received import Received
+from undertow.physics.thrusters.thruster import PropellerReport
 from undertow.scenario.build import build
 from undertow.scenario.faulted import faulted
 from undertow.scenario.schema import Fault
-from undertow.sensors.received import Received
-from undertow.thrusters.thruster import PropellerReport
 
 DT, FIRST, STOP, STEPS = 0.01, 3, 8, 11
 SENSORS = ["imu", "dvl", "depth", "compass", "position_fix", "propeller_speed"]

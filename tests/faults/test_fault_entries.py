@@ -11,8 +11,8 @@ from hypothesis import strategies as some
 
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.faults.kinds import list_kinds
-from undertow.faults.sampling import random_faults
+from undertow.physics.faults.kinds import list_kinds
+from undertow.physics.faults.sampling import random_faults
 from undertow.scenario.build import build
 from undertow.scenario.faulted import faulted
 from undertow.scenario.part_cache import PartCache
@@ -200,7 +200,7 @@ OWN = '''
 
 import jax.numpy as jnp
 
-from undertow.faults.mode import AbstractMode, Altered, Severity
+from undertow.physics.faults.mode import AbstractMode, Altered, Severity
 
 
 class Half(AbstractMode):

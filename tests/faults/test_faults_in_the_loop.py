@@ -9,8 +9,8 @@ import pytest
 import undertow as ut
 from undertow.core import runtime
 from undertow.core.errors import BadInput
-from undertow.loop import sampled, simd_batch
 from undertow.scenario.build import build
+from undertow.simulation.loop import sampled, simd_batch
 
 DT = 0.01
 ODIN = {

@@ -4,7 +4,7 @@ import pytest
 from driven_scenario import DRIVEN
 from ruamel.yaml import YAML
 
-from undertow.interop.stepped_vehicle import SteppedVehicle
+from undertow.outside.stepped_vehicle import SteppedVehicle
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import struct
 
 import numpy as np
 
-from undertow.interop.thruster_channels import FRAMES
+from undertow.outside.thruster_channels import FRAMES
 
 MOTORS = np.array(FRAMES["vectored_6dof"], dtype=float)
 GAINS = np.array([[0.3, 0, 0.1], [0.3, 0, 0.1], [0.8, 0.2, 0.4], [1.5, 0.3, 0.8]])  # roll, pitch, yaw, up

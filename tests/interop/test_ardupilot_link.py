@@ -13,10 +13,10 @@ from driven_scenario import DRIVEN
 from fake_autopilot import FakeAutopilot, vector
 
 from undertow.cli.main import run
-from undertow.interop.ardupilot.server import listen, serve, status_line
-from undertow.interop.ardupilot.session import Session
-from undertow.interop.thruster_channels import channels_of_vehicle
-from undertow.realtime.statistics import Durations
+from undertow.outside.ardupilot.server import listen, serve, status_line
+from undertow.outside.ardupilot.session import Session
+from undertow.outside.realtime.statistics import Durations
+from undertow.outside.thruster_channels import channels_of_vehicle
 
 pytestmark = pytest.mark.interop
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.interop.ardupilot.packets import ServoPacket, reply
-from undertow.interop.stepped_vehicle import State
-from undertow.interop.thruster_channels import channels_from_text
+from undertow.outside.ardupilot.packets import ServoPacket, reply
+from undertow.outside.stepped_vehicle import State
+from undertow.outside.thruster_channels import channels_from_text
 
 pytestmark = pytest.mark.interop
 

@@ -8,8 +8,8 @@ import pytest
 from driven_scenario import DRIVEN
 
 import undertow as ut
-from undertow.interop.ardupilot.session import SILENCE, Session
-from undertow.interop.thruster_channels import channels_from_text
+from undertow.outside.ardupilot.session import SILENCE, Session
+from undertow.outside.thruster_channels import channels_from_text
 
 pytestmark = pytest.mark.interop
 

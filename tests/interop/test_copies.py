@@ -8,9 +8,9 @@ import pytest
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop.gymnasium.env import make
-from undertow.interop.gymnasium.vector_env import make_vec
-from undertow.loop.stepped import Step
+from undertow.outside.gymnasium.env import make
+from undertow.outside.gymnasium.vector_env import make_vec
+from undertow.simulation.loop.stepped import Step
 
 PENDULUM = {
     "plant": "inverted_pendulum",

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.lqi import lqi_gains
+from undertow.control.controllers.lqi import lqi_gains
 
 pytestmark = pytest.mark.interop
 

@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop import gymnasium as ug
+from undertow.outside import gymnasium as ug
 
 pytestmark = pytest.mark.interop
 
@@ -191,7 +191,7 @@ def test_registered_names():
 
 def test_by_xla_where_the_batch_compiler_cannot(monkeypatch):
     """The same to rounding."""
-    from undertow.loop import stepped_batch
+    from undertow.simulation.loop import stepped_batch
 
     def unsupported(*_):
         raise stepped_batch.Unsupported("for a test")

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import undertow as ut
-from undertow.interop.log_score import score
-from undertow.interop.log_signs import _best_set
 from undertow.logs.log import Log
+from undertow.outside.log_score import score
+from undertow.outside.log_signs import _best_set
 from undertow.scenario.build import build
 from undertow.scenario.log_file import read_log
 

@@ -8,16 +8,16 @@ from driven_scenario import DRIVEN
 from pymavlink.dialects.v20 import common as mavlink
 
 import undertow as ut
-from undertow.autopilot.measured_motion import Format
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink import Companion
-from undertow.interop.mavlink.companion import HEARTBEAT_PERIOD
-from undertow.interop.mavlink.message_codec import parsed
-from undertow.interop.mavlink.message_requests import MessageRequests
-from undertow.interop.mavlink.permission import HEARTBEAT_TIMEOUT, Permission
-from undertow.realtime.control_session import SAFE_PERIOD, ControlSession
-from undertow.realtime.measurement_rate import MOST, WINDOW
-from undertow.realtime.sender_clock import SenderClock
+from undertow.outside.autopilot.measured_motion import Format
+from undertow.outside.mavlink import Companion
+from undertow.outside.mavlink.companion import HEARTBEAT_PERIOD
+from undertow.outside.mavlink.message_codec import parsed
+from undertow.outside.mavlink.message_requests import MessageRequests
+from undertow.outside.mavlink.permission import HEARTBEAT_TIMEOUT, Permission
+from undertow.outside.realtime.control_session import SAFE_PERIOD, ControlSession
+from undertow.outside.realtime.measurement_rate import MOST, WINDOW
+from undertow.outside.realtime.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
 

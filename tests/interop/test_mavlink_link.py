@@ -17,11 +17,11 @@ from mavlink_vehicle import MavlinkVehicle
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink import Companion, CompanionLink, UdpLink
-from undertow.realtime.control_loop import RealTimeLoop
-from undertow.realtime.loop_clock import MonotonicClock
-from undertow.realtime.loop_settings import LoopSettings
-from undertow.realtime.sender_clock import SenderClock
+from undertow.outside.mavlink import Companion, CompanionLink, UdpLink
+from undertow.outside.realtime.control_loop import RealTimeLoop
+from undertow.outside.realtime.loop_clock import MonotonicClock
+from undertow.outside.realtime.loop_settings import LoopSettings
+from undertow.outside.realtime.sender_clock import SenderClock
 
 pytestmark = pytest.mark.interop
 

@@ -5,10 +5,10 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink.actuator_commands import Pulses, Target, commands_of
-from undertow.interop.mavlink.message_codec import parsed
-from undertow.interop.mavlink.odometry import OdometryReader, in_body_axes, of_local_position, of_odometry
-from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
+from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
+from undertow.outside.mavlink.actuator_commands import Pulses, Target, commands_of
+from undertow.outside.mavlink.message_codec import parsed
+from undertow.outside.mavlink.odometry import OdometryReader, in_body_axes, of_local_position, of_odometry
 
 pytestmark = pytest.mark.interop
 

@@ -3,8 +3,8 @@
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from undertow.interop.mavlink.actuator_commands import Target
-from undertow.interop.mavlink.message_requests import MessageRequests
+from undertow.outside.mavlink.actuator_commands import Target
+from undertow.outside.mavlink.message_requests import MessageRequests
 
 pytestmark = pytest.mark.interop
 

@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.interop.mavlink import UdpLink, read_key
-from undertow.interop.mavlink.message_codec import MessageCodec
+from undertow.outside.mavlink import UdpLink, read_key
+from undertow.outside.mavlink.message_codec import MessageCodec
 
 pytestmark = pytest.mark.interop
 

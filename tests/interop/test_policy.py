@@ -10,7 +10,7 @@ import pytest
 import undertow as ut
 from undertow.cli.main import run
 from undertow.core.errors import BadInput
-from undertow.interop import gymnasium as ug
+from undertow.outside import gymnasium as ug
 
 pytestmark = pytest.mark.interop
 

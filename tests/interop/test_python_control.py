@@ -11,7 +11,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.analysis.linearization.jacobians import without
 from undertow.core.errors import BadInput
-from undertow.interop import python_control as upc
+from undertow.outside import python_control as upc
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.interop import gymnasium as ug
+from undertow.outside import gymnasium as ug
 
 pytestmark = pytest.mark.interop
 

@@ -6,9 +6,9 @@ from driven_scenario import DRIVEN
 
 import undertow as ut
 from undertow.core.errors import BadInput
+from undertow.core.numerics.rotations import rotation_from_quaternion
 from undertow.core.status import Status
-from undertow.interop.stepped_vehicle import STANDARD_GRAVITY, SteppedVehicle
-from undertow.numerics.rotations import rotation_from_quaternion
+from undertow.outside.stepped_vehicle import STANDARD_GRAVITY, SteppedVehicle
 
 pytestmark = pytest.mark.interop
 

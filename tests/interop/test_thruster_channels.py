@@ -5,7 +5,7 @@ import pytest
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop.thruster_channels import (
+from undertow.outside.thruster_channels import (
     FRAMES,
     Channels,
     channels_from_text,

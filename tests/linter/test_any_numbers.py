@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.checks.vehicle_lint import derived, lint
 from undertow.core.errors import BadInput
+from undertow.scenario.checks.vehicle_lint import derived, lint
 from undertow.scenario.reading import read
 from undertow.scenario.vehicle_schema import parse
 

@@ -1,7 +1,7 @@
 """Defects of published models, each as a vehicle file with the numbers of its source: the linter finds every one.
 
 Not here, since no vehicle file shows them: thrust limits (von Benzon's 30.4 N for a T200), tables and plants (T500,
-MLS2EM), and defects of code; for those see the docstring of undertow/checks/vehicle_lint.
+MLS2EM), and defects of code; for those see the docstring of undertow/scenario/checks/vehicle_lint.
 """
 
 import warnings
@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from undertow.checks.part_check import check_contract
-from undertow.checks.thruster_check import derived_of_thruster
-from undertow.checks.vehicle_lint import lint
+from undertow.physics.thrusters import paper_table3, t200
+from undertow.scenario.checks.part_check import check_contract
+from undertow.scenario.checks.thruster_check import derived_of_thruster
+from undertow.scenario.checks.vehicle_lint import lint
 from undertow.scenario.vehicle_file import read_vehicle
-from undertow.thrusters import paper_table3, t200
 
 FOLDER = Path(__file__).parent / "defects"
 

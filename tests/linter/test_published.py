@@ -5,8 +5,8 @@ import importlib
 import numpy as np
 import pytest
 
-from undertow.checks.vehicle_lint import derived, facts_of, lint, mass
 from undertow.core import catalogue
+from undertow.scenario.checks.vehicle_lint import derived, facts_of, lint, mass
 
 # Hull -> what is said about it, with the number that causes it; about layouts, below.
 HULLS = {
@@ -29,7 +29,7 @@ RANKS = {"bluerov2": "rank 5 of 6", "lauv": "rank 1 of 6", "npsauv2": "rank 1 of
 
 def variants():
     for name, part in sorted(catalogue.names("vehicles").items()):
-        module = importlib.import_module(f"undertow.vehicles.{name}")
+        module = importlib.import_module(f"undertow.physics.vehicles.{name}")
         for hull in getattr(module, "PARAMETERS", [None]):
             for layout in getattr(module, "LAYOUTS", [None]):
                 given = {"parameters": hull, "layout": layout}

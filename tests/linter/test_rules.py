@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.checks.vehicle_lint import facts_of, lint
+from undertow.physics.vehicles import odin
+from undertow.scenario.checks.vehicle_lint import facts_of, lint
 from undertow.scenario.vehicle_file import read_vehicle
-from undertow.vehicles import odin
 
 SOUND = read_vehicle(Path(__file__).parents[2] / "examples" / "my_rov.yaml").data.facts()
 LOOSE = SOUND._replace(size=None, printed_matrix=None)

@@ -256,7 +256,7 @@ def test_missing_topics_and_columns(tmp_path):
 def test_pulses_become_volts_as_the_speed_controllers_have_it():
     from undertow.logs.mapped_log import volts
     from undertow.logs.mapping import Entry
-    from undertow.power.esc import esc
+    from undertow.physics.power.esc import esc
 
     pulses = np.arange(1050.0, 1950.0, 7.0)
     entry = Entry(("x",), unit="us", supply=16.0)

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop.log_score import AXES, score
 from undertow.logs.foxglove_layout import layout
 from undertow.logs.log import Log
+from undertow.outside.log_score import AXES, score
 from undertow.scenario.build import build
 
 pytestmark = pytest.mark.full

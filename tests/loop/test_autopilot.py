@@ -6,10 +6,10 @@ import pytest
 from scipy.optimize import brentq
 
 import undertow as ut
-from undertow.autopilot.clock import Clock
-from undertow.autopilot.measured_motion import Format, Motion
 from undertow.core.errors import BadInput
-from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
+from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
+from undertow.outside.autopilot.clock import Clock
+from undertow.outside.autopilot.measured_motion import Format, Motion
 
 NOISY = {"kind": "white_noise", "position": 0.001, "velocity": 0.01}
 HEAVY = {

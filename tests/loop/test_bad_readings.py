@@ -9,29 +9,29 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.pid import pid
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.pid import pid
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.observer import observer
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core import runtime
 from undertow.core.contracts import AbstractContinuousController, AbstractController, AbstractNavigation, Model
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.status import Status
-from undertow.disturbances.none import none
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import continuous, sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.loop_runs import LoopRun, RunPlan
-from undertow.navigation.observer import observer
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.references.setpoint import setpoint
-from undertow.sensors import compass, dvl, imu, position_fix
-from undertow.sensors.depth import Depth
-from undertow.sensors.sampling import Sampling
+from undertow.physics.disturbances.none import none
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.sensors import compass, dvl, imu, position_fix
+from undertow.physics.sensors.depth import Depth
+from undertow.physics.sensors.sampling import Sampling
+from undertow.physics.thrusters import paper_table3, t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import continuous, sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
 from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.run_many import run_together
-from undertow.thrusters import paper_table3, t200
-from undertow.vehicles import bluerov2_heavy
 
 DT = 0.01
 NAN, INF = float("nan"), float("inf")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import simdjit
-from undertow.bench import workload
-from undertow.bench.workload import W1
-from undertow.loop.simd_batch import SimdBatchRunner
-from undertow.numerics.integrators import rk4, rk4_compact
+from undertow.core.numerics.integrators import rk4, rk4_compact
+from undertow.simulation.loop.simd_batch import SimdBatchRunner
+from undertow.studies.speed import workload
+from undertow.studies.speed.workload import W1
 
 
 def stepped(method):

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.navigation.consistency import innovation_monitor, normalised_square
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.consistency import innovation_monitor, normalised_square
-from undertow.sensors import compass, dvl, imu
-from undertow.sensors.gauss_markov import CorrelatedErrors, Disturbed
-from undertow.sensors.motion import motion_of
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.sensors import compass, dvl, imu
+from undertow.physics.sensors.gauss_markov import CorrelatedErrors, Disturbed
+from undertow.physics.sensors.motion import motion_of
+from undertow.physics.thrusters.thruster import PropellerReport
 
 
 @jax.jit

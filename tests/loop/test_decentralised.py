@@ -6,25 +6,25 @@ import numpy as np
 import pytest
 
 from undertow.analysis.metrics import measure
-from undertow.controllers.decentralised import decentralised
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.decentralised import decentralised
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.white_noise import white_noise
+from undertow.control.references.setpoint import setpoint
 from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.composite_model import composite_model, parts_of
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
-from undertow.disturbances.none import none
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.white_noise import white_noise
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.plants.two_link_arm import two_link_arm
-from undertow.plants.two_vehicles import two_vehicles
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.plants.two_link_arm import two_link_arm
+from undertow.physics.plants.two_vehicles import two_vehicles
+from undertow.physics.thrusters.t200 import t200
+from undertow.physics.vehicles.bluerov2 import bluerov2
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.thrusters.t200 import t200
-from undertow.vehicles.bluerov2 import bluerov2
-from undertow.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 START = np.array([0.0, 0, 0, 0, 0, 0.1, -4.2, 0.3, 0, 0, 0, -0.2])
 GOAL = np.array([0.3, -0.2, 0.1, 0, 0, 0.2, -4.5, 0.1, 0.2, 0.1, 0, -0.1])

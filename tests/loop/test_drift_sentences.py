@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from undertow.navigation.drift import drift_advice, drifts
-from undertow.navigation.observability import Sensed, drift_sentences, unobservable
-from undertow.sensors.compass import compass
-from undertow.sensors.depth import depth
-from undertow.sensors.dvl import dvl
-from undertow.sensors.imu import imu
-from undertow.sensors.position_fix import position_fix
+from undertow.control.navigation.drift import drift_advice, drifts
+from undertow.control.navigation.observability import Sensed, drift_sentences, unobservable
+from undertow.physics.sensors.compass import compass
+from undertow.physics.sensors.depth import depth
+from undertow.physics.sensors.dvl import dvl
+from undertow.physics.sensors.imu import imu
+from undertow.physics.sensors.position_fix import position_fix
 
 G, T, PERIOD = 9.81, 100.0, 0.01
 ANGLE, RATE, FORCE = 0.002, 0.03, 0.05  # noise

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.references.circle import circle
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.circle import circle
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

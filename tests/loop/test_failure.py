@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from jaxtyping import Array, Float
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractDisturbance
 from undertow.core.status import Status
-from undertow.loop import continuous, sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.outcome import status_of
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.outcome import status_of
 
 
 class Breaks(AbstractDisturbance):

@@ -10,9 +10,9 @@ from batch_compiler.emulated_gpu import EmulatedGpu
 from loop.test_simd_examples import example
 
 from simdjit import Driver, nvidia
-from undertow.bench.workload import constant
-from undertow.loop.loop_runs import LoopRun, RunPlan
-from undertow.loop.simd_batch import SimdBatchRunner
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
+from undertow.simulation.loop.simd_batch import SimdBatchRunner
+from undertow.studies.speed.workload import constant
 
 
 @pytest.fixture

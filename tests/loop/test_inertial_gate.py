@@ -5,16 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.control.navigation.disagreement import distrusted
+from undertow.control.navigation.inertial_gate import gate_for
+from undertow.control.navigation.kalman import kalman
+from undertow.control.navigation.observer import observer
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.disagreement import distrusted
-from undertow.navigation.inertial_gate import gate_for
-from undertow.navigation.kalman import kalman
-from undertow.navigation.observer import observer
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix
+from undertow.physics.sensors.received import Received
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.sensors import compass, depth, dvl, imu, position_fix
-from undertow.sensors.received import Received
 
 STEP = 0.01  # s
 AT_REST = np.array([0, 0, 0, 0, 0, 0, 0, -9.81])

@@ -12,16 +12,16 @@ from scipy.spatial.transform import Rotation
 from textbook import rotation_from_euler
 
 import undertow as ut
+from undertow.control.navigation.kalman import ATTITUDE, FORCE_BIAS, GYRO_BIAS, POSITION, VELOCITY, Kalman, kalman
+from undertow.control.navigation.observability import Sensed, deviations, unobservable
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.param import Param, param
-from undertow.navigation.kalman import ATTITUDE, FORCE_BIAS, GYRO_BIAS, POSITION, VELOCITY, Kalman, kalman
-from undertow.navigation.observability import Sensed, deviations, unobservable
-from undertow.sensors import compass, depth, dvl, imu, position_fix
-from undertow.sensors.imu import IMU
-from undertow.sensors.received import Received
-from undertow.sensors.sampling import Sampling
-from undertow.sensors.sensor import AbstractSensor
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix
+from undertow.physics.sensors.imu import IMU
+from undertow.physics.sensors.received import Received
+from undertow.physics.sensors.sampling import Sampling
+from undertow.physics.sensors.sensor import AbstractSensor
 
 AMPLITUDE = np.array([1.0, 0.7, 0.4, 0.3, 0.2, 0.5])
 FREQUENCY = np.array([0.3, 0.5, 0.4, 0.7, 0.6, 0.2])

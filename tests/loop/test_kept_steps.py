@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.loop import simd_batch, stepped, stepped_batch
-from undertow.loop.simd_batch import Unsupported
-from undertow.loop.vmap_batch import _batched
+from undertow.simulation.loop import simd_batch, stepped, stepped_batch
+from undertow.simulation.loop.simd_batch import Unsupported
+from undertow.simulation.loop.vmap_batch import _batched
 
 NUMBERS = {"stiffness": np.array([2.0, 3.0]), "damping": np.array(0.5)}
 STATE = (np.array([0.3, -0.2]), np.zeros(2))

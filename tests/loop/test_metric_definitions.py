@@ -10,17 +10,17 @@ import pytest
 import undertow as ut
 from undertow.analysis.metrics import MEANINGS, Metrics, meanings, results, results_of_batch
 from undertow.cli.main import run as command
-from undertow.controllers.pid import pid
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.none import none
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants import double_integrator, inverted_pendulum, magnetic_levitation, two_link_arm
-from undertow.references.setpoint import setpoint
-from undertow.references.sine import sine
+from undertow.control.controllers.pid import pid
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
+from undertow.control.references.sine import sine
+from undertow.physics.disturbances.none import none
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants import double_integrator, inverted_pendulum, magnetic_levitation, two_link_arm
 from undertow.scenario.reading import dump
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DT = 0.01
 

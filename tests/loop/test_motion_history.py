@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.navigation.motion_history import MotionHistory, resting
+from undertow.control.navigation.motion_history import MotionHistory, resting
 
 REST = np.array([1.0, 0.0, 0.0, 0.0])
 SLOTS = len(resting(jnp.asarray(REST)).age)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.autopilot.navigation_filter import NavigationFilter
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.loop.stepped import put, step_of
+from undertow.outside.autopilot.navigation_filter import NavigationFilter
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
+from undertow.simulation.loop.stepped import put, step_of
 
 pytestmark = pytest.mark.full
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.campaign.task import run_trials, site
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import dump
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.campaign.task import run_trials, site
 
 # What other packages do to a process when they are imported is theirs; they are imported before.
 PROCESS = """
@@ -51,7 +51,7 @@ import dask, distributed, rich, scipy.linalg, scipy.optimize, scipy.signal, scip
 before.update(state())
 for package in ("undertow", "simdjit"):
     for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + "."):
-        if module.name != "undertow.bench.first" and "mujoco_engine" not in module.name:  # a program; an extra
+        if module.name != "undertow.studies.speed.first" and "mujoco_engine" not in module.name:  # a program; an extra
             __import__(module.name)
             look(module.name)
 print(json.dumps(changed))

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from recorded import is_as_recorded
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.degraded import degraded
+from undertow.control.navigation.perfect import perfect
+from undertow.control.navigation.white_noise import white_noise
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import Measurement
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.degraded import degraded
-from undertow.navigation.perfect import perfect
-from undertow.navigation.white_noise import white_noise
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
 from undertow.scenario.build import velocity_noise_of
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 LIMIT, DT = 3.0, 1e-3
 

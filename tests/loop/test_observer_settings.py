@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from undertow.control.navigation.observer import observer
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.observer import observer
-from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.physics.thrusters.thruster import PropellerReport
 
 SENSORS = (imu, dvl, depth, compass, position_fix, propeller_speed)
 BLENDS = ("imu", "dvl", "compass", "depth", "fix", "propeller")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.campaign.task import run_trials
 from undertow.cli.main import run as command
 from undertow.core.errors import BadInput
 from undertow.scenario.build import build
 from undertow.scenario.reading import dump, read
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.campaign.task import run_trials
 
 OVERSHOOT = '''
 import jax.numpy as jnp

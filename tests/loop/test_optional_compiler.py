@@ -9,11 +9,11 @@ import sys
 import numpy as np
 import pytest
 
-from undertow import process_setup
-from undertow.bench import measure
 from undertow.cli.main import run
-from undertow.loop import simd_batch
-from undertow.simulation.run_scenario import run_scenario
+from undertow.core import process_setup
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop import simd_batch
+from undertow.studies.speed import measure
 
 SCENARIO = """
 plant: {kind: double_integrator, axes: 1, limit: 20.0}

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from jaxtyping import Array, Float
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractDisturbance
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import continuous, sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.plants.inverted_pendulum import inverted_pendulum
-from undertow.plants.mechanism import AbstractMechanism
-from undertow.plants.two_link_arm import two_link_arm
-from undertow.references.setpoint import setpoint
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.plants.inverted_pendulum import inverted_pendulum
+from undertow.physics.plants.mechanism import AbstractMechanism
+from undertow.physics.plants.two_link_arm import two_link_arm
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 GENTLE = {"adaptation": 1.0, "composite": 1.0, "robust_gain": 0.0, "pole": 5.0}  # stable at 20 Hz
 

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.control.navigation.pose_only import PoseOnly, PoseOnlyState, pose_only
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.pose_only import PoseOnly, PoseOnlyState, pose_only
 
 T = 0.01
 

@@ -9,15 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.campaign.campaign_schema import read_text
-from undertow.campaign.store_layout import layout
-from undertow.campaign.task import run_trials, site
 from undertow.core import runtime
 from undertow.core.contracts import Load, Pose
-from undertow.disturbances.u1 import u1
-from undertow.numerics.rotations import cross
+from undertow.core.numerics.rotations import cross
+from undertow.physics.disturbances.u1 import u1
 from undertow.scenario.reading import dump
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.campaign.campaign_schema import read_text
+from undertow.studies.campaign.store_layout import layout
+from undertow.studies.campaign.task import run_trials, site
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},
@@ -29,7 +29,7 @@ SCENARIO = {
 }
 PROGRAM = """
 import sys
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
 from undertow.scenario.reading import read
 from pathlib import Path
 print(run_scenario(read(Path(sys.argv[1]))).dataset.attrs["content_hash"])

@@ -4,15 +4,15 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.white_noise import white_noise
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractContinuousController, Model
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.white_noise import white_noise
-from undertow.numerics.linear_algebra import matvec
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.core.numerics.linear_algebra import matvec
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

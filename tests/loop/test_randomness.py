@@ -8,21 +8,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.pid import pid
+from undertow.control.controllers.pid import pid
+from undertow.control.navigation.observer import observer
+from undertow.control.navigation.white_noise import white_noise
+from undertow.control.references.setpoint import setpoint
 from undertow.core import catalogue, runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
 from undertow.core.measurement import measurement_of_outputs
-from undertow.disturbances.adding import Together
-from undertow.disturbances.none import none
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.observer import observer
-from undertow.navigation.white_noise import white_noise
-from undertow.numerics.random_keys import keys_for, numbered
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
-from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.sensors.sensor import AbstractSensor
+from undertow.core.numerics.random_keys import keys_for, numbered
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.physics.sensors.sensor import AbstractSensor
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DEVIATION = 0.1
 

@@ -9,12 +9,12 @@ import pytest
 import undertow
 from undertow.analysis.success import Success
 from undertow.analysis.temporal.requirements import Verdict
+from undertow.control.supervision.conditions import State
+from undertow.control.supervision.transition_log import Transition
 from undertow.core.metric import Metric
 from undertow.core.status import Status
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_facts import RunFacts, facts_from
-from undertow.supervision.conditions import State
-from undertow.supervision.transition_log import Transition
+from undertow.scenario.results.run_facts import RunFacts, facts_from
 
 FACTS = RunFacts(
     status=Status.DIVERGED,

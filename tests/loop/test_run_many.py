@@ -4,11 +4,11 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.loop import batch_runner
-from undertow.loop.loop_runs import numbers_of
-from undertow.loop.simd_batch import Unsupported
 from undertow.scenario.build import build
 from undertow.scenario.prepare import prepare
+from undertow.simulation.loop import batch_runner
+from undertow.simulation.loop.loop_runs import numbers_of
+from undertow.simulation.loop.simd_batch import Unsupported
 from undertow.simulation.prepared_run import PreparedRun, RunBatch
 from undertow.simulation.programs import ProgramCache
 from undertow.simulation.run_many import in_order, run_many, run_together

@@ -4,16 +4,16 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import continuous, sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.references.setpoint import setpoint
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DURATION, RECORD = 1.0, 0.05
 STEPS = RECORD / np.array([50, 100, 400])  # 1 ms, 1/2 ms, 1/8 ms

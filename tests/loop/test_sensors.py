@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from textbook import wrap_angle
 
+from undertow.control.navigation.observer import observer
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.navigation.observer import observer
-from undertow.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
-from undertow.sensors.sampling import Sampling
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
+from undertow.physics.sensors.sampling import Sampling
+from undertow.physics.thrusters.thruster import PropellerReport
 
 QUIET_IMU = {"angle_noise": 0.0, "rate_noise": 0.0, "force_noise": 0.0}
 

@@ -8,17 +8,17 @@ import pytest
 from jaxtyping import Array, Float
 from recorded import is_as_recorded
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractDisturbance
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import continuous, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
-from undertow.simulation.run_scenario import run_scenario
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop import continuous, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 HOW = {"duration": 0.5, "record_step": 0.02, "dt": 1e-3}
 

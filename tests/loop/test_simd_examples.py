@@ -10,11 +10,11 @@ import pytest
 from recorded import is_as_recorded
 
 from undertow.analysis.metrics import Metrics
-from undertow.bench.workload import constant
-from undertow.loop import sampled, simd_batch
-from undertow.loop.loop_runs import LoopRun, RunPlan
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
+from undertow.studies.speed.workload import constant
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUICK = ("inverted_pendulum",)

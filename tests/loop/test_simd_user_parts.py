@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
 
 FILE = Path(__file__).with_name("user_parts.py")
 

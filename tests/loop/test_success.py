@@ -7,18 +7,18 @@ from scipy.spatial.transform import Rotation
 
 from undertow.analysis.metrics import Metrics, accumulators, for_people, meanings, output_groups, results
 from undertow.analysis.success import criterion_of, judged
-from undertow.campaign.task import NOT_JUDGED, run_trials
-from undertow.controllers.pid import pid
+from undertow.control.controllers.pid import pid
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.metric import Metric
 from undertow.core.status import Status
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import DoubleIntegrator, double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import DoubleIntegrator, double_integrator
 from undertow.scenario.reading import dump
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.studies.campaign.task import NOT_JUDGED, run_trials
 
 KNOWN = {"position_rms": Metric("m", ""), "attitude_rms": Metric("rad", "")}
 

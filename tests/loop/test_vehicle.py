@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.autopilot.measured_motion import ATTITUDES, VELOCITIES, Format, motion_in
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_pose
 from undertow.core.status import Status
+from undertow.outside.autopilot.measured_motion import ATTITUDES, VELOCITIES, Format, motion_in
 
 PENDULUM = {
     "plant": "inverted_pendulum",

@@ -5,13 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import rcaf
+from undertow.control.controllers import rcaf
 from undertow.core.contracts import Load, Target
-from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import attitude_error, rotation_from_quaternion
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.vehicles import odin
+from undertow.core.numerics.integrators import rk4
+from undertow.core.numerics.rotations import attitude_error, rotation_from_quaternion
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import odin
 
 RNG = np.random.default_rng(11)
 STARTS = 1000

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from undertow.numerics.box_quadratic import box_minimum
-from undertow.numerics.linear_algebra import inverse_symmetric, solve_symmetric
+from undertow.core.numerics.box_quadratic import box_minimum
+from undertow.core.numerics.linear_algebra import inverse_symmetric, solve_symmetric
 
 RNG = np.random.default_rng(11)
 solve = jax.jit(box_minimum)

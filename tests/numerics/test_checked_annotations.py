@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 
-from undertow.numerics.linear_algebra import matvec
+from undertow.core.numerics.linear_algebra import matvec
 
 
 @pytest.mark.full

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from undertow.control.estimation import FuzzySystem, gaussian_sets
+from undertow.control.estimation.fuzzy_system import even_memberships, is_even, memberships
 from undertow.core import runtime
 from undertow.core.errors import BadInput
-from undertow.estimation import FuzzySystem, gaussian_sets
-from undertow.estimation.fuzzy_system import even_memberships, is_even, memberships
 
 EPSILON = np.finfo(float).eps
 LAYOUTS = [(1, None), (2, None), (3, None), (3, 0.5), (5, None), (5, 0.25), (7, None), (7, 1.0), (15, None), (25, None)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from undertow.estimation import gaussian_sets
+from undertow.control.estimation import gaussian_sets
 
 # spacing / width: rho of 3, 5 and 7 sets, and sigma^2 |xi'(0)|^2 of 3 and 5 sets, four digits.
 TABLE = {

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from undertow.core.contracts import Load
-from undertow.disturbances import u1
-from undertow.numerics.integrators import METHODS, rk4
-from undertow.plants import double_integrator
+from undertow.core.numerics.integrators import METHODS, rk4
+from undertow.physics.disturbances import u1
+from undertow.physics.plants import double_integrator
 
 
 def integrate(step, field, start, duration, steps):

@@ -9,16 +9,16 @@ import pytest
 from textbook import jacobian
 
 from undertow.core.measurement import measurement_of_outputs
-from undertow.numerics.linear_algebra import (
+from undertow.core.numerics.linear_algebra import (
     partial_inverse,
     printed_inverse,
     pseudo_inverse,
     regularised_inverse,
     regularised_sharp,
 )
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2, odin
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2, odin
 
 RNG = np.random.default_rng(5)
 COUNT = 50

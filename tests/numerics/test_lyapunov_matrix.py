@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
-from undertow.controllers import rcaf
+from undertow.control.controllers import rcaf
 from undertow.core.errors import BadInput
-from undertow.numerics.linear_algebra import companion_lyapunov
-from undertow.plants import double_integrator
+from undertow.core.numerics.linear_algebra import companion_lyapunov
+from undertow.physics.plants import double_integrator
 
 RNG = np.random.default_rng(3)
 COUNT = 200

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from textbook import euler_rate_matrix, jacobian, rotation_from_euler, wrap_angle
 
-from undertow.numerics.rotations import (
+from undertow.core.numerics.rotations import (
     _SMALLEST_COSINE,
     Kinematics,
     cross,

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.numerics.rounding import three_digits
+from undertow.core.numerics.rounding import three_digits
 
 
 def test_three_digits_are_those_that_python_prints():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from undertow.numerics.motion_laws import quintic, rounded_ramp, with_rates
-from undertow.numerics.spline import clamped_slopes, spline
+from undertow.core.numerics.motion_laws import quintic, rounded_ramp, with_rates
+from undertow.core.numerics.spline import clamped_slopes, spline
 
 
 def rows(count, columns=3, seed=0):

@@ -5,9 +5,9 @@ import jax
 import numpy as np
 import pytest
 
+from undertow.control.estimation import SeriesParallel
 from undertow.core.errors import BadInput
-from undertow.estimation import SeriesParallel
-from undertow.numerics import smoothing
+from undertow.core.numerics import smoothing
 
 switch = jax.jit(smoothing.switch, static_argnames="kind")
 compensation = eqx.filter_jit(SeriesParallel.compensation)

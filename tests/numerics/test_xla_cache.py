@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from undertow.process_setup import remove_damaged
+from undertow.core.process_setup import remove_damaged
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_a_check_ends_in_time(cache):
 
 
 PROGRAM = """
-from undertow import process_setup
+from undertow.core import process_setup
 process_setup.prepare()
 import jax, os
 print(jax.jit(lambda x: jax.numpy.sin(x) @ x)(jax.numpy.arange(30.0)))

@@ -9,7 +9,7 @@ import pytest
 pytestmark = pytest.mark.full
 
 PROGRAM = """
-from undertow.process_setup import prepare
+from undertow.core.process_setup import prepare
 
 prepare()
 import numpy as np

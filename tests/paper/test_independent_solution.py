@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from undertow.bench.plain_numpy import ALPHA, CQ, CT, K3, KE, KF, KT, M_INV, B, R, jacobian, law, rk4, suite_u1
-from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.setup import CONTROLLERS, scenario
-from undertow.simulation.run_scenario import run_scenario
+from undertow.paper.all_outputs import with_all_outputs
+from undertow.paper.setup import CONTROLLERS, scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.studies.speed.plain_numpy import ALPHA, CQ, CT, K3, KE, KF, KT, M_INV, B, R, jacobian, law, rk4, suite_u1
 
 pytestmark = pytest.mark.full
 

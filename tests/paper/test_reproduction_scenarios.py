@@ -2,8 +2,8 @@
 
 import pytest
 
-from undertow.reproduction import claims, horizons, lag_map
-from undertow.reproduction.robust_variant import fidelity
+from undertow.paper import claims, horizons, lag_map
+from undertow.paper.robust_variant import fidelity
 from undertow.scenario.build import build
 from undertow.scenario.part_cache import PartCache
 

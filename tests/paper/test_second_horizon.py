@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from undertow.analysis.drift import gain_of, time_to_divergence
-from undertow.controllers.presets.paper import paper
+from undertow.control.controllers.presets.paper import paper
 from undertow.core.status import Status
-from undertow.plants.double_integrator import double_integrator
-from undertow.reproduction import claims, drifting, horizons, lag_map
-from undertow.reproduction.all_outputs import with_all_outputs
-from undertow.reproduction.claims import estimation
-from undertow.reproduction.claims.tracking import perfect_variation
-from undertow.reproduction.running import run_batches
-from undertow.reproduction.setup import FIDELITIES, SIX_AXES, law_of, scenario
+from undertow.paper import claims, drifting, horizons, lag_map
+from undertow.paper.all_outputs import with_all_outputs
+from undertow.paper.claims import estimation
+from undertow.paper.claims.tracking import perfect_variation
+from undertow.paper.running import run_batches
+from undertow.paper.setup import FIDELITIES, SIX_AXES, law_of, scenario
+from undertow.physics.plants.double_integrator import double_integrator
 from undertow.scenario.build import build
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.numerics.number import Number
+from undertow.core.numerics.number import Number
 
 Vector6 = Float[Array, "6"]
 

@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core.contracts import Load, Water
-from undertow.numerics.integrators import rk4
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
 
 
 def poses(count, seed):

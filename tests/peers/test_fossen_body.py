@@ -12,9 +12,9 @@ import pytest
 from textbook import rotation_from_euler
 
 from undertow.core.contracts import Load
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.vehicles import Vehicle, bluerov2_heavy, odin, rexrov
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import Vehicle, bluerov2_heavy, odin, rexrov
 
 
 class Peer(NamedTuple):

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from textbook import jacobian, rotation_from_euler
 
-from undertow.numerics.integrators import rk4
-from undertow.vehicles import bluerov2_heavy
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.vehicles import bluerov2_heavy
 
 PEER = json.loads((Path(__file__).parent / "data" / "kth_bluerov2_heavy.json").read_text())
 X = jnp.array(PEER["x"])

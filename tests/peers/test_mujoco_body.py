@@ -12,13 +12,13 @@ from mujoco_states import poses, undertow_acceleration
 from textbook import rotation_from_euler
 
 from undertow.core.errors import BadInput
-from undertow.interop.mujoco_engine import Submerged, Water, mjcf
-from undertow.interop.mujoco_engine.mjcf import as_rigid_body
-from undertow.numerics.rotations import Kinematics
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.vehicles import bluerov2, bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov
-from undertow.vehicles.body import rigid_body_mass
+from undertow.core.numerics.rotations import Kinematics
+from undertow.outside.mujoco_engine import Submerged, Water, mjcf
+from undertow.outside.mujoco_engine.mjcf import as_rigid_body
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import bluerov2, bluerov2_heavy, lauv, npsauv2, odin, remus100, rexrov
+from undertow.physics.vehicles.body import rigid_body_mass
 
 pytestmark = pytest.mark.full
 

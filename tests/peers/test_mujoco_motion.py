@@ -7,8 +7,8 @@ import pytest
 from mujoco_states import undertow_motion
 
 from undertow.core.status import Status
-from undertow.interop.mujoco_engine import Submerged
-from undertow.vehicles import bluerov2_heavy, odin, rexrov
+from undertow.outside.mujoco_engine import Submerged
+from undertow.physics.vehicles import bluerov2_heavy, odin, rexrov
 
 pytestmark = pytest.mark.full
 

@@ -7,12 +7,12 @@ import pytest
 
 import undertow as ut
 from undertow.core.errors import BadInput
+from undertow.core.numerics.integrators import rk4
 from undertow.core.status import Status
-from undertow.interop.mujoco_engine import Submerged, Water, run_in_mujoco
-from undertow.interop.mujoco_engine.mujoco_run import Propellers
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.numerics.integrators import rk4
+from undertow.outside.mujoco_engine import Submerged, Water, run_in_mujoco
+from undertow.outside.mujoco_engine.mujoco_run import Propellers
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -7,14 +7,14 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.controllers import adrc, integral_sliding_mode, nmpc, pid
+from undertow.control.controllers import adrc, integral_sliding_mode, nmpc, pid
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import linear_plant, two_link_arm
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import linear_plant, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from undertow.controllers import adaptive_backstepping, mrac, slotine_li
-from undertow.controllers.adaptive_backstepping import steps
+from undertow.control.controllers import adaptive_backstepping, mrac, slotine_li
+from undertow.control.controllers.adaptive_backstepping import steps
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.parametric_dynamics import AbstractParametricDynamics
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, linear_plant, two_link_arm
-from undertow.references import setpoint, sine
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, linear_plant, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 
 def run(plant, law, reference, duration, dt, load=None, **start):

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from textbook import rotation_from_euler
 
-from undertow.controllers import cascade
+from undertow.control.controllers import cascade
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Target
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.references import setpoint
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

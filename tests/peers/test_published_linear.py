@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.controllers import pid
-from undertow.controllers.lqi import lqi_gains
-from undertow.disturbances import none
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import setpoint
+from undertow.control.controllers import pid
+from undertow.control.controllers.lqi import lqi_gains
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
+from undertow.physics.disturbances import none
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 SHORT = 1e-5  # s: the sampled design is the continuous one
 

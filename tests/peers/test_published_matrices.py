@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.vehicles import bluerov2, bluerov2_heavy, npsauv2, rexrov
+from undertow.physics.vehicles import bluerov2, bluerov2_heavy, npsauv2, rexrov
 
 # uuvsimulator/uuv_simulator@bfb40cb, TAM.yaml, rows Y, Z, M, N negated (forward, port, up -> forward, starboard, down).
 REXROV = np.array(

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from undertow.controllers import neural
-from undertow.disturbances import none
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import sine
+from undertow.control.controllers import neural
+from undertow.control.navigation import perfect
+from undertow.control.references import sine
+from undertow.physics.disturbances import none
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

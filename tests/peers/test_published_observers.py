@@ -5,16 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import adrc, disturbance_observer, indi, l1_adaptive
+from undertow.control.controllers import adrc, disturbance_observer, indi, l1_adaptive
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.contracts import Load, Measurement, Target
-from undertow.disturbances import none, sinusoid
-from undertow.disturbances.adding import AbstractSmoothDisturbance
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, linear_plant, two_link_arm
-from undertow.references import setpoint, sine
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.plants import double_integrator, linear_plant, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from undertow.controllers import integral_sliding_mode, super_twisting
-from undertow.controllers.super_twisting import contraction
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator
-from undertow.references import setpoint
+from undertow.control.controllers import integral_sliding_mode, super_twisting
+from undertow.control.controllers.super_twisting import contraction
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -9,8 +9,8 @@ import pytest
 from hull import SEAWATER, cross_flow_coefficient, cross_flow_drag, lift_and_drag
 from textbook import coriolis_matrix, euler_rate_matrix, jacobian, rotation_from_euler, shift_matrix
 
-from undertow.vehicles import Body
-from undertow.vehicles.body import rigid_body_mass
+from undertow.physics.vehicles import Body
+from undertow.physics.vehicles.body import rigid_body_mass
 
 PEER = json.loads((Path(__file__).parent / "data" / "pvs_gnc.json").read_text())
 NU, R = np.array(PEER["nu"]), np.array(PEER["r"])

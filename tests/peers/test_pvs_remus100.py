@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from hull import cross_flow_coefficient
 
-from undertow.vehicles import remus100
+from undertow.physics.vehicles import remus100
 
 PEER = json.loads((Path(__file__).parent / "data" / "pvs_remus100.json").read_text())
 VEHICLE = remus100("fossen_python")

@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from undertow.thrusters import t200, t500
+from undertow.physics.thrusters import t200, t500
 
 ROOT, DATA = Path(__file__).parents[2], Path(__file__).parent / "data"
 LETTERS = {

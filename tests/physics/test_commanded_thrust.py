@@ -9,20 +9,20 @@ from scipy.optimize import linprog
 
 from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
-from undertow.controllers import pid, rcaf
+from undertow.control.controllers import pid, rcaf
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.disturbances import none
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.numerics.integrators import rk4
-from undertow.plants import hybrid_vehicle
-from undertow.power import battery
-from undertow.references import setpoint
-from undertow.thrusters import commanded_thrust, first_order
-from undertow.vehicles import bluerov2_heavy, odin
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.disturbances import none
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.power import battery
+from undertow.physics.thrusters import commanded_thrust, first_order
+from undertow.physics.vehicles import bluerov2_heavy, odin
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 FORWARD, REVERSE = 30.0, 12.0  # N
 ONE_TO_FOUR = commanded_thrust(FORWARD, REVERSE, time_constant=0.1)

@@ -8,18 +8,18 @@ import pytest
 
 from simdjit import Loop
 from undertow.analysis.metrics import Metrics, results
-from undertow.controllers import pid, rcaf
+from undertow.control.controllers import pid, rcaf
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core import runtime
 from undertow.core.errors import BadInput
-from undertow.disturbances import sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.numerics.integrators import rk4
-from undertow.plants import hybrid_vehicle
-from undertow.references import setpoint
-from undertow.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500
-from undertow.vehicles import bluerov2_heavy
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.disturbances import sinusoid
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import first_order, linear_voltage, paper_table3, quadratic_voltage, t200, t500
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 ZONE, SUPPLY = 1.5, 12.0  # V
 KINDS = ("pass", "subtract")

@@ -10,11 +10,11 @@ import pytest
 from textbook import kinetic_energy, potential_energy
 
 from undertow.core.contracts import Load
-from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import rotation_from_quaternion
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.vehicles import odin
+from undertow.core.numerics.integrators import rk4
+from undertow.core.numerics.rotations import rotation_from_quaternion
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import odin
 
 ODIN = hybrid_vehicle(odin(), paper_table3("shaft"))
 START = jnp.array([[0.0, 0, 0, 0.5, -0.4, 1.0], [0.4, -0.3, 0.2, 0.3, -0.2, 0.5]])

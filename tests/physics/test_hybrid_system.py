@@ -7,12 +7,12 @@ import pytest
 from textbook import coriolis_matrix, jacobian
 
 from undertow.core.contracts import Load
+from undertow.core.numerics.rotations import Kinematics
 from undertow.core.status import Status
-from undertow.numerics.rotations import Kinematics
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.thrusters.thruster import PropellerReport
-from undertow.vehicles import Vehicle, odin
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.thrusters.thruster import PropellerReport
+from undertow.physics.vehicles import Vehicle, odin
 
 RNG = np.random.default_rng(2)
 COUNT = 300

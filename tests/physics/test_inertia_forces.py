@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from textbook import coriolis_matrix, jacobian, kinetic_energy, shift_matrix
 
-from undertow.vehicles import odin
+from undertow.physics.vehicles import odin
 
 RNG = np.random.default_rng(1)
 COUNT = 300

@@ -11,17 +11,17 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose
 from undertow.core.errors import BadInput
-from undertow.disturbances.adding import Together
-from undertow.disturbances.parameter_error import parameter_error
-from undertow.disturbances.payload import payload
-from undertow.disturbances.sheared_current import sheared_current
-from undertow.disturbances.tether import tether
-from undertow.disturbances.thruster_loss import thruster_loss
-from undertow.disturbances.waves import waves
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
-from undertow.vehicles.vehicle import Vehicle
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.parameter_error import parameter_error
+from undertow.physics.disturbances.payload import payload
+from undertow.physics.disturbances.sheared_current import sheared_current
+from undertow.physics.disturbances.tether import tether
+from undertow.physics.disturbances.thruster_loss import thruster_loss
+from undertow.physics.disturbances.waves import waves
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.physics.vehicles.vehicle import Vehicle
 
 THRUSTER = paper_table3("static")
 PLANT = hybrid_vehicle(odin(), THRUSTER)

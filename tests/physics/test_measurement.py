@@ -8,13 +8,13 @@ import pytest
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
 from undertow.core.measurement import completed, measurement_of_outputs, measurement_of_pose, with_outputs
-from undertow.numerics.rotations import (
+from undertow.core.numerics.rotations import (
     quaternion_from_euler,
     quaternion_rate,
     rotation_from_quaternion,
     turning_from_euler,
 )
-from undertow.plants.hybrid_model import BodyCoordinates
+from undertow.physics.plants.hybrid_model import BodyCoordinates
 
 RNG = np.random.default_rng(16)
 

@@ -23,7 +23,7 @@ LOPSIDED |= {("npsauv2", "fossen_mss"), ("npsauv2", "antonelli_simurv")}
 
 def bodies():
     for name, part in sorted(catalogue.names("vehicles").items()):
-        module = importlib.import_module(f"undertow.vehicles.{name}")
+        module = importlib.import_module(f"undertow.physics.vehicles.{name}")
         for hull in getattr(module, "PARAMETERS", [None]):
             yield (name, hull), part(**({"parameters": hull} if hull else {})).body()
 

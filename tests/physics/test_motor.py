@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from undertow.plants import hybrid_vehicle
-from undertow.thrusters import DCMotor, paper_table3
-from undertow.vehicles import odin
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import DCMotor, paper_table3
+from undertow.physics.vehicles import odin
 
 PAPER = paper_table3("electromechanical")
 MOTOR = PAPER.motor

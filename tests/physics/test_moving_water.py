@@ -9,15 +9,15 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
-from undertow.disturbances.adding import Together
-from undertow.disturbances.current import current
-from undertow.disturbances.gauss_markov_current import gauss_markov_current
-from undertow.disturbances.sheared_current import sheared_current
-from undertow.disturbances.waves import spectrum, waves
-from undertow.numerics.integrators import rk4
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.current import current
+from undertow.physics.disturbances.gauss_markov_current import gauss_markov_current
+from undertow.physics.disturbances.sheared_current import sheared_current
+from undertow.physics.disturbances.waves import spectrum, waves
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
 
 PLANT = hybrid_vehicle(odin(), paper_table3("shaft"))
 CALM = PLANT.no_load()

@@ -5,19 +5,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
 from undertow.core.contracts import Target, forced_acceleration, input_for
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.numerics.integrators import rk4
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.thrusters.axial_flow import axial_flow
-from undertow.thrusters.first_order import first_order
-from undertow.thrusters.inflow import advance_speed, static_thrust_for, with_inflow
-from undertow.thrusters.linear_voltage import linear_voltage
-from undertow.thrusters.quadratic_voltage import quadratic_voltage
-from undertow.thrusters.t200 import t200
-from undertow.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.axial_flow import axial_flow
+from undertow.physics.thrusters.first_order import first_order
+from undertow.physics.thrusters.inflow import advance_speed, static_thrust_for, with_inflow
+from undertow.physics.thrusters.linear_voltage import linear_voltage
+from undertow.physics.thrusters.quadratic_voltage import quadratic_voltage
+from undertow.physics.thrusters.t200 import t200
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 
 LOSS = 1.6
 MOVING = measurement_of_outputs(

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from textbook import energy_of_arm
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import Load, Measurement
+from undertow.core.numerics.integrators import rk4
 from undertow.core.status import Status
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.numerics.integrators import rk4
-from undertow.plants import inverted_pendulum, linear_plant, magnetic_levitation, two_link_arm
-from undertow.plants.magnetic_levitation import RIGS
-from undertow.plants.reachability import lost_directions, open_loop_advice
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants import inverted_pendulum, linear_plant, magnetic_levitation, two_link_arm
+from undertow.physics.plants.magnetic_levitation import RIGS
+from undertow.physics.plants.reachability import lost_directions, open_loop_advice
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 UNDER = ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0))  # pushes x1 and x2 alike
 PLANTS = {

@@ -7,11 +7,11 @@ import pytest
 from textbook import jacobian
 
 from undertow.core.contracts import Load
-from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import euler_from_rotation, rotation_from_quaternion
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.thrusters import paper_table3
-from undertow.vehicles import odin
+from undertow.core.numerics.integrators import rk4
+from undertow.core.numerics.rotations import euler_from_rotation, rotation_from_quaternion
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import odin
 
 RNG = np.random.default_rng(4)
 COUNT = 200

@@ -12,21 +12,21 @@ from jaxtyping import Array, Float
 from scipy.integrate import quad
 
 import undertow as ut
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractContinuousController, Model
 from undertow.core.errors import BadInput
-from undertow.disturbances.none import none
-from undertow.loop import continuous, sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.numerics.integrators import METHODS
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.power import battery, esc
-from undertow.power.esc import ESC
-from undertow.power.ledger import closure
-from undertow.references.setpoint import setpoint
-from undertow.thrusters import first_order, linear_voltage, paper_table3, t200
-from undertow.thrusters.fidelity import FIDELITIES
-from undertow.vehicles import odin
+from undertow.core.numerics.integrators import METHODS
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.power import battery, esc
+from undertow.physics.power.esc import ESC
+from undertow.physics.power.ledger import closure
+from undertow.physics.thrusters import first_order, linear_voltage, paper_table3, t200
+from undertow.physics.thrusters.fidelity import FIDELITIES
+from undertow.physics.vehicles import odin
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 THRUSTERS = {"t200": t200, "table3": paper_table3}
 # Stiff enough for both: Table 3 takes 10 A a thruster at 12 V, eight of them.

@@ -9,8 +9,8 @@ import pytest
 
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
-from undertow.disturbances import random_suite, sinusoid, table, thruster_loss, wrench
-from undertow.disturbances.adding import Together
+from undertow.physics.disturbances import random_suite, sinusoid, table, thruster_loss, wrench
+from undertow.physics.disturbances.adding import Together
 
 TIMES = np.array([-1.0, 0.0, 0.7, 1.5, 2.0, 3.9, 4.0, 5.3, 100.0])
 CALM = Load(jnp.zeros(2), jnp.zeros(2))

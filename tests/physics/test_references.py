@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from messages import named
 
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
+from undertow.control.references.setpoint import Transition
 from undertow.core.errors import BadInput
-from undertow.disturbances.none import none
-from undertow.loop import continuous, sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.references import circle, helix, lawn_mower, line, lissajous, recorded, setpoint, sine, waypoints
-from undertow.references.setpoint import Transition
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.double_integrator import double_integrator
 from undertow.scenario import factory
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 RNG = np.random.default_rng(4)
 SQUARE = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [0, 4, 1], [0, 0, 0.5]], dtype=float)

@@ -5,9 +5,9 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.bench.plain_numpy import suite_u1
-from undertow.disturbances import u1, u2
-from undertow.plants.double_integrator import double_integrator
+from undertow.physics.disturbances import u1, u2
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.studies.speed.plain_numpy import suite_u1
 
 PLANT = double_integrator(6)
 

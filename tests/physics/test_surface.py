@@ -9,16 +9,16 @@ from textbook import kinetic_energy
 
 from undertow.core.contracts import FreeSurface, Pose, Water
 from undertow.core.errors import BadInput
-from undertow.disturbances.adding import Together
-from undertow.disturbances.surface import UnderSurface, stated_depths, surface
-from undertow.disturbances.waves import waves
-from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import rotation_from_quaternion
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.thrusters.t200 import t200
-from undertow.vehicles.bluerov2_heavy import bluerov2_heavy
-from undertow.vehicles.body import SeenFromWater
-from undertow.vehicles.submersion import FRESH_WATER, dry_share
+from undertow.core.numerics.integrators import rk4
+from undertow.core.numerics.rotations import rotation_from_quaternion
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.surface import UnderSurface, stated_depths, surface
+from undertow.physics.disturbances.waves import waves
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.t200 import t200
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.physics.vehicles.body import SeenFromWater
+from undertow.physics.vehicles.submersion import FRESH_WATER, dry_share
 
 HEAVY = bluerov2_heavy("wu2018")  # 114.8 N of buoyancy, 112.8 N of weight
 SIZE = np.array([0.457, 0.575, 0.254])

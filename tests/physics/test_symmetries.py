@@ -6,17 +6,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import rcaf
+from undertow.control.controllers import rcaf
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Load
-from undertow.disturbances import u1
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.sampled import simulate
-from undertow.navigation import perfect
-from undertow.numerics.integrators import rk4
-from undertow.plants import hybrid_vehicle
-from undertow.references import setpoint
-from undertow.thrusters import paper_table3
-from undertow.vehicles import odin
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.disturbances import u1
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import paper_table3
+from undertow.physics.vehicles import odin
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.sampled import simulate
 
 pytestmark = pytest.mark.full
 

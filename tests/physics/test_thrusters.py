@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.numerics.integrators import METHODS
-from undertow.thrusters import (
+from undertow.core.numerics.integrators import METHODS
+from undertow.physics.thrusters import (
     DCMotor,
     axial_flow,
     commanded_thrust,
@@ -22,7 +22,7 @@ from undertow.thrusters import (
     t200,
     t500,
 )
-from undertow.thrusters.fidelity import FIDELITIES, with_fidelity
+from undertow.physics.thrusters.fidelity import FIDELITIES, with_fidelity
 
 # A motor with everything: friction, and a propeller that is another one in reverse.
 UNEVEN = DCMotor(

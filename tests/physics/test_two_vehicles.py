@@ -8,16 +8,16 @@ import pytest
 
 from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
+from undertow.core.numerics.integrators import rk4
+from undertow.core.numerics.rotations import Kinematics, rotation_from_quaternion
 from undertow.core.status import Status
-from undertow.numerics.integrators import rk4
-from undertow.numerics.rotations import Kinematics, rotation_from_quaternion
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.plants.link import Link, Place
-from undertow.plants.two_vehicles import two_vehicles
-from undertow.thrusters.first_order import first_order
-from undertow.thrusters.linear_voltage import linear_voltage
-from undertow.vehicles.bluerov2 import bluerov2
-from undertow.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.plants.link import Link, Place
+from undertow.physics.plants.two_vehicles import two_vehicles
+from undertow.physics.thrusters.first_order import first_order
+from undertow.physics.thrusters.linear_voltage import linear_voltage
+from undertow.physics.vehicles.bluerov2 import bluerov2
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 
 APART = jnp.asarray([0.3, -0.4, 1.0, 0.2, -0.3, 0.8, -5.0, 1.5, 0.4, -0.4, 0.2, -1.0])
 MOVING = jnp.asarray([0.5, 0.1, -0.2, 0.3, -0.1, 0.2, -0.3, 0.4, 0.1, -0.2, 0.4, 0.1])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.references import setpoint
 from undertow.core.runtime import double_outside_runs
-from undertow.disturbances import current
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.references import setpoint
+from undertow.physics.disturbances import current
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.unactuated_attitude import largest_lean
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 STILL, WATER = setpoint([0.0] * 6), current([-0.4, 0.0, 0.0])
 LEVEL, AHEAD = np.zeros((1, 3)), np.array([[0.4, 0.0, 0.0]])

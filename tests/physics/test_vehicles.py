@@ -11,12 +11,12 @@ import pytest
 from recorded import is_as_recorded
 from textbook import coriolis_matrix, rotation_from_euler
 
-from undertow import vehicles
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.core.param import parameters
-from undertow.vehicles.thruster_labels import number_of
-from undertow.vehicles.vehicle import Vehicle
+from undertow.physics import vehicles
+from undertow.physics.vehicles.thruster_labels import number_of
+from undertow.physics.vehicles.vehicle import Vehicle
 
 # Mass (kg), smallest and largest eigenvalue of M, (B - W) / W (%), righting moment (N m/rad), smallest eigenvalue of
 # the symmetric part of D at unit speed; to the digits given. From the printed numbers, by other code than undertow's.
@@ -60,7 +60,7 @@ RNG = np.random.default_rng(3)
 def variants(table):
     """(vehicle, variant) for everything that the vehicle's file offers under this name."""
     for name in NAMES:
-        module = importlib.import_module(f"undertow.vehicles.{name}")
+        module = importlib.import_module(f"undertow.physics.vehicles.{name}")
         yield from ((name, variant) for variant in getattr(module, table, [None]))
 
 

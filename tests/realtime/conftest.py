@@ -2,7 +2,7 @@
 
 import pytest
 
-from undertow.realtime import control_loop
+from undertow.outside.realtime import control_loop
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
-from undertow.realtime.link import AbstractLink, LinkMeasurement
-from undertow.realtime.loop_clock import SimulatedClock
+from undertow.outside.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
+from undertow.outside.realtime.link import AbstractLink, LinkMeasurement
+from undertow.outside.realtime.loop_clock import SimulatedClock
 
 PERIOD = 0.01
 SAFE = np.array([0.25, -0.5])

@@ -5,14 +5,14 @@ import re
 import numpy as np
 import pytest
 
-from undertow.autopilot.measured_motion import Format
 from undertow.core.errors import BadInput
-from undertow.realtime.control_loop import LOOK, RealTimeLoop
-from undertow.realtime.control_session import SAFE_PERIOD, ControlSession
-from undertow.realtime.link import AbstractPacingLink, LinkMeasurement
-from undertow.realtime.loop_clock import SimulatedClock
-from undertow.realtime.loop_settings import LoopSettings, Reason
-from undertow.realtime.measurement_rate import MOST
+from undertow.outside.autopilot.measured_motion import Format
+from undertow.outside.realtime.control_loop import LOOK, RealTimeLoop
+from undertow.outside.realtime.control_session import SAFE_PERIOD, ControlSession
+from undertow.outside.realtime.link import AbstractPacingLink, LinkMeasurement
+from undertow.outside.realtime.loop_clock import SimulatedClock
+from undertow.outside.realtime.loop_settings import LoopSettings, Reason
+from undertow.outside.realtime.measurement_rate import MOST
 
 PERIOD, MAX_AGE, MILLISECOND = 0.01, 0.5, 1_000_000
 FORM, SAFE, APPLIED = Format("quaternion", "body"), np.array([0.25, -0.5]), np.array([3.0, 4.0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender, address_of, size_of
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender, address_of, size_of
 
 N = 8
 UPRIGHT = np.concatenate([[1.0, -2.0, 3.0], [1, 0, 0, 0], np.linspace(-0.3, 0.3, 6), np.linspace(-5, 5, N)])

@@ -6,9 +6,9 @@ import pytest
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.logs.read import read_log
-from undertow.realtime.control_loop import RealTimeLoop, Reason
-from undertow.realtime.log_link import LogLink
-from undertow.realtime.loop_clock import SimulatedClock
+from undertow.outside.realtime.control_loop import RealTimeLoop, Reason
+from undertow.outside.realtime.log_link import LogLink
+from undertow.outside.realtime.loop_clock import SimulatedClock
 
 pytestmark = pytest.mark.full
 

@@ -12,10 +12,10 @@ import pytest
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
-from undertow.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
-from undertow.realtime.loop_clock import SimulatedClock
-from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
+from undertow.outside.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
+from undertow.outside.realtime.loop_clock import SimulatedClock
+from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 

@@ -10,13 +10,13 @@ import pytest
 import undertow as ut
 from undertow.core.contracts import AbstractFaults
 from undertow.core.measurement import with_outputs
-from undertow.numerics.random_keys import numbered
-from undertow.realtime.control_loop import RealTimeLoop, Reason
-from undertow.realtime.loop_clock import SimulatedClock
-from undertow.realtime.vehicle_link import VehicleLink
+from undertow.core.numerics.random_keys import numbered
+from undertow.outside.realtime.control_loop import RealTimeLoop, Reason
+from undertow.outside.realtime.loop_clock import SimulatedClock
+from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 

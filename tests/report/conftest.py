@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from undertow.report.figures import fidelity_figure, run_figures
+from undertow.paper.figures.fidelity import fidelity_figure
+from undertow.paper.pages.report import write_report
+from undertow.report.figures import run_figures
 from undertow.report.replay.replay_data import Replay, Thrusters
-from undertow.report.reproduction.report import write_report
 
 
 def run_of(controller="rcafc", axes=6, inputs=8, status="completed", ended=20.0, samples=201):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from undertow.report.figures import run_figures, svg
-from undertow.simulation.run_facts import facts_from
+from undertow.scenario.results.run_facts import facts_from
 
 pytestmark = pytest.mark.full
 

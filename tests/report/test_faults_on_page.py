@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from undertow.control.supervision.conditions import State
+from undertow.control.supervision.transition_log import Transition
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.run import run_plots
 from undertow.report.run_tables import fault_rows, navigation_rows, transition_rows
-from undertow.simulation.run_facts import facts_from
-from undertow.simulation.run_result import lost_thrusters
-from undertow.supervision.conditions import State
-from undertow.supervision.transition_log import Transition
+from undertow.scenario.results.run_facts import facts_from
+from undertow.scenario.results.run_result import lost_thrusters
 
 
 def test_rows_of_faults():

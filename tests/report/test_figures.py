@@ -9,11 +9,13 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from PIL import Image
 
-from undertow.report.figures import fidelity_figure, paper_figures, png, run_figures, save, svg, sweep_figure
+from undertow.paper.figures.fidelity import fidelity_figure
+from undertow.paper.figures.paper import effort, paper_figures, uncertainty
+from undertow.paper.figures.sweep import sweep_figure
+from undertow.paper.thruster_response import thruster_response
+from undertow.report.figures import png, run_figures, save, svg
 from undertow.report.figures.limits import fit_linear
-from undertow.report.figures.paper import effort, uncertainty
 from undertow.report.figures.prediction import prediction_plots
-from undertow.reproduction.thruster_response import thruster_response
 
 pytestmark = pytest.mark.full
 

@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from undertow.report.figures.horizons import horizons_figure
-from undertow.report.figures.lags import drifting_figure, lags_figure
-from undertow.report.reproduction.report import write_report
+from undertow.paper.figures.horizons import horizons_figure
+from undertow.paper.figures.lags import drifting_figure, lags_figure
+from undertow.paper.pages.report import write_report
 
 WINDOWS = [[10.0, 20.0], [100.0, 200.0]]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from undertow.paper.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures import run_figures, save, style
-from undertow.report.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures.one_column import WIDTH, one_column
 from undertow.report.figures.writing import pdf
 

@@ -3,10 +3,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from undertow.report.figures import sweep_figure
+from undertow.paper.figures.sweep import sweep_figure
+from undertow.paper.pages.report import write_report
 from undertow.report.formats import chip, number, percent, prose
 from undertow.report.page import Html, document, join, table, tag, text
-from undertow.report.reproduction.report import write_report
 
 pytestmark = pytest.mark.full
 

@@ -9,8 +9,8 @@ import pytest
 from undertow.logs.result_file import UnreadableResult
 from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
 from undertow.report.run_figures import plotted
-from undertow.simulation.run_facts import facts_from
-from undertow.simulation.run_result import RunRecord
+from undertow.scenario.results.run_facts import facts_from
+from undertow.scenario.results.run_result import RunRecord
 
 pytestmark = pytest.mark.full
 

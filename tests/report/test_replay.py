@@ -11,9 +11,9 @@ from test_page import parsed
 
 import undertow as ut
 from undertow.analysis.metrics import meanings
-from undertow.disturbances.adding import Together
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
+from undertow.control.navigation.perfect import perfect
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.thrusters.first_order import first_order
 from undertow.report import run_page
 from undertow.report.plotting import Plotted
 from undertow.report.replay import replay_section, trials_again
@@ -25,10 +25,10 @@ from undertow.report.run_figures import LARGE
 from undertow.report.run_page import Shown, write_run_page
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_facts import facts_from
-from undertow.simulation.run_result import RunRecord, RunResult
-from undertow.simulation.run_scenario import run_scenario
-from undertow.thrusters.first_order import first_order
+from undertow.scenario.results.run_facts import facts_from
+from undertow.scenario.results.run_result import RunRecord, RunResult
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

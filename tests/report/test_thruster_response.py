@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from undertow.reproduction.thruster_response import thruster_response
-from undertow.thrusters.paper_table3 import paper_table3
+from undertow.paper.thruster_response import thruster_response
+from undertow.physics.thrusters.paper_table3 import paper_table3
 
 MOTOR = paper_table3().motor
 

@@ -9,7 +9,7 @@ from typing import get_type_hints
 
 from cyclonedds.idl import IdlStruct
 
-from undertow.interop.ros2 import messages as ros
+from undertow.outside.ros2 import messages as ros
 
 SOURCE = Path(__file__).parent / "fast_dds_peer.cpp"
 WORDS = {"float64": "double", "int32": "long", "uint32": "unsigned long"}

@@ -5,15 +5,15 @@ import time
 
 import numpy as np
 
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.controller_link import ControllerLink, ControllerSettings
-from undertow.interop.ros2.from_messages import SECOND, Frames, PoseAndVelocity
-from undertow.interop.ros2.link import Link
-from undertow.interop.ros2.node import Reporter
-from undertow.interop.ros2.to_messages import odometry_of, stamp_of
-from undertow.realtime.control_loop import RealTimeLoop
-from undertow.realtime.loop_clock import MonotonicClock
-from undertow.realtime.loop_settings import LoopSettings
+from undertow.outside.realtime.control_loop import RealTimeLoop
+from undertow.outside.realtime.loop_clock import MonotonicClock
+from undertow.outside.realtime.loop_settings import LoopSettings
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.controller_link import ControllerLink, ControllerSettings
+from undertow.outside.ros2.from_messages import SECOND, Frames, PoseAndVelocity
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.node import Reporter
+from undertow.outside.ros2.to_messages import odometry_of, stamp_of
 
 STILL = PoseAndVelocity(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(6))
 

@@ -13,15 +13,15 @@ from rosbags.typesys import Stores, get_typestore
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2 import read_rosbag2, to_messages
-from undertow.interop.ros2.from_messages import Frames
-from undertow.interop.ros2.link import Link
-from undertow.interop.ros2.write_bag import STORAGES, BagWriter, write_rosbag2
+from undertow.core.numerics.rotations import quaternion_from_euler
 from undertow.logs.background_writer import BackgroundWriter
 from undertow.logs.mapping import mapping_of
 from undertow.logs.read import read_log
-from undertow.numerics.rotations import quaternion_from_euler
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2 import read_rosbag2, to_messages
+from undertow.outside.ros2.from_messages import Frames
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.write_bag import STORAGES, BagWriter, write_rosbag2
 
 pytestmark = pytest.mark.interop
 
@@ -241,8 +241,8 @@ def test_a_disk_that_blocks_holds_up_no_message(domain):
 
 RECORDED = """
 import sys, time
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.write_bag import BagWriter
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.write_bag import BagWriter
 from undertow.logs.background_writer import BackgroundWriter
 
 bag = BackgroundWriter(BagWriter(__import__("pathlib").Path(sys.argv[1]), sys.argv[2]).open)

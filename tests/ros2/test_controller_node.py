@@ -12,14 +12,14 @@ from random_messages import random_message
 
 import undertow as ut
 from undertow.core.errors import BadInput
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.compiled_controller import CompiledController
-from undertow.interop.ros2.controller_link import ControllerSettings
-from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
-from undertow.interop.ros2.link import DIFFERENT_NETWORKS, Link, why_nothing
-from undertow.interop.ros2.node import Reporter, Topics
-from undertow.interop.ros2.to_messages import odometry_of, target_message
 from undertow.logs.frames import quaternions
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.compiled_controller import CompiledController
+from undertow.outside.ros2.controller_link import ControllerSettings
+from undertow.outside.ros2.from_messages import Frames, PoseAndVelocity
+from undertow.outside.ros2.link import DIFFERENT_NETWORKS, Link, why_nothing
+from undertow.outside.ros2.node import Reporter, Topics
+from undertow.outside.ros2.to_messages import odometry_of, target_message
 from undertow.scenario.link_scenario import read_for_link
 
 pytestmark = pytest.mark.interop
@@ -334,7 +334,7 @@ def test_faster_odometry_is_taken_once_per_step(setup):
 
 def test_missing_odometry_is_explained(setup, monkeypatch):
     """Once, and again where the reason changes."""
-    monkeypatch.setattr("undertow.interop.ros2.controller_link._ABSENT", 0.05)
+    monkeypatch.setattr("undertow.outside.ros2.controller_link._ABSENT", 0.05)
     node, peer, said = setup()
     nothing(node, peer)
     assert said.warnings == ["Warning: /odom has a publisher that sends nothing"]

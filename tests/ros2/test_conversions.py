@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.interop.ros2 import from_messages, to_messages
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.frames import between_attitudes
-from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity
 from undertow.logs.frames import quaternions
+from undertow.outside.ros2 import from_messages, to_messages
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.frames import between_attitudes
+from undertow.outside.ros2.from_messages import Frames, PoseAndVelocity
 
 pytestmark = pytest.mark.interop
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from peer import ControllerNode, Peer, Running, Said, until
 
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.compiled_controller import CompiledController
-from undertow.interop.ros2.controller_link import ControllerSettings
-from undertow.interop.ros2.link import Link
-from undertow.interop.ros2.node import Reporter
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.compiled_controller import CompiledController
+from undertow.outside.ros2.controller_link import ControllerSettings
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.node import Reporter
 
 pytestmark = pytest.mark.dds
 

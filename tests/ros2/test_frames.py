@@ -5,9 +5,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from undertow.interop.ros2 import frames
+from undertow.core.numerics.rotations import (
+    Kinematics,
+    euler_from_rotation,
+    quaternion_from_euler,
+    rotation_from_quaternion,
+)
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
-from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
+from undertow.outside.ros2 import frames
 
 pytestmark = pytest.mark.interop
 

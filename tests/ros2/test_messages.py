@@ -7,7 +7,7 @@ import pytest
 from random_messages import random_message
 
 from undertow.core.errors import BadInput
-from undertow.interop.ros2 import messages as ros
+from undertow.outside.ros2 import messages as ros
 
 pytestmark = pytest.mark.interop
 

@@ -9,18 +9,18 @@ import pytest
 from peer import ControllerNode
 
 import undertow as ut
-from undertow.autopilot.vehicle import Vehicle
 from undertow.core.status import Status
-from undertow.interop.ros2 import from_messages, read_rosbag2, to_messages
-from undertow.interop.ros2.compiled_controller import CompiledController
-from undertow.interop.ros2.controller_link import ControllerSettings
-from undertow.interop.ros2.from_messages import Frames, PoseAndVelocity, motion_of
-from undertow.interop.ros2.link import Link
-from undertow.interop.ros2.node import Reporter
-from undertow.interop.ros2.to_messages import odometry_of, stamp_of
-from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
-from undertow.interop.ros2.write_bag import BagWriter
 from undertow.logs.background_writer import BackgroundWriter
+from undertow.outside.autopilot.vehicle import Vehicle
+from undertow.outside.ros2 import from_messages, read_rosbag2, to_messages
+from undertow.outside.ros2.compiled_controller import CompiledController
+from undertow.outside.ros2.controller_link import ControllerSettings
+from undertow.outside.ros2.from_messages import Frames, PoseAndVelocity, motion_of
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.node import Reporter
+from undertow.outside.ros2.to_messages import odometry_of, stamp_of
+from undertow.outside.ros2.vehicle_node import VehicleNode, VehicleSettings
+from undertow.outside.ros2.write_bag import BagWriter
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 

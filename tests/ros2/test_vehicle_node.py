@@ -7,16 +7,16 @@ import pytest
 from peer import Running, Said, until
 
 import undertow as ut
-from undertow.autopilot.vehicle import Vehicle
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.interop.ros2 import messages as ros
-from undertow.interop.ros2.checked_scenario import check_vehicle
-from undertow.interop.ros2.from_messages import Frames, motion_of, nanoseconds_of
-from undertow.interop.ros2.link import Link
-from undertow.interop.ros2.node import Reporter
-from undertow.interop.ros2.to_messages import thrusters_of
-from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
+from undertow.outside.autopilot.vehicle import Vehicle
+from undertow.outside.ros2 import messages as ros
+from undertow.outside.ros2.checked_scenario import check_vehicle
+from undertow.outside.ros2.from_messages import Frames, motion_of, nanoseconds_of
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.node import Reporter
+from undertow.outside.ros2.to_messages import thrusters_of
+from undertow.outside.ros2.vehicle_node import VehicleNode, VehicleSettings
 from undertow.scenario.build import build
 
 pytestmark = pytest.mark.interop

@@ -5,14 +5,14 @@ import random
 
 import pytest
 
-from undertow.cli.soak import attacked
+from soak import mutation, specimens
+from soak.command import attacked
+from soak.input_soak import try_inputs
+from soak.inputs import BUILD, KINDS, Attack, attack, planned
+from soak.trying import try_in_process
+from soak.verdict import Done, judged
 from undertow.scenario.build import build
 from undertow.scenario.reading import parse
-from undertow.soak import mutation, specimens
-from undertow.soak.input_soak import try_inputs
-from undertow.soak.inputs import BUILD, KINDS, Attack, attack, planned
-from undertow.soak.trying import try_in_process
-from undertow.soak.verdict import Done, judged
 
 pytestmark = pytest.mark.soak
 
@@ -112,7 +112,7 @@ def test_what_may_happen_is_no_failure(done):
 
 
 def test_hostile_inputs_of_every_kind_are_refused_or_accepted(tmp_path):
-    """A few of each kind in this process; `undertow soak` tries thousands."""
+    """A few of each kind in this process; `python -m soak` tries thousands."""
     for kind in KINDS:
         for number in range(4):
             given = attack(kind, 1, number, VALID)

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.autopilot.measured_motion import Motion
-from undertow.cli.kept_commands import kept
-from undertow.soak.links.command_process import CommandProcess
-from undertow.soak.links.link_run import LinkRunner
-from undertow.soak.links.peer import AbstractPeer, Measured, altered
-from undertow.soak.links.plan import ENDINGS, LINKS, STREAMS, WILD, Event, Plan, plan, signals_of
-from undertow.soak.links.scenario import PERIOD
-from undertow.soak.links_soak import attack_links
+from soak.kept_commands import kept
+from soak.links.command_process import CommandProcess
+from soak.links.link_run import LinkRunner
+from soak.links.peer import AbstractPeer, Measured, altered
+from soak.links.plan import ENDINGS, LINKS, STREAMS, WILD, Event, Plan, plan, signals_of
+from soak.links.scenario import PERIOD
+from soak.links_soak import attack_links
+from undertow.outside.autopilot.measured_motion import Motion
 
 pytestmark = pytest.mark.soak
 
@@ -238,7 +238,7 @@ def test_a_standstill_is_a_stop_and_a_continuation():
 
 
 def test_a_link_whose_package_is_missing_is_left_out(tmp_path, monkeypatch):
-    from undertow.soak import links_soak
+    from soak import links_soak
 
     monkeypatch.setitem(links_soak._PACKAGES, "ros2", ("no_such_package",))
     found = attack_links(pretended, 1, 1, tmp_path, links=("ros2",))

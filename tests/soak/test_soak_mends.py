@@ -2,12 +2,12 @@
 
 import pytest
 
-from undertow.cli.soak import attacked
+from soak import plug_ins, specimens
+from soak.command import attacked
+from soak.inputs import BUILD, Attack
+from soak.trying import try_in_process
+from soak.verdict import judged
 from undertow.core.errors import BadInput, printable
-from undertow.soak import plug_ins, specimens
-from undertow.soak.inputs import BUILD, Attack
-from undertow.soak.trying import try_in_process
-from undertow.soak.verdict import judged
 
 pytestmark = pytest.mark.soak
 

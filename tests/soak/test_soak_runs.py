@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from soak import controls, faults_soak, hours_soak
+from soak.controls import CONTROLS, run_controls
+from soak.judged_runs import Judged, judge, judged_runs
+from soak.watching import Counts
 from undertow.core.status import Status
-from undertow.soak import controls, faults_soak, hours_soak
-from undertow.soak.controls import CONTROLS, run_controls
-from undertow.soak.judged_runs import Judged, judge, judged_runs
-from undertow.soak.watching import Counts
 
 pytestmark = pytest.mark.soak
 

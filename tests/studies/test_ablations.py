@@ -9,22 +9,22 @@ import pytest
 from scipy.stats import binom
 
 from undertow.analysis.small_signal import gains
-from undertow.campaign.build_trials import build_trial
-from undertow.campaign.campaign_schema import read_campaign
-from undertow.campaign.campaign_summary import median_interval
-from undertow.campaign.trials import trials
-from undertow.controllers.presets.paper import paper
-from undertow.controllers.presets.robust import robust
+from undertow.control.controllers.presets.paper import paper
+from undertow.control.controllers.presets.robust import robust
 from undertow.core.errors import BadInput
-from undertow.disturbances import random_suite
-from undertow.plants import double_integrator
-from undertow.reproduction.ablations import study
-from undertow.reproduction.ablations.study import Variant, spread
-from undertow.reproduction.ablations.verdicts import ABLATIONS
-from undertow.reproduction.robust_variant import conclusions, fidelity
-from undertow.reproduction.setup import equal_gain_ratio
+from undertow.paper.ablations import study
+from undertow.paper.ablations.study import Variant, spread
+from undertow.paper.ablations.verdicts import ABLATIONS
+from undertow.paper.robust_variant import conclusions, fidelity
+from undertow.paper.setup import equal_gain_ratio
+from undertow.physics.disturbances import random_suite
+from undertow.physics.plants import double_integrator
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import dump
+from undertow.studies.campaign.build_trials import build_trial
+from undertow.studies.campaign.campaign_schema import read_campaign
+from undertow.studies.campaign.campaign_summary import median_interval
+from undertow.studies.campaign.trials import trials
 
 pytestmark = pytest.mark.full
 

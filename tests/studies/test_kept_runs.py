@@ -3,11 +3,11 @@
 import pytest
 import xarray as xr
 
-from undertow.reproduction.running import begin_all
+from undertow.paper.running import begin_all
 from undertow.scenario.reading import read
+from undertow.scenario.results.repetition import compare
+from undertow.scenario.results.run_scenario import run_scenario
 from undertow.simulation.processes import Tasks, worker_processes
-from undertow.simulation.repetition import compare
-from undertow.simulation.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full
 

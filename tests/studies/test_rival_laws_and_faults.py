@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from undertow.analysis.small_signal import gains
-from undertow.controllers import adrc, indi
-from undertow.controllers.presets.paper import paper
-from undertow.controllers.presets.robust import robust
+from undertow.control.controllers import adrc, indi
+from undertow.control.controllers.presets.paper import paper
+from undertow.control.controllers.presets.robust import robust
+from undertow.control.navigation import degraded
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
-from undertow.disturbances import thruster_loss
-from undertow.loop import sampled
-from undertow.navigation import degraded
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.references import setpoint
+from undertow.physics.disturbances import thruster_loss
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.scenario.build import build
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled
 
 LOAD = {"kind": "random_suite", "amplitude": 0.5, "step": 0.3}
 

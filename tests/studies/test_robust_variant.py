@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.report.figures.ablations import ablations_figure
-from undertow.report.figures.fidelity import robust_fidelity_figure
+from undertow.paper.ablations import verdicts
+from undertow.paper.figures.ablations import ablations_figure
+from undertow.paper.figures.fidelity import robust_fidelity_figure
+from undertow.paper.pages.ablations_page import ablations_page
+from undertow.paper.pages.report import write_report
+from undertow.paper.robust_variant import fidelity
+from undertow.paper.robust_variant.conclusions import conclusions
 from undertow.report.page import Html
-from undertow.report.reproduction.ablations_page import ablations_page
-from undertow.report.reproduction.report import write_report
-from undertow.reproduction.ablations import verdicts
-from undertow.reproduction.robust_variant import fidelity
-from undertow.reproduction.robust_variant.conclusions import conclusions
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import validate
 
@@ -173,7 +173,7 @@ def test_every_ablation_names_its_file_and_the_command_that_runs_it(tmp_path):
     found = [ablation(one.id, {"a": 1.0}) | {"campaigns": list(one.campaigns)} for one in ABLATIONS_OF_THE_PAPER]
     chapter = {"seeds": 8, "left_out": [], "ablations": found}
     words = re.sub(r"<[^>]+>", "", ablations_page(chapter, Html(""), "report.html"))
-    named = re.findall(r"undertow/reproduction/ablations/(\w+\.yaml)", words)
+    named = re.findall(r"undertow/paper/ablations/(\w+\.yaml)", words)
     assert len(named) >= 21 and all((FOLDER / file).is_file() for file in named)
     assert {path.name for path in FOLDER.glob("a*_*.yaml")} == set(named)
     assert re.findall(r"undertow campaign campaigns/(\S+)", words) == named

@@ -11,12 +11,12 @@ import pytest
 from batch_compiler.emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, Loop, nvidia
-from undertow.bench import measure, plain_numpy, workload
 from undertow.cli.main import run
-from undertow.loop import sampled
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop import sampled
+from undertow.studies.speed import measure, plain_numpy, workload
 
 pytestmark = pytest.mark.full
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from undertow.bench.waiting import CASES, waiting_times
 from undertow.cli.main import run
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
+from undertow.studies.speed.waiting import CASES, waiting_times
 
 pytestmark = pytest.mark.full
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from undertow.bench.waiting import CASES
-from undertow.bench.workload import W1, W2
 from undertow.scenario.reading import from_data
 from undertow.scenario.schema import validate
+from undertow.studies.speed.waiting import CASES
+from undertow.studies.speed.workload import W1, W2
 
 LAWS = {"W1": (W1, "paper"), "W2": (W2, "robust")}
 LAWS |= {name: (case.scenario, "robust" if name == "heavy" else "paper") for name, case in CASES.items()}

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from undertow.bench import workload
 from undertow.core.errors import BadInput
+from undertow.studies.speed import workload
 
 pytestmark = pytest.mark.full
 

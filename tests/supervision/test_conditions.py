@@ -13,16 +13,25 @@ import pytest
 from recorded import is_as_recorded
 
 import undertow as ut
+from undertow.control.supervision.conditions import (
+    CONDITIONS,
+    HEAD,
+    NAMES,
+    Request,
+    State,
+    code_of,
+    reason_of,
+    state_of,
+)
+from undertow.control.supervision.supervisor import supervisor
+from undertow.control.supervision.transition_log import transitions
 from undertow.core.contracts import AbstractController, Model, Target
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.measurement import with_outputs
+from undertow.core.numerics.integrators import METHODS
 from undertow.core.signals import Signal
-from undertow.loop.sampled import moved
-from undertow.numerics.integrators import METHODS
-from undertow.plants.double_integrator import DoubleIntegrator
-from undertow.supervision.conditions import CONDITIONS, HEAD, NAMES, Request, State, code_of, reason_of, state_of
-from undertow.supervision.supervisor import supervisor
-from undertow.supervision.transition_log import transitions
+from undertow.physics.plants.double_integrator import DoubleIntegrator
+from undertow.simulation.loop.sampled import moved
 
 T = 0.02
 BLOCK = 50  # steps of a call, at most: a call takes longer than a step

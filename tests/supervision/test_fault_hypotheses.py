@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
-from undertow.supervision.fault_onset import ONSETS, Wide, cleared, examine, onset_state, transients, weighed
+from undertow.control.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
+from undertow.control.supervision.fault_onset import ONSETS, Wide, cleared, examine, onset_state, transients, weighed
 
 CHANCE = np.random.default_rng(5)
 EFFECT = CHANCE.normal(size=(6, 5))

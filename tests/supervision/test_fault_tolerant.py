@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.supervision.fault_tolerant_law import fault_tolerant
 from undertow.core.contracts import Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.disturbances.adding import Together
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.loop_runs import RunPlan
+from undertow.physics.disturbances.adding import Together
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
 from undertow.simulation.run_many import run_together
-from undertow.supervision.fault_tolerant_law import fault_tolerant
 
 DT, ONSET, DURATION = 0.02, 15.0, 18.0
 PLANT = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), ut.thrusters.t200(fidelity="static"))

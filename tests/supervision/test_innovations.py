@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.control.supervision.innovations import InnovationMonitor, JumpLimits
+from undertow.control.supervision.motion import Motion
 from undertow.core.errors import BadInput
-from undertow.supervision.innovations import InnovationMonitor, JumpLimits
-from undertow.supervision.motion import Motion
 
 DT, LIMITS = 0.02, JumpLimits(1.0, 0.5, 1.0, 1.0)
 LEVEL, REST = np.array([1.0, 0, 0, 0]), np.zeros(6)

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.supervision.limit_swings import AVERAGED, no_swings, swung
+from undertow.control.supervision.limit_swings import AVERAGED, no_swings, swung
 
 LOW, HIGH, STEP = np.array([-16.0, -16.0, 0.0, -np.inf]), np.array([16.0, 8.0, 10.0, np.inf]), 0.02
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from recorded import is_as_recorded
 
+from undertow.control.supervision.innovations import InnovationMonitor
+from undertow.control.supervision.measurement_gate import MeasurementGate
+from undertow.control.supervision.stuck_readings import StuckReadings
 from undertow.core.measurement import measurement_of_outputs
-from undertow.supervision.innovations import InnovationMonitor
-from undertow.supervision.measurement_gate import MeasurementGate
-from undertow.supervision.stuck_readings import StuckReadings
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.thrusters.thruster import PropellerReport
 
 DT = 0.02
 RATES = np.array([0.4, -0.2, 0.1, 0.0, 0.0, 0.3])

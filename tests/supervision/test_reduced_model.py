@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.supervision.reduced_model import attained_share, default_priority, least_forces, reduced
 from undertow.core.measurement import measurement_of_outputs
-from undertow.plants.double_integrator import double_integrator
-from undertow.supervision.reduced_model import attained_share, default_priority, least_forces, reduced
+from undertow.physics.plants.double_integrator import double_integrator
 
 VEHICLES = {"odin": ut.vehicles.odin, "heavy": ut.vehicles.bluerov2_heavy, "bluerov2": ut.vehicles.bluerov2}
 

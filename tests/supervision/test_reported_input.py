@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.control.supervision.reported_input import ReportedInput
 from undertow.core.errors import BadInput
-from undertow.plants.double_integrator import DoubleIntegrator
-from undertow.supervision.reported_input import ReportedInput
+from undertow.physics.plants.double_integrator import DoubleIntegrator
 
 T, LIMIT = 0.02, 20.0
 

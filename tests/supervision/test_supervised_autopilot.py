@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.supervision.supervised_controller import state_in
 from undertow.scenario.reading import dump
-from undertow.supervision.supervised_controller import state_in
 
 pytestmark = pytest.mark.full
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import undertow as ut
+from undertow.control.supervision.conditions import Request, State
+from undertow.control.supervision.supervisor import supervisor
+from undertow.control.supervision.transition_log import transitions
 from undertow.core import runtime
-from undertow.loop import simd_batch
-from undertow.loop.sampled import moved
-from undertow.numerics.integrators import METHODS
+from undertow.core.numerics.integrators import METHODS
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_result import lost_thrusters
-from undertow.supervision.conditions import Request, State
-from undertow.supervision.supervisor import supervisor
-from undertow.supervision.transition_log import transitions
+from undertow.scenario.results.run_result import lost_thrusters
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.sampled import moved
 
 pytestmark = pytest.mark.full
 

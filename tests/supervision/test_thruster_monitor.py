@@ -10,11 +10,11 @@ import pytest
 from recorded import is_as_recorded
 
 import undertow as ut
-from undertow.controllers.pid import pid
+from undertow.control.controllers.pid import pid
+from undertow.control.supervision.fault_tolerant_law import fault_tolerant
 from undertow.core.contracts import BodyMotion, Measurement
 from undertow.core.errors import BadInput
-from undertow.supervision.fault_tolerant_law import fault_tolerant
-from undertow.thrusters.thruster import PropellerReport
+from undertow.physics.thrusters.thruster import PropellerReport
 
 DT = 0.01
 WARM = 2000  # steps, so that the covariance is known

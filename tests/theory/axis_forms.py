@@ -13,10 +13,10 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 
 from undertow.analysis import drift, motor_loop
 from undertow.analysis.small_signal import Gains, first_crossing, gains, of_axis, system_matrix
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.control.controllers.composite_law import RCAF
+from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.core.errors import BadInput
-from undertow.thrusters.motor import DCMotor
+from undertow.physics.thrusters.motor import DCMotor
 
 RULES = ("euler", "exact")  # how the law's own state is advanced over one sampling time
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.none import none
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 THREE_SETS = {"sets": 3}  # at -1, 0, 1 with width 1: the layout of section 3
 

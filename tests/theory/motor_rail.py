@@ -9,8 +9,8 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractController, AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.status import Status
-from undertow.plants.mechanism import AbstractMechanism, both_ways
-from undertow.thrusters.thruster import AbstractThruster
+from undertow.physics.plants.mechanism import AbstractMechanism, both_ways
+from undertow.physics.thrusters.thruster import AbstractThruster
 
 MASS, COUNT = 187.5, 4  # kg
 _ENVELOPE = 100.0  # m, m/s

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from undertow.controllers import adaptive_backstepping, pid
-from undertow.controllers.adaptive_backstepping import steps
+from undertow.control.controllers import adaptive_backstepping, pid
+from undertow.control.controllers.adaptive_backstepping import steps
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 C, INNER, GAMMA, LOAD = 2.0, 5.0, 1.2, 0.7
 

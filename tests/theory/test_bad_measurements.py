@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from undertow.analysis import small_signal
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractNavigation, Measurement
-from undertow.disturbances.none import none
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -10,16 +10,16 @@ import pytest
 from recorded import is_as_recorded
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from undertow.controllers import bandwidths
-from undertow.controllers.bandwidths import MARGINS, Axis, pid_frequency, robust_bandwidths
-from undertow.controllers.options import LOAD_RATE, DesignConditions
-from undertow.controllers.pid import pid
-from undertow.controllers.presets.robust import robust
+from undertow.control.controllers import bandwidths
+from undertow.control.controllers.bandwidths import MARGINS, Axis, pid_frequency, robust_bandwidths
+from undertow.control.controllers.options import LOAD_RATE, DesignConditions
+from undertow.control.controllers.pid import pid
+from undertow.control.controllers.presets.robust import robust
 from undertow.core.errors import BadInput
-from undertow.plants import double_integrator, hybrid_vehicle
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import first_order, t200
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.run import simulate_scenario
-from undertow.thrusters import first_order, t200
-from undertow.vehicles import bluerov2_heavy
 
 AXES = [
     Axis(dt, lag, max(0.35 / dt, 1 / lag if lag else 0.0), delay, noise, 1.0, authority)

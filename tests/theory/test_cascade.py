@@ -7,17 +7,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import cascade, pid
+from undertow.control.controllers import cascade, pid
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, two_link_arm
-from undertow.references import setpoint
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle, two_link_arm
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DT = 1e-2
 

@@ -8,16 +8,16 @@ import pytest
 import undertow as ut
 from undertow.analysis import theory
 from undertow.analysis.certificate.function import gramian, lyapunov_residual, transition
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.pid import pid
-from undertow.controllers.rcaf import rcaf
-from undertow.controllers.robust.estimator import Estimator
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.disturbances.table import table
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.navigation.white_noise import white_noise
-from undertow.plants.double_integrator import double_integrator
-from undertow.plants.linear_plant import linear_plant
+from undertow.control.controllers.composite_law import RCAF
+from undertow.control.controllers.pid import pid
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation.white_noise import white_noise
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.disturbances.table import table
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.physics.plants.linear_plant import linear_plant
 
 pytestmark = pytest.mark.full
 

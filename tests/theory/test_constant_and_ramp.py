@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from undertow.analysis import small_signal
-from undertow.disturbances.table import table
-from undertow.loop import continuous
+from undertow.physics.disturbances.table import table
+from undertow.simulation.loop import continuous
 
 pytestmark = pytest.mark.full
 

@@ -4,18 +4,25 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from undertow import controllers
-from undertow.controllers.adaptive_backstepping import backstepping_rate
-from undertow.controllers.bandwidths import Axis, Law, axes_of, bandwidth_grid, best_frequency, robust_bandwidths
-from undertow.controllers.integral_sliding_mode import _inside_the_layer as sliding_law
-from undertow.controllers.lqi import lqi_frequency
-from undertow.controllers.mrac import _load_alone
-from undertow.controllers.options import DesignConditions
-from undertow.controllers.slotine_li import _small_errors
-from undertow.controllers.super_twisting import _inside_the_layer as twisting_law
+from undertow.control import controllers
+from undertow.control.controllers.adaptive_backstepping import backstepping_rate
+from undertow.control.controllers.bandwidths import (
+    Axis,
+    Law,
+    axes_of,
+    bandwidth_grid,
+    best_frequency,
+    robust_bandwidths,
+)
+from undertow.control.controllers.integral_sliding_mode import _inside_the_layer as sliding_law
+from undertow.control.controllers.lqi import lqi_frequency
+from undertow.control.controllers.mrac import _load_alone
+from undertow.control.controllers.options import DesignConditions
+from undertow.control.controllers.slotine_li import _small_errors
+from undertow.control.controllers.super_twisting import _inside_the_layer as twisting_law
 from undertow.core.errors import BadInput
 from undertow.core.param import tuning_ranges
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
 
 DT = 0.02
 W = np.array([2.0, 6.0])

@@ -4,15 +4,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import disturbance_observer
-from undertow.controllers.bandwidths import MARGINS, Axis, robust_bandwidths
+from undertow.control.controllers import disturbance_observer
+from undertow.control.controllers.bandwidths import MARGINS, Axis, robust_bandwidths
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DT = 1e-2
 

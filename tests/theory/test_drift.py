@@ -6,17 +6,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from undertow.analysis import drift, small_signal
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation.perfect import perfect
+from undertow.control.navigation.white_noise import white_noise
+from undertow.control.references.setpoint import setpoint
 from undertow.core.status import Status
-from undertow.disturbances.none import none
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.navigation.white_noise import white_noise
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.none import none
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from undertow.core.contracts import AbstractController, Model
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.simulation.loop import sampled
 
 pytestmark = pytest.mark.full
 

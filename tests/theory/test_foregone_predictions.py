@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from undertow.prediction.foregone import reason_without_prediction
 from undertow.scenario.build import build
+from undertow.studies.prediction.foregone import reason_without_prediction
 
 pytestmark = pytest.mark.full
 

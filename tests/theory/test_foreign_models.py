@@ -10,13 +10,13 @@ import pytest
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import OperatingConditions
-from undertow.checks.flow_stability import flow_advice, munk_rate
 from undertow.core import runtime
 from undertow.core.contracts import AbstractController
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.scenario.build import build
+from undertow.scenario.checks.flow_stability import flow_advice, munk_rate
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_scenario import run_scenario
-from undertow.vehicles import bluerov2_heavy
+from undertow.scenario.results.run_scenario import run_scenario
 
 CURRENT = 0.5  # m/s
 

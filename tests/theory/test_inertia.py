@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty
-from undertow.controllers import rcaf
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.inertia import InertiaIdentification
-from undertow.controllers.robust.memory import Observed, memory
-from undertow.disturbances import none
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.dataset import to_dataset
-from undertow.navigation import perfect
-from undertow.plants import hybrid_vehicle
-from undertow.references import lissajous
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.controllers.robust.inertia import InertiaIdentification
+from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation import perfect
+from undertow.control.references import lissajous
+from undertow.physics.disturbances import none
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.dataset import to_dataset
 
 pytestmark = pytest.mark.full
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from undertow.controllers import disturbance_observer, l1_adaptive
+from undertow.control.controllers import disturbance_observer, l1_adaptive
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 
 def run(plant, law, goal, disturbance=None, duration=4.0, dt=1e-2, simulate=sampled.simulate, **start):

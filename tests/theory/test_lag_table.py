@@ -11,17 +11,17 @@ import pytest
 from motor_rail import COUNT, MASS, InnerLoop, MotorRail, thrust_model
 
 from undertow.analysis import motor_loop
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import Load, Target
+from undertow.core.numerics.integrators import rk4
 from undertow.core.status import Status
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.numerics.integrators import rk4
-from undertow.references.setpoint import setpoint
-from undertow.thrusters.fidelity import ElectromechanicalState
-from undertow.thrusters.paper_table3 import paper_table3
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.thrusters.fidelity import ElectromechanicalState
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 WHOLE = paper_table3()
 SPEEDS = np.array([2.0, 10.0, 20.0, 40.0])  # rad/s

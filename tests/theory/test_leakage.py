@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from undertow.analysis import drift
-from undertow.controllers.presets.robust import robust
-from undertow.controllers.robust.estimator import Estimator, EstimatorState
-from undertow.disturbances import none, sinusoid
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect, white_noise
-from undertow.plants import double_integrator
-from undertow.references import setpoint
+from undertow.control.controllers.presets.robust import robust
+from undertow.control.controllers.robust.estimator import Estimator, EstimatorState
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation import perfect, white_noise
+from undertow.control.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

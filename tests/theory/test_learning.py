@@ -5,22 +5,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import rcaf
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.knowledge import load_knowledge, save_knowledge
-from undertow.controllers.robust.memory import Observed, memory
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.controllers.robust.knowledge import load_knowledge, save_knowledge
+from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation import perfect
+from undertow.control.references import lissajous, sine
 from undertow.core.contracts import Target, TrackingError
 from undertow.core.measurement import measurement_of_outputs
-from undertow.disturbances import none, sinusoid
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.dataset import to_dataset
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.references import lissajous, sine
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.dataset import to_dataset
 
 pytestmark = pytest.mark.full
 

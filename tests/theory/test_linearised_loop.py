@@ -5,26 +5,26 @@ import jax
 import numpy as np
 import pytest
 
-from undertow import controllers
 from undertow.analysis import motor_loop, small_signal
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.analysis.linearization.response import compare_metrics
-from undertow.arena.vehicles import VEHICLES
-from undertow.controllers import rcaf
-from undertow.disturbances import none, sinusoid
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.sampled import simulate
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, linear_plant
-from undertow.prediction.operating_point import operating_point, predicted
-from undertow.references import setpoint
+from undertow.control import controllers
+from undertow.control.controllers import rcaf
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle, linear_plant
+from undertow.physics.thrusters import paper_table3, t200
+from undertow.physics.vehicles import bluerov2, odin, remus100
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.simulation.run_scenario import run_scenario
-from undertow.thrusters import paper_table3, t200
-from undertow.vehicles import bluerov2, odin, remus100
+from undertow.scenario.results.run_scenario import run_scenario
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.sampled import simulate
+from undertow.studies.arena.vehicles import VEHICLES
+from undertow.studies.prediction.operating_point import operating_point, predicted
 
 pytestmark = pytest.mark.full
 

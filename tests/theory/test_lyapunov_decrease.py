@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.numerics.integrators import rk4
-from undertow.references.setpoint import setpoint
+from undertow.control.references.setpoint import setpoint
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.disturbances.sinusoid import sinusoid
 
 pytestmark = pytest.mark.full
 

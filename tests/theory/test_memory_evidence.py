@@ -5,17 +5,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import rcaf
-from undertow.controllers.robust import evidence
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.memory import Observed, memory
-from undertow.disturbances import sinusoid
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator
-from undertow.references import sine
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.robust import evidence
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.control.navigation import perfect
+from undertow.control.references import sine
+from undertow.physics.disturbances import sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

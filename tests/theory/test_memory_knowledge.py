@@ -10,21 +10,21 @@ import xarray as xr
 
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty
 from undertow.analysis.theory import SteadyWindow, theory_of
-from undertow.controllers import rcaf
-from undertow.controllers.robust.knowledge import load_knowledge, regressor_names, save_knowledge, strongest
-from undertow.controllers.robust.memory import memory
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.robust.knowledge import load_knowledge, regressor_names, save_knowledge, strongest
+from undertow.control.controllers.robust.memory import memory
+from undertow.control.navigation import perfect
+from undertow.control.references import sine
 from undertow.core.contracts import TrackingError
 from undertow.core.errors import BadInput
-from undertow.disturbances import sinusoid
-from undertow.loop import simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.dataset import to_dataset
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.references import sine
+from undertow.physics.disturbances import sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.report.run_tables import memory_rows
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.dataset import to_dataset
 
 DT = 0.02
 OPTIONS = {"sampling_time": DT, "bandwidth": 4.0, "tracking": 2.0}

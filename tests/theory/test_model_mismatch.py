@@ -10,18 +10,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import pid
-from undertow.controllers.presets.robust import robust
+from undertow.control.controllers import pid
+from undertow.control.controllers.presets.robust import robust
+from undertow.control.navigation import perfect, white_noise
+from undertow.control.references import setpoint
 from undertow.core.contracts import AbstractNavigation
-from undertow.disturbances import current, sinusoid, waves
-from undertow.disturbances.adding import Together
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect, white_noise
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.references import setpoint
-from undertow.thrusters import first_order, t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.physics.disturbances import current, sinusoid, waves
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import first_order, t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

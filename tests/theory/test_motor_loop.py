@@ -12,15 +12,15 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 from undertow.analysis import drift, motor_loop, small_signal
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.references.setpoint import setpoint
-from undertow.thrusters.fidelity import ElectromechanicalState
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.fidelity import ElectromechanicalState
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 MOTOR = paper_table3().motor
 LAWS = {"rcafc": {}, "rafc": {"composite": 0.0}, "no robust term": {"robust_gain": 0.0}}

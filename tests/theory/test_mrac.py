@@ -5,15 +5,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import mrac, pid
+from undertow.control.controllers import mrac, pid
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator
-from undertow.references import setpoint, sine
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 
 def run(plant, law, reference, disturbance=None, duration=20.0, dt=1e-2, **start):

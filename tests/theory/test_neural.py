@@ -5,15 +5,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import neural, pid
+from undertow.control.controllers import neural, pid
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import setpoint, sine
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DT = 1e-2
 

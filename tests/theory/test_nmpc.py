@@ -9,16 +9,16 @@ import pytest
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import lsq_linear, minimize
 
-from undertow.controllers import disturbance_observer, nmpc
-from undertow.controllers.receding_horizon import Horizon, improved, regulator
+from undertow.control.controllers import disturbance_observer, nmpc
+from undertow.control.controllers.receding_horizon import Horizon, improved, regulator
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, two_link_arm
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, two_link_arm
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 DT = 1e-2
 

@@ -5,13 +5,13 @@ import pytest
 
 from undertow.analysis.observer_limit import LinearLaw, loop_poles, papers_law, slowest_observer
 from undertow.analysis.small_signal import poles
-from undertow.controllers.rcaf import rcaf
-from undertow.disturbances.none import none
-from undertow.loop import simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.pose_only import pose_only
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.pose_only import pose_only
+from undertow.control.references.setpoint import setpoint
+from undertow.physics.disturbances.none import none
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

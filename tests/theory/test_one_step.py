@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from two_axes import DT, V, X
 
-from undertow import controllers
-from undertow.controllers.actuation import Given, actuation_for
-from undertow.controllers.adaptive_backstepping import BacksteppingState
-from undertow.controllers.adrc import ObserverState
-from undertow.controllers.cascade_law import CascadeState
-from undertow.controllers.disturbance_observer import ObserverState as Predicted
-from undertow.controllers.indi import FilterState
-from undertow.controllers.integral_sliding_mode import SlidingState
-from undertow.controllers.l1_adaptive import PredictorState
-from undertow.controllers.lqi import LQI, LQIState
-from undertow.controllers.mrac import AdaptiveState
-from undertow.controllers.neural import Weights
+from undertow.control import controllers
+from undertow.control.controllers.actuation import Given, actuation_for
+from undertow.control.controllers.adaptive_backstepping import BacksteppingState
+from undertow.control.controllers.adrc import ObserverState
+from undertow.control.controllers.cascade_law import CascadeState
+from undertow.control.controllers.disturbance_observer import ObserverState as Predicted
+from undertow.control.controllers.indi import FilterState
+from undertow.control.controllers.integral_sliding_mode import SlidingState
+from undertow.control.controllers.l1_adaptive import PredictorState
+from undertow.control.controllers.lqi import LQI, LQIState
+from undertow.control.controllers.mrac import AdaptiveState
+from undertow.control.controllers.neural import Weights
 from undertow.core.contracts import Measurement, Target, TrackingError
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
 
 MODEL = double_integrator(2, limit=4.0).model()
 E, R, A = np.array([0.5, -0.3]), np.array([-0.2, 0.6]), np.array([0.1, -0.4])

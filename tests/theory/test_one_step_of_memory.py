@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from two_axes import DT, GAINS, GOAL, THETA, A, E, R, V, Y, same
 
-from undertow.controllers import rcaf
-from undertow.controllers.robust import evidence
-from undertow.controllers.robust.estimator import EstimatorState
-from undertow.controllers.robust.evidence import Evidence
-from undertow.controllers.robust.inertia import InertiaIdentification, InertiaState
-from undertow.controllers.robust.memory import MemoryState, Observed, memory
-from undertow.controllers.robust.robust_law import RobustState
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.robust import evidence
+from undertow.control.controllers.robust.estimator import EstimatorState
+from undertow.control.controllers.robust.evidence import Evidence
+from undertow.control.controllers.robust.inertia import InertiaIdentification, InertiaState
+from undertow.control.controllers.robust.memory import MemoryState, Observed, memory
+from undertow.control.controllers.robust.robust_law import RobustState
 from undertow.core.contracts import TrackingError
-from undertow.plants import double_integrator
+from undertow.physics.plants import double_integrator
 
 RNG = np.random.default_rng(11)
 PROBED = {"duration": 50.0, "horizon": 400.0, "window": 5.0, "plausible": 0.4, "error_share": 0.25}

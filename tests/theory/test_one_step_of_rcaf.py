@@ -11,14 +11,14 @@ import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 from two_axes import DRIFT, DT, GAINS, GOAL, THETA, A, E, F, G, H, R, V, X, Y, same
 
-from undertow.controllers import rcaf
-from undertow.controllers.composite_law import RCAFState, projected_rate
-from undertow.controllers.reference_filter import FilterState, ReferenceFilter, Room
-from undertow.controllers.robust.estimator import EstimatorState
-from undertow.controllers.robust.robust_law import RobustState
+from undertow.control.controllers import rcaf
+from undertow.control.controllers.composite_law import RCAFState, projected_rate
+from undertow.control.controllers.reference_filter import FilterState, ReferenceFilter, Room
+from undertow.control.controllers.robust.estimator import EstimatorState
+from undertow.control.controllers.robust.robust_law import RobustState
+from undertow.control.estimation.fuzzy_system import FuzzySystem, gaussian_sets
 from undertow.core.contracts import Target
-from undertow.estimation.fuzzy_system import FuzzySystem, gaussian_sets
-from undertow.plants import double_integrator, linear_plant
+from undertow.physics.plants import double_integrator, linear_plant
 
 MODEL = linear_plant(G, F, H).model()
 APPLIED = np.array([0.3, -0.4])

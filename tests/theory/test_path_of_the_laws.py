@@ -9,18 +9,18 @@ from scipy.linalg import solve_discrete_are
 from scipy.optimize import lsq_linear
 from two_axes import DRIFT, DT, F, G, H, V, X, Y
 
-from undertow.controllers import nmpc, pid, policy, rcaf, replay
-from undertow.controllers.actuation import ActuatedState, Given
-from undertow.controllers.bandwidths import axes_of
-from undertow.controllers.decentralised import decentralised
-from undertow.controllers.law_signals import share_given
-from undertow.controllers.options import DesignConditions
-from undertow.controllers.reference_filter import FilterState
+from undertow.control.controllers import nmpc, pid, policy, rcaf, replay
+from undertow.control.controllers.actuation import ActuatedState, Given
+from undertow.control.controllers.bandwidths import axes_of
+from undertow.control.controllers.decentralised import decentralised
+from undertow.control.controllers.law_signals import share_given
+from undertow.control.controllers.options import DesignConditions
+from undertow.control.controllers.reference_filter import FilterState
 from undertow.core.actuator_model import LaggedActuator
 from undertow.core.composite_model import composite_model
 from undertow.core.contracts import Measurement, Target, TrackingError
 from undertow.core.errors import BadInput
-from undertow.plants import double_integrator, linear_plant
+from undertow.physics.plants import double_integrator, linear_plant
 
 TAU, LIMIT = 0.3, 1.5
 MODEL = linear_plant(G, F, H, limit=LIMIT).model()

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from undertow.controllers import pid
+from undertow.control.controllers import pid
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation
-from undertow.references import setpoint
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 
 def run(plant, law, goal, disturbance=None, duration=20.0, dt=1e-2, **start):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.controllers.policy_interface import policy_interface_of
+from undertow.control.controllers.policy_interface import policy_interface_of
 from undertow.core.errors import BadInput
 
 

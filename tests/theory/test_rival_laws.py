@@ -6,17 +6,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers.actuation import AbstractAccelerationLaw
+from undertow.control.controllers.actuation import AbstractAccelerationLaw
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core import catalogue
 from undertow.core.param import tuning_ranges
-from undertow.disturbances import sinusoid
-from undertow.loop import sampled, simd_batch
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, magnetic_levitation, two_link_arm
-from undertow.references import setpoint, sine
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy, odin
+from undertow.physics.disturbances import sinusoid
+from undertow.physics.plants import (
+    double_integrator,
+    hybrid_vehicle,
+    inverted_pendulum,
+    magnetic_levitation,
+    two_link_arm,
+)
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy, odin
+from undertow.simulation.loop import sampled, simd_batch
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

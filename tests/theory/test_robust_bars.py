@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from textbook import rotation_from_euler, wrap_angle
 
-from undertow.controllers import rcaf
+from undertow.control.controllers import rcaf
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.contracts import AbstractReference, Target
-from undertow.disturbances import none, sinusoid, table, u1
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, magnetic_levitation
-from undertow.references import setpoint, sine
-from undertow.thrusters import paper_table3, t200
-from undertow.vehicles import bluerov2_heavy, odin
+from undertow.physics.disturbances import none, sinusoid, table, u1
+from undertow.physics.plants import double_integrator, hybrid_vehicle, magnetic_levitation
+from undertow.physics.thrusters import paper_table3, t200
+from undertow.physics.vehicles import bluerov2_heavy, odin
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -9,18 +9,18 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from undertow.analysis.drift import gain_bound
-from undertow.controllers.presets.robust import robust
-from undertow.controllers.reference_filter import ReferenceFilter
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.thruster_allocation import allocate, attained
+from undertow.control.controllers.presets.robust import robust
+from undertow.control.controllers.reference_filter import ReferenceFilter
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.controllers.thruster_allocation import allocate, attained
+from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.core.contracts import Target
 from undertow.core.errors import BadInput
 from undertow.core.measurement import measurement_of_outputs
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.numerics.integrators import rk4
-from undertow.plants import double_integrator, hybrid_vehicle
-from undertow.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
-from undertow.vehicles import bluerov2_heavy
+from undertow.core.numerics.integrators import rk4
+from undertow.physics.plants import double_integrator, hybrid_vehicle
+from undertow.physics.thrusters import linear_voltage, paper_table3, quadratic_voltage, t200
+from undertow.physics.vehicles import bluerov2_heavy
 
 RNG = np.random.default_rng(4)
 

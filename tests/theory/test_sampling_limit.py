@@ -8,8 +8,8 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 from undertow.analysis import small_signal
-from undertow.loop import sampled
-from undertow.numerics.integrators import rk4
+from undertow.core.numerics.integrators import rk4
+from undertow.simulation.loop import sampled
 
 pytestmark = pytest.mark.full
 

@@ -4,9 +4,9 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.estimation.fuzzy_system import gaussian_sets
-from undertow.loop import sampled
+from undertow.control.estimation.fuzzy_system import gaussian_sets
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.simulation.loop import sampled
 
 pytestmark = pytest.mark.full
 

@@ -7,8 +7,8 @@ import pytest
 
 import undertow as ut
 from undertow.core.contracts import Load
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
 
 pytestmark = pytest.mark.full
 

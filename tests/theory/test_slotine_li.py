@@ -8,18 +8,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from undertow.controllers import pid, slotine_li
-from undertow.controllers.slotine_li import DiagonalDynamics
+from undertow.control.controllers import pid, slotine_li
+from undertow.control.controllers.slotine_li import DiagonalDynamics
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint, sine
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator, hybrid_vehicle, inverted_pendulum, two_link_arm
-from undertow.references import setpoint, sine
-from undertow.thrusters import t200
-from undertow.vehicles import bluerov2_heavy, odin, remus100
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator, hybrid_vehicle, inverted_pendulum, two_link_arm
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy, odin, remus100
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 ARM = two_link_arm(gravity=0.0)
 

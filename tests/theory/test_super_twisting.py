@@ -6,15 +6,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from undertow.controllers import pid, super_twisting
-from undertow.controllers.super_twisting import contraction, least_second
+from undertow.control.controllers import pid, super_twisting
+from undertow.control.controllers.super_twisting import contraction, least_second
+from undertow.control.navigation import perfect
+from undertow.control.references import setpoint
 from undertow.core.errors import BadInput
-from undertow.disturbances import none, sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import perfect
-from undertow.plants import double_integrator
-from undertow.references import setpoint
+from undertow.physics.disturbances import none, sinusoid
+from undertow.physics.plants import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 NO_LAYER = {"layer": 1e-9, "reference_frequency": 0.0}
 

@@ -14,19 +14,19 @@ import numpy as np
 import pytest
 
 from undertow.analysis import small_signal
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractPlant
-from undertow.disturbances.none import none
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.hybrid_vehicle import HybridVehicle, hybrid_vehicle
-from undertow.plants.linear_plant import linear_plant
-from undertow.references.setpoint import setpoint
-from undertow.thrusters.paper_table3 import paper_table3
-from undertow.vehicles.odin import odin
+from undertow.physics.disturbances.none import none
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle, hybrid_vehicle
+from undertow.physics.plants.linear_plant import linear_plant
+from undertow.physics.thrusters.paper_table3 import paper_table3
+from undertow.physics.vehicles.odin import odin
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

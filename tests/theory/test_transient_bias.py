@@ -5,7 +5,7 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.loop import sampled
+from undertow.simulation.loop import sampled
 
 pytestmark = pytest.mark.full
 

@@ -8,8 +8,8 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.simulation.loop import sampled
 
 pytestmark = pytest.mark.full
 

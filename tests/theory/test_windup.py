@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from undertow.analysis import small_signal
-from undertow.controllers.rcaf import rcaf
+from undertow.control.controllers.rcaf import rcaf
+from undertow.control.navigation.perfect import perfect
+from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractController, Model
-from undertow.disturbances.sinusoid import sinusoid
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.perfect import perfect
-from undertow.plants.double_integrator import double_integrator
-from undertow.references.setpoint import setpoint
+from undertow.physics.disturbances.sinusoid import sinusoid
+from undertow.physics.plants.double_integrator import double_integrator
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
 

@@ -9,9 +9,9 @@ import pytest
 from undertow.core import atomic_io
 from undertow.core.errors import BadInput
 from undertow.simulation.checkpoint import Checkpoint, OutOfTime
-from undertow.tuning.objective import Objective
-from undertow.tuning.search import descend, evolve, search
-from undertow.tuning.stability import Certificate, no_certificate
+from undertow.studies.tuning.objective import Objective
+from undertow.studies.tuning.search import descend, evolve, search
+from undertow.studies.tuning.stability import Certificate, no_certificate
 
 RNG = np.random.default_rng(4)
 ROOT = RNG.normal(size=(3, 3))

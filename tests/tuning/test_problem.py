@@ -8,28 +8,28 @@ import pytest
 from messages import named
 
 from undertow.analysis.linearization.jacobians import Parts, without
-from undertow.controllers import pid
+from undertow.control.controllers import pid
+from undertow.control.navigation import observer
+from undertow.control.references import setpoint
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
-from undertow.disturbances import current, sinusoid, wrench
-from undertow.disturbances.adding import Together
-from undertow.loop import sampled
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation import observer
-from undertow.plants import hybrid_vehicle
-from undertow.references import setpoint
+from undertow.physics.disturbances import current, sinusoid, wrench
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.plants import hybrid_vehicle
+from undertow.physics.sensors import depth, dvl, imu
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2_heavy
 from undertow.scenario.reading import from_data
-from undertow.sensors import depth, dvl, imu
 from undertow.simulation.checkpoint import Checkpoint
-from undertow.thrusters import t200
-from undertow.tuning.cost import shares
-from undertow.tuning.evaluator import Evaluation, Scaled
-from undertow.tuning.objective import Objective
-from undertow.tuning.problem import problem
-from undertow.tuning.search import descend, search
-from undertow.tuning.stability import Certifier
-from undertow.tuning.tunable_parameters import options, parameters
-from undertow.vehicles import bluerov2_heavy
+from undertow.simulation.loop import sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.studies.tuning.cost import shares
+from undertow.studies.tuning.evaluator import Evaluation, Scaled
+from undertow.studies.tuning.objective import Objective
+from undertow.studies.tuning.problem import problem
+from undertow.studies.tuning.search import descend, search
+from undertow.studies.tuning.stability import Certifier
+from undertow.studies.tuning.tunable_parameters import options, parameters
 
 pytestmark = pytest.mark.full
 

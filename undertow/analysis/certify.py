@@ -9,7 +9,7 @@ from undertow.analysis.certificate.function import Lyapunov
 from undertow.analysis.certificate.hypotheses import Hypothesis
 from undertow.analysis.theory import SteadyWindow, theory_of
 from undertow.core.contracts import AbstractController
-from undertow.loop.dataset import series
+from undertow.simulation.loop.dataset import series
 
 # V rises where it grows by more than this share of its largest value.
 _RISE = 1e-10

@@ -9,11 +9,11 @@ import functools
 import numpy as np
 
 from undertow.analysis.small_signal import gains, of_axis
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.control.controllers.composite_law import RCAF
+from undertow.control.controllers.robust.robust_law import RobustRCAF
+from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core.arrays import as_array
 from undertow.core.errors import BadInput
-from undertow.estimation.fuzzy_system import FuzzySystem
 
 
 @functools.singledispatch

@@ -13,13 +13,13 @@ from jaxtyping import Array, Float
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput
 from undertow.core.metric import AbstractMetric, Metric
+from undertow.core.numerics.rotations import attitude_error, quaternion_from_euler
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.outcome import Outcome
-from undertow.loop.recorded_signals import Signals
-from undertow.loop.sampled import AbstractAccumulator
-from undertow.numerics.rotations import attitude_error, quaternion_from_euler
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.outcome import Outcome
+from undertow.simulation.loop.recorded_signals import Signals
+from undertow.simulation.loop.sampled import AbstractAccumulator
 
 PerAxis = Float[Array, " n"]
 Scalar = Float[Array, ""]

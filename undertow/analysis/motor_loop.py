@@ -13,8 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from undertow.analysis.small_signal import Gains, gains
-from undertow.controllers.composite_law import RCAF
-from undertow.thrusters.motor import DCMotor
+from undertow.control.controllers.composite_law import RCAF
+from undertow.physics.thrusters.motor import DCMotor
 
 
 def lag_matrix(law: RCAF, lag: float, gain: float = 1.0, axis: int = 0, drifted: float = 0.0) -> np.ndarray:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.from_sensors import SensorNavigation, sensor_names
-from undertow.navigation.kalman import Kalman
-from undertow.sensors.propeller_speed import PropellerSpeed
-from undertow.sensors.sensor import AbstractSensor
+from undertow.control.navigation.from_sensors import SensorNavigation, sensor_names
+from undertow.control.navigation.kalman import Kalman
+from undertow.physics.sensors.propeller_speed import PropellerSpeed
+from undertow.physics.sensors.sensor import AbstractSensor
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _EXPECTED = 9  # mean of the normalised square of errors of three positions, three velocities and three angles
 _TOO_LARGE = 2  # times as much; the mean of a run departs less by chance

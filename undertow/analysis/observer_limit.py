@@ -1,7 +1,7 @@
 """How slow an observer of velocity may be for a law that estimates the uncertainty: the limit of stability.
 
 One axis in continuous time, with actuators that follow at once: v_dot = u + d, the observer of
-`undertow.navigation.pose_only`, and the law with its estimator linearised at zero,
+`undertow.control.navigation.pose_only`, and the law with its estimator linearised at zero,
 
     u = - d_hat - k_1 x_hat - k_2 v_hat ,  v_bar_dot = - alpha eps + u + d_hat ,  d_hat_dot = - w_d^2 (eps + mu s)
 
@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.analysis.small_signal import gains
-from undertow.controllers.composite_law import RCAF
+from undertow.control.controllers.composite_law import RCAF
 from undertow.core import checks
 
 _GRID, _ROUNDS = 400, 40

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.controllers.composite_law import RCAF
+from undertow.control.controllers.composite_law import RCAF
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
 

@@ -11,10 +11,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.control.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
 from undertow.core.runtime import double_outside_runs
-from undertow.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
 _CONTROLLED = 0.85

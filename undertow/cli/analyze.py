@@ -6,7 +6,6 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from undertow.checks.flow_stability import flow_advice
 from undertow.cli.commands.understand import AnalyzeCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
@@ -15,11 +14,12 @@ from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import titled, wide_console
 from undertow.core.json_text import to_json
-from undertow.prediction.predict import predict, summary
-from undertow.prediction.warnings import advice
 from undertow.report.prediction_page import Rows, tables, write_prediction
 from undertow.scenario.build import build
+from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.reading import read
+from undertow.studies.prediction.predict import predict, summary
+from undertow.studies.prediction.warnings import advice
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 

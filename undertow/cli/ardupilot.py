@@ -8,10 +8,10 @@ from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
-from undertow.interop.ardupilot.server import listen, serve
-from undertow.interop.ardupilot.session import Session
-from undertow.interop.stepped_vehicle import SteppedVehicle
-from undertow.interop.thruster_channels import channels_of_vehicle
+from undertow.outside.ardupilot.server import listen, serve
+from undertow.outside.ardupilot.session import Session
+from undertow.outside.stepped_vehicle import SteppedVehicle
+from undertow.outside.thruster_channels import channels_of_vehicle
 
 
 def ardupilot(command: ArdupilotCommand) -> int:

@@ -8,14 +8,6 @@ from typing import NamedTuple
 import typer
 from rich.console import Console
 
-from undertow.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, with_law, write_entry
-from undertow.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
-from undertow.arena.robustness import FOLDER, prepare_robustness
-from undertow.arena.tasks import CELLS, TASKS
-from undertow.arena.tuned_gains import Gains, tuned_gains
-from undertow.arena.vehicles import VEHICLES
-from undertow.campaign.prepare import Prepared
-from undertow.campaign.run_campaign import STORE
 from undertow.cli import results_folder
 from undertow.cli.commands.understand import ArenaCommand
 from undertow.cli.exit_codes import DONE, warn_of
@@ -25,15 +17,23 @@ from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import new_lines, stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import run_trials, worker_count
-from undertow.comparison.candidates import Candidate, laws
-from undertow.comparison.equal_budgets import check_budget
-from undertow.comparison.step_time import step_time
 from undertow.core import checks
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.json_text import to_json
 from undertow.report.arena_page import PAGE, SCORE, write_board
 from undertow.scenario.reading import dump
+from undertow.studies.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, with_law, write_entry
+from undertow.studies.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
+from undertow.studies.arena.robustness import FOLDER, prepare_robustness
+from undertow.studies.arena.tasks import CELLS, TASKS
+from undertow.studies.arena.tuned_gains import Gains, tuned_gains
+from undertow.studies.arena.vehicles import VEHICLES
+from undertow.studies.campaign.prepare import Prepared
+from undertow.studies.campaign.run_campaign import STORE
+from undertow.studies.comparison.candidates import Candidate, laws
+from undertow.studies.comparison.equal_budgets import check_budget
+from undertow.studies.comparison.step_time import step_time
 
 # All laws of undertow but for `nmpc`, which runs by XLA and takes hours.
 EVERY = (

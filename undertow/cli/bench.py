@@ -6,13 +6,13 @@ from typing import Any
 import typer
 from rich.table import Table
 
-from undertow.bench.measure import measure
-from undertow.bench.waiting import waiting_times
 from undertow.cli.commands.inspection import BenchCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import shares
 from undertow.cli.tables import numbers, titled, wide_console
+from undertow.studies.speed.measure import measure
+from undertow.studies.speed.waiting import waiting_times
 
 _ROWS = {
     "single_ns": "one run, SIMD backend",

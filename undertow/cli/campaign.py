@@ -6,11 +6,6 @@ from rich.console import Console
 from rich.table import Table
 
 from undertow.analysis.metrics import for_people
-from undertow.campaign.build_trials import build_trial
-from undertow.campaign.campaign_summary import endings, summary
-from undertow.campaign.prepare import Prepared, prepare
-from undertow.campaign.run_campaign import STORE
-from undertow.campaign.store_results import Results, load
 from undertow.cli.commands.understand import CampaignCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.pdf_option import check_pdf
@@ -24,6 +19,11 @@ from undertow.core.json_text import to_json
 from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.executors import check_cluster
+from undertow.studies.campaign.build_trials import build_trial
+from undertow.studies.campaign.campaign_summary import endings, summary
+from undertow.studies.campaign.prepare import Prepared, prepare
+from undertow.studies.campaign.run_campaign import STORE
+from undertow.studies.campaign.store_results import Results, load
 
 
 def campaign(command: CampaignCommand) -> int:

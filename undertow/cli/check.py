@@ -6,16 +6,16 @@ from typing import Any
 
 from rich.text import Text
 
-from undertow.campaign.prepare import prepare
-from undertow.checks import check as checks
 from undertow.cli.commands.inspection import CheckCommand
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
+from undertow.scenario.checks import check as checks
 from undertow.scenario.reading import read
 from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file
 from undertow.scenario.yaml_text import load
+from undertow.studies.campaign.prepare import prepare
 
 
 def check(command: CheckCommand) -> int:

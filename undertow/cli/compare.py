@@ -8,9 +8,6 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
-from undertow.campaign.build_trials import build_trial
-from undertow.campaign.run_campaign import STORE
-from undertow.campaign.store_results import load
 from undertow.cli import results_folder
 from undertow.cli.commands.understand import CompareCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
@@ -20,20 +17,23 @@ from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import new_lines, stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
-from undertow.comparison.budget_tables import budget_sentences
-from undertow.comparison.candidates import file_stem
-from undertow.comparison.comparison import Comparison, read_comparison
-from undertow.comparison.equal_budgets import FOLDER, check_budget, equal_budgets
-from undertow.comparison.prepare import PreparedComparison, Tuner, prepare_comparison
-from undertow.comparison.sentences import sentences
-from undertow.comparison.step_time import HOW_LONG, step_times
-from undertow.comparison.tables import NOTE, medians
 from undertow.core import checks
 from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.json_text import to_json
 from undertow.core.status import Status
 from undertow.report.comparison_page import write_comparison
 from undertow.scenario.part_cache import PartCache
+from undertow.studies.campaign.build_trials import build_trial
+from undertow.studies.campaign.run_campaign import STORE
+from undertow.studies.campaign.store_results import load
+from undertow.studies.comparison.budget_tables import budget_sentences
+from undertow.studies.comparison.candidates import file_stem
+from undertow.studies.comparison.comparison import Comparison, read_comparison
+from undertow.studies.comparison.equal_budgets import FOLDER, check_budget, equal_budgets
+from undertow.studies.comparison.prepare import PreparedComparison, Tuner, prepare_comparison
+from undertow.studies.comparison.sentences import sentences
+from undertow.studies.comparison.step_time import HOW_LONG, step_times
+from undertow.studies.comparison.tables import NOTE, medians
 
 # File of each style of table.
 _TABLES = {"markdown": "comparison.md", "latex": "comparison.tex", "csv": "comparison.csv"}

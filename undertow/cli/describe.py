@@ -8,18 +8,18 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
-from undertow.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
 from undertow.cli.commands.inspection import DescribeCommand, ListCommand
 from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.signals import Signal
-from undertow.faults.kinds import list_kinds, severity_cells
-from undertow.loop.recorded_signals import RECORDED
+from undertow.physics.faults.kinds import list_kinds, severity_cells
 from undertow.scenario import describing
 from undertow.scenario.describing import text_of
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.schema import Scenario, keys
+from undertow.simulation.loop.recorded_signals import RECORDED
+from undertow.studies.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
 
 _SCHEMAS = {"scenario": scenario_schema, "campaign": campaign_json_schema}
 

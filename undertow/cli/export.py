@@ -9,11 +9,11 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.export.c_program import Exported
-from undertow.export.controller import export_controller
-from undertow.export.fmu import export_fmu
-from undertow.export.navigation import export_navigation
-from undertow.export.vehicle import export_vehicle
+from undertow.outside.export.c_program import Exported
+from undertow.outside.export.controller import export_controller
+from undertow.outside.export.fmu import export_fmu
+from undertow.outside.export.navigation import export_navigation
+from undertow.outside.export.vehicle import export_vehicle
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import read
 

@@ -19,11 +19,11 @@ from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
-from undertow.falsification.falsify import METHODS, Falsified, as_data, falsify
-from undertow.falsification.objective import Violation
 from undertow.report.figures import save_all
 from undertow.report.figures.falsification import beside_nominal_figure, search_figure
 from undertow.scenario.reading import read
+from undertow.studies.falsification.falsify import METHODS, Falsified, as_data, falsify
+from undertow.studies.falsification.objective import Violation
 
 _WRITTEN = ("falsify.json", "counterexample.yaml", "figures")
 _CHECKPOINT = "falsify.jsonl"

@@ -119,7 +119,7 @@ def _layout(out: Path, overwrite: bool) -> int:
 def _score(scenario: Path, path: Path, command: LogsCommand) -> int:
     """Score the model of a scenario against a log, and write score.json and figures/ to a folder."""
     from undertow.core.json_text import to_json
-    from undertow.interop.log_score import AXES, UNITS, score
+    from undertow.outside.log_score import AXES, UNITS, score
     from undertow.report.figures import save
     from undertow.report.figures.log_score import log_score_figure
     from undertow.scenario.build import build

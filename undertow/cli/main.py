@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from undertow.cli.commands import GROUPS
 from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
-from undertow.process_setup import prepare
+from undertow.core.process_setup import prepare
 
 
 class GroupedCommands(TyperGroup):

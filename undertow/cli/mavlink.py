@@ -7,13 +7,13 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.realtime.loop_settings import LoopSettings
+from undertow.outside.realtime.loop_settings import LoopSettings
 
 
 def mavlink(command: MavlinkCommand) -> int:
     """Control the vehicle at the other end of a link until Ctrl-C; return the exit code."""
     try:
-        from undertow.interop.mavlink import Companion, CompanionLink, UdpLink, read_key
+        from undertow.outside.mavlink import Companion, CompanionLink, UdpLink, read_key
     except ModuleNotFoundError as error:
         if error.name != "pymavlink":
             raise

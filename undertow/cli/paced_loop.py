@@ -4,14 +4,14 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from undertow.autopilot.autopilot import Autopilot
 from undertow.cli.exit_codes import DONE, FILES_FAILED, complain
 from undertow.cli.interruptible import EndingSignal
 from undertow.cli.step_logs import logging_to
-from undertow.realtime.control_loop import RealTimeLoop
-from undertow.realtime.link import AbstractPacingLink
-from undertow.realtime.loop_clock import MonotonicClock
-from undertow.realtime.loop_settings import LoopSettings
+from undertow.outside.autopilot.autopilot import Autopilot
+from undertow.outside.realtime.control_loop import RealTimeLoop
+from undertow.outside.realtime.link import AbstractPacingLink
+from undertow.outside.realtime.loop_clock import MonotonicClock
+from undertow.outside.realtime.loop_settings import LoopSettings
 
 
 def run_until_signal(

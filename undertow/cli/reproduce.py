@@ -21,11 +21,11 @@ def reproduce(command: ReproduceCommand) -> None:
         output_folder(command.out, command.out) as folder,
         results_folder(folder, _WRITTEN, "results.json", overwrite=True) as draft,
         shares(console) as progress,
-        worker_processes(preload="undertow.reproduction.reproduce") as pool,
+        worker_processes(preload="undertow.paper.reproduce") as pool,
     ):
         # Imported while the other processes import the same.
-        from undertow.report.reproduction.report import write
-        from undertow.reproduction.reproduce import reproduce as run
+        from undertow.paper.pages.report import write
+        from undertow.paper.reproduce import reproduce as run
 
         found = interruptible(lambda: run(draft.path, command.quick, progress, pool))
         progress("figures and report", 0.9)

@@ -39,10 +39,10 @@ def ros2(command: Ros2Command) -> int:
 
 
 def _run(command: Ros2Command) -> int:
-    from undertow.interop.ros2.from_messages import Frames
-    from undertow.interop.ros2.link import Link
-    from undertow.interop.ros2.node import Reporter, Topics
-    from undertow.interop.ros2.write_bag import BagWriter
+    from undertow.outside.ros2.from_messages import Frames
+    from undertow.outside.ros2.link import Link
+    from undertow.outside.ros2.node import Reporter, Topics
+    from undertow.outside.ros2.write_bag import BagWriter
 
     names = Topics().remapped(command.remap or [])
     frames = Frames(tuple(command.world_frame or ()) or Frames().world, command.body_frame)
@@ -77,9 +77,9 @@ def _recording(bag: Any, missing: list[str]) -> Iterator[BackgroundWriter | None
 
 def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
     from undertow.cli.paced_loop import run_until_signal
-    from undertow.interop.ros2.compiled_controller import CompiledController
-    from undertow.interop.ros2.controller_link import ControllerLink, ControllerSettings
-    from undertow.realtime.loop_settings import LoopSettings
+    from undertow.outside.realtime.loop_settings import LoopSettings
+    from undertow.outside.ros2.compiled_controller import CompiledController
+    from undertow.outside.ros2.controller_link import ControllerLink, ControllerSettings
 
     if command.duration is not None:
         checks.positive("--duration", command.duration, "s", finite=False)
@@ -98,9 +98,9 @@ def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter
 
 
 def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
-    from undertow.autopilot.vehicle import Vehicle
-    from undertow.interop.ros2.checked_scenario import check_vehicle
-    from undertow.interop.ros2.vehicle_node import VehicleNode, VehicleSettings
+    from undertow.outside.autopilot.vehicle import Vehicle
+    from undertow.outside.ros2.checked_scenario import check_vehicle
+    from undertow.outside.ros2.vehicle_node import VehicleNode, VehicleSettings
     from undertow.scenario.build import build
     from undertow.scenario.reading import read
 

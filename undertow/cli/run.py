@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import typer
 
-from undertow.autopilot.autopilot import Autopilot
-from undertow.autopilot.measured_motion import Format
 from undertow.cli.commands.deploy import RunCommand
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import EndingSignal, interruptible
@@ -22,24 +20,26 @@ from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
 from undertow.cli.step_logs import logging_to
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
+from undertow.control.supervision.conditions import State
+from undertow.control.supervision.transition_log import Transition
 from undertow.core import checks
 from undertow.core.atomic_io import sync, write_whole
 from undertow.core.errors import BadInput
-from undertow.realtime.control_loop import RealTimeLoop
-from undertow.realtime.link import AbstractLink
-from undertow.realtime.log_link import LogLink
-from undertow.realtime.loop_clock import MonotonicClock, SimulatedClock
-from undertow.realtime.loop_settings import LoopSettings, Reason
-from undertow.realtime.process_priority import scheduled
-from undertow.realtime.statistics import LoopStatistics
-from undertow.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
-from undertow.realtime.vehicle_link import VehicleLink
+from undertow.outside.autopilot.autopilot import Autopilot
+from undertow.outside.autopilot.measured_motion import Format
+from undertow.outside.realtime.control_loop import RealTimeLoop
+from undertow.outside.realtime.link import AbstractLink
+from undertow.outside.realtime.log_link import LogLink
+from undertow.outside.realtime.loop_clock import MonotonicClock, SimulatedClock
+from undertow.outside.realtime.loop_settings import LoopSettings, Reason
+from undertow.outside.realtime.process_priority import scheduled
+from undertow.outside.realtime.statistics import LoopStatistics
+from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
+from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.report.run_tables import transition_rows
 from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time, read_for_link
 from undertow.scenario.reading import Text, dump
-from undertow.supervision.conditions import State
-from undertow.supervision.transition_log import Transition
 
 _BEFORE = ".unbegun"  # where the log is before the first step, when an earlier one is still there
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")

@@ -18,16 +18,16 @@ from undertow.core.errors import BadInput
 from undertow.core.user_code import python_says
 from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.run_log import log_of_run
-from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.prediction.foregone import reason_without_prediction
-from undertow.prediction.operating_point import operating_point, predicted
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.plotting import Plotted, PlottingProcess
 from undertow.report.replay.replay_data import Replay, hull_size
 from undertow.report.run_page import Shown, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
-from undertow.simulation.result_files import write_metrics
-from undertow.simulation.run_result import ScenarioResult
+from undertow.scenario.results.result_files import write_metrics
+from undertow.scenario.results.run_result import ScenarioResult
+from undertow.studies.prediction.foregone import reason_without_prediction
+from undertow.studies.prediction.operating_point import operating_point, predicted
 
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10

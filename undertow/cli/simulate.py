@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import typer
 from rich.console import Console
 
-from undertow.checks.flow_stability import flow_advice
-from undertow.checks.vehicle_lint import vehicle_advice
 from undertow.cli.commands.start import SimulateCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
@@ -22,11 +20,13 @@ from undertow.logs.run_log import log_of_run
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.scenario.build import build, own_parts
+from undertow.scenario.checks.flow_stability import flow_advice
+from undertow.scenario.checks.vehicle_lint import vehicle_advice
 from undertow.scenario.reading import read
-from undertow.simulation.repetition import Repetition, compare
-from undertow.simulation.result_files import write
-from undertow.simulation.run_result import ScenarioResult, lost_thrusters
-from undertow.simulation.run_scenario import run_scenario
+from undertow.scenario.results.repetition import Repetition, compare
+from undertow.scenario.results.result_files import write
+from undertow.scenario.results.run_result import ScenarioResult, lost_thrusters
+from undertow.scenario.results.run_scenario import run_scenario
 
 if TYPE_CHECKING:
     from undertow.cli.run_presentation import PredictedMetrics
@@ -53,7 +53,7 @@ def simulate(command: SimulateCommand) -> int:
 
             check_video(video, folder, command.overwrite)
         if rerun is not None:
-            from undertow.interop.rerun_file import check_rerun
+            from undertow.outside.rerun_file import check_rerun
 
             check_rerun(rerun, folder, command.overwrite)
         result = _run(scenario, console, command.allow_code, video is not None)
@@ -74,7 +74,7 @@ def simulate(command: SimulateCommand) -> int:
         with shares(console) as progress:
             write_video(replay, video, progress)
     if rerun is not None:
-        from undertow.interop.rerun_file import write_rerun
+        from undertow.outside.rerun_file import write_rerun
 
         write_rerun(log_of_run(result.dataset), rerun, None if replay is None else replay.size)
     return code

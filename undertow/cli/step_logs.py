@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from undertow.autopilot.autopilot import Autopilot
+from undertow.outside.autopilot.autopilot import Autopilot
 
 
 @contextlib.contextmanager

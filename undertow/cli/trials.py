@@ -11,9 +11,6 @@ from typing import Protocol, TypeVar
 import typer
 from rich.console import Console
 
-from undertow.campaign.prepare import Prepared
-from undertow.campaign.run_campaign import STORE, Tally, Watch, run_campaign
-from undertow.campaign.store_results import load
 from undertow.cli import results_folder
 from undertow.cli.interruptible import interruptible
 from undertow.cli.results_folder import output_folder
@@ -24,6 +21,9 @@ from undertow.core.file_lock import file_lock
 from undertow.scenario.build import Built
 from undertow.scenario.reading import dump
 from undertow.simulation.executors import make_executor
+from undertow.studies.campaign.prepare import Prepared
+from undertow.studies.campaign.run_campaign import STORE, Tally, Watch, run_campaign
+from undertow.studies.campaign.store_results import load
 
 
 class _Advised(Protocol):

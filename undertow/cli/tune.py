@@ -21,9 +21,9 @@ from undertow.core.json_text import to_json
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.reading import read
-from undertow.tuning.cost import times_other
-from undertow.tuning.objective import Step
-from undertow.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
+from undertow.studies.tuning.cost import times_other
+from undertow.studies.tuning.objective import Step
+from undertow.studies.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
 _CHECKPOINT = "tuning.jsonl"

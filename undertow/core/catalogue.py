@@ -21,22 +21,11 @@ from typing import Any
 from undertow.core import checks
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.part_packages import PACKAGE_OF
 from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import MODULE_PREFIX, fault_of
 
-KINDS = (
-    "vehicles",
-    "thrusters",
-    "power",
-    "plants",
-    "controllers",
-    "disturbances",
-    "references",
-    "sensors",
-    "navigation",
-    "supervision",
-    "faults",
-)
+KINDS = tuple(PACKAGE_OF)
 
 # Key of a scenario -> kind of its part.
 KIND_OF = {"plant": "plants", "controller": "controllers", "reference": "references"}
@@ -105,7 +94,7 @@ def publish(package_name: str) -> Callable[[str], Any]:
 
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
-    parts = collect(importlib.import_module(f"undertow.{kind}")) if kind in KINDS else {}
+    parts = collect(importlib.import_module(PACKAGE_OF[kind])) if kind in PACKAGE_OF else {}
     return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 

@@ -12,11 +12,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray, PyTree
 
 from undertow.core.actuator_model import AbstractActuatorModel, Forces
+from undertow.core.numerics.integrators import METHODS
+from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.runtime import double_outside_runs, says_single
 from undertow.core.signals import Signal
 from undertow.core.status import Status
-from undertow.numerics.integrators import METHODS
-from undertow.numerics.linear_algebra import matvec
 
 Time = Float[Array, ""]
 Outputs = Float[Array, " n"]
@@ -364,7 +364,7 @@ class AbstractContinuousController(AbstractController):
     over one sampling time and takes `substeps` steps of `method`.
     """
 
-    method: eqx.AbstractVar[str]  # of undertow.numerics.integrators
+    method: eqx.AbstractVar[str]  # of undertow.core.numerics.integrators
     substeps: eqx.AbstractVar[int]
 
     @abc.abstractmethod

@@ -7,7 +7,12 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import BodyMotion, Measurement
 from undertow.core.errors import BadInput
-from undertow.numerics.rotations import Kinematics, euler_from_rotation, quaternion_from_euler, rotation_from_quaternion
+from undertow.core.numerics.rotations import (
+    Kinematics,
+    euler_from_rotation,
+    quaternion_from_euler,
+    rotation_from_quaternion,
+)
 
 Vector6 = Float[Array, "6"]
 

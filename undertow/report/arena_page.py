@@ -4,7 +4,12 @@ import math
 import re
 from pathlib import Path
 
-from undertow.arena.leader_board import (
+from undertow.core.atomic_io import write_whole
+from undertow.report.figures.arena import arena_plots
+from undertow.report.figures.writing import save_all
+from undertow.report.formats import prose
+from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.studies.arena.leader_board import (
     BASELINE,
     Board,
     failures,
@@ -14,15 +19,10 @@ from undertow.arena.leader_board import (
     task_rows,
     vehicle_rows,
 )
-from undertow.arena.robustness import VEHICLE
-from undertow.arena.tasks import TASKS, VERSION, tolerances
-from undertow.comparison.step_time import HOW_LONG
-from undertow.comparison.tables import Rows
-from undertow.core.atomic_io import write_whole
-from undertow.report.figures.arena import arena_plots
-from undertow.report.figures.writing import save_all
-from undertow.report.formats import prose
-from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.studies.arena.robustness import VEHICLE
+from undertow.studies.arena.tasks import TASKS, VERSION, tolerances
+from undertow.studies.comparison.step_time import HOW_LONG
+from undertow.studies.comparison.tables import Rows
 
 PAGE = "leaderboard.html"
 

@@ -8,10 +8,6 @@ from typing import Any
 import numpy as np
 
 from undertow.analysis.metrics import for_people, infinite, titled_name
-from undertow.campaign.campaign_schema import Distribution
-from undertow.campaign.columns import ENDINGS
-from undertow.campaign.labels import words
-from undertow.campaign.store_results import Results
 from undertow.core.atomic_io import write_whole
 from undertow.core.status import Status
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
@@ -20,6 +16,10 @@ from undertow.report.formats import chip, ending, number, prose, quantity, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 from undertow.report.replay.replay_data import Replay
 from undertow.report.replay.replay_section import replay_looks, replay_section
+from undertow.studies.campaign.campaign_schema import Distribution
+from undertow.studies.campaign.columns import ENDINGS
+from undertow.studies.campaign.labels import words
+from undertow.studies.campaign.store_results import Results
 
 _CAPTIONS = {
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "

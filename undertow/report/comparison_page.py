@@ -6,14 +6,6 @@ from pathlib import Path
 
 import xarray as xr
 
-from undertow.campaign.store_results import Results
-from undertow.comparison.budget_tables import budget_rows, budget_sentences
-from undertow.comparison.comparison import Comparison
-from undertow.comparison.equal_budgets import EqualBudgets
-from undertow.comparison.findings import Findings
-from undertow.comparison.sentences import HOW, sentences
-from undertow.comparison.step_time import HOW_LONG, StepTime
-from undertow.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
 from undertow.core.atomic_io import write_whole
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import alike, comparison_plots
@@ -22,6 +14,14 @@ from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
 from undertow.report.replay.replay_data import Replay
 from undertow.report.replay.replay_section import replay_looks, replay_section
+from undertow.studies.campaign.store_results import Results
+from undertow.studies.comparison.budget_tables import budget_rows, budget_sentences
+from undertow.studies.comparison.comparison import Comparison
+from undertow.studies.comparison.equal_budgets import EqualBudgets
+from undertow.studies.comparison.findings import Findings
+from undertow.studies.comparison.sentences import HOW, sentences
+from undertow.studies.comparison.step_time import HOW_LONG, StepTime
+from undertow.studies.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
 
 _CAPTIONS = {
     "differences": "Each point is one trial: the metric of a {one} less that of the first {one}, with the same sample "

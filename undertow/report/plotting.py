@@ -110,6 +110,6 @@ def serve() -> None:
 
 def _plot(run: Path, width: str | None) -> Plotted:
     from undertow.report.run_figures import plotted
-    from undertow.simulation.result_files import read_record
+    from undertow.scenario.results.result_files import read_record
 
     return plotted(read_record(run), width)

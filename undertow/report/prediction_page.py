@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.analysis.metrics import for_people
-from undertow.loop.dataset import input_names
-from undertow.prediction.predict import Prediction
 from undertow.report.figures.prediction import force_label, prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
+from undertow.simulation.loop.dataset import input_names
+from undertow.studies.prediction.predict import Prediction
 
 
 class Rows(NamedTuple):

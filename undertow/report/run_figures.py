@@ -7,7 +7,7 @@ from PIL import Image
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import files_of, make_all
 from undertow.report.plotting import Plotted
-from undertow.simulation.run_result import RunRecord
+from undertow.scenario.results.run_result import RunRecord
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
 LARGE, _COLOURS = 80_000, 48

@@ -21,8 +21,8 @@ from undertow.report.run_tables import (
     transition_rows,
 )
 from undertow.scenario.reading import dump
-from undertow.simulation.run_facts import RunFacts
-from undertow.simulation.run_result import RunRecord, RunResult, lost_thrusters
+from undertow.scenario.results.run_facts import RunFacts
+from undertow.scenario.results.run_result import RunRecord, RunResult, lost_thrusters
 
 _DIGITS = 4
 

@@ -6,8 +6,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite
+from undertow.control.supervision.transition_log import Transition
 from undertow.core.metric import Metric
-from undertow.supervision.transition_log import Transition
 
 if TYPE_CHECKING:  # it loads SciPy, which a run does not need
     from undertow.analysis.linearization.response import Comparison

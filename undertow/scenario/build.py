@@ -15,6 +15,8 @@ import numpy as np
 from undertow.analysis.metrics import meanings
 from undertow.analysis.success import criterion_of
 from undertow.analysis.temporal.requirements import Requirement, requirements_of
+from undertow.control.navigation.from_sensors import SensorNavigation
+from undertow.control.supervision.supervised_controller import unsupervised
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.authority import authority_of
@@ -30,12 +32,9 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import Advice, BadInput, advice, within
 from undertow.core.metric import AbstractMetric, Metric
-from undertow.disturbances.adding import Together
-from undertow.loop import continuous
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.navigation.from_sensors import SensorNavigation
-from undertow.numerics.rounding import three_digits
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.core.numerics.rounding import three_digits
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import (
     check_fit,
@@ -53,7 +52,8 @@ from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario, validate
 from undertow.scenario.step_size import step_advice
-from undertow.supervision.supervised_controller import unsupervised
+from undertow.simulation.loop import continuous
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")

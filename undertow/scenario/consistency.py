@@ -17,8 +17,8 @@ from undertow.core.errors import Advice, BadInput, advice, joined, within
 from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
 from undertow.core.user_code import RAISED, fault_of
-from undertow.loop.closed_loop import ClosedLoop
 from undertow.scenario.schema import Initial, Loop, Window
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 # A record takes about a kilobyte, a control step some microseconds.
 MOST_RECORDS = 1_000_000

@@ -13,7 +13,7 @@ from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.param import Parameter, parameters
 from undertow.core.signals import Signal
-from undertow.plants.double_integrator import double_integrator
+from undertow.physics.plants.double_integrator import double_integrator
 from undertow.scenario import factory
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
 

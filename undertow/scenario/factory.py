@@ -16,16 +16,16 @@ from undertow.core.composite_model import parts_of
 from undertow.core.errors import BadInput, joined, known_key, within
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import RAISED, fault_of, place_of
-from undertow.faults.mode import AbstractFault
 from undertow.logs.log import Log
-from undertow.power import ESC, Battery
+from undertow.physics.faults.mode import AbstractFault
+from undertow.physics.power import ESC, Battery
+from undertow.physics.sensors.sensor import AbstractSensor
+from undertow.physics.thrusters.thruster import AbstractThruster
+from undertow.physics.vehicles.vehicle import Vehicle
 from undertow.scenario.csv_table import csv_of, read_csv, samples_of
 from undertow.scenario.log_file import read_log
 from undertow.scenario.values import checked
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
-from undertow.sensors.sensor import AbstractSensor
-from undertow.thrusters.thruster import AbstractThruster
-from undertow.vehicles.vehicle import Vehicle
 
 # Argument of a controller that applies another law to each subsystem of a plant.
 _LAW = "law"

@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
+from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, known_key, within
-from undertow.faults.injected import Faults, InputFault, PlantFault, QuantityFault
-from undertow.faults.kinds import Kind, check_pair
-from undertow.faults.mode import AbstractFault
-from undertow.faults.occurrence import Occurrence
-from undertow.faults.of_computation import ComputationFault, computed, law_of_computed
-from undertow.faults.of_sensors import SensorFault, SensorFaults
-from undertow.faults.targets import FaultTarget, checked_number, named, targets_of
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.dataset import input_names
-from undertow.navigation.from_sensors import SensorNavigation
+from undertow.physics.faults.injected import Faults, InputFault, PlantFault, QuantityFault
+from undertow.physics.faults.kinds import Kind, check_pair
+from undertow.physics.faults.mode import AbstractFault
+from undertow.physics.faults.occurrence import Occurrence
+from undertow.physics.faults.of_computation import ComputationFault, computed, law_of_computed
+from undertow.physics.faults.of_sensors import SensorFault, SensorFaults
+from undertow.physics.faults.targets import FaultTarget, checked_number, named, targets_of
 from undertow.scenario import factory
 from undertow.scenario.schema import Fault
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.dataset import input_names
 
 # Words for keys of a fault that other programs use.
 _OTHER_WORDS: dict[str, str] = dict.fromkeys(("start", "start_time", "begin", "time", "from", "t"), "onset")

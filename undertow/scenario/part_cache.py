@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from undertow.loop.loop_runs import structure
+from undertow.simulation.loop.loop_runs import structure
 
 _MOST = 512  # parts that are remembered
 

@@ -15,13 +15,13 @@ from jaxtyping import Float
 from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
-from undertow.disturbances.adding import Together
-from undertow.disturbances.current import Current
-from undertow.disturbances.gauss_markov_current import GaussMarkovCurrent
-from undertow.disturbances.surface import stated_depths
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.current import Current
+from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurrent
+from undertow.physics.disturbances.surface import stated_depths
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SAMPLES = 201  # instants at which a reference is looked at
 _LONG = 1e6  # s, by when a reference that ends has ended

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from undertow.analysis.metrics import accumulators as metric_accumulators
-from undertow.loop import continuous
-from undertow.loop.loop_runs import LoopRun, RunPlan
-from undertow.loop.sampled import AbstractAccumulator
-from undertow.numerics.random_keys import key_of_seed
+from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, in_its_precision
+from undertow.simulation.loop import continuous
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
+from undertow.simulation.loop.sampled import AbstractAccumulator
 from undertow.simulation.prepared_run import PreparedRun
 
 _STARTS = ("position", "velocity")

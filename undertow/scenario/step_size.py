@@ -10,13 +10,13 @@ from jax.flatten_util import ravel_pytree
 
 from undertow.core.errors import Advice, advice
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.continuous import flow
-from undertow.loop.outcome import Outcome
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.thrusters.thruster import AbstractThruster
+from undertow.physics.vehicles.body import Body
 from undertow.scenario.schema import Loop
-from undertow.thrusters.thruster import AbstractThruster
-from undertow.vehicles.body import Body
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.continuous import flow
+from undertow.simulation.loop.outcome import Outcome
 
 # Largest step times decay rate at which a method is stable.
 _LIMITS = {"rk4": 2.785, "euler": 2.0}

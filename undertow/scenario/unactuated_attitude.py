@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from undertow.core.runtime import double_outside_runs
-from undertow.plants.hybrid_vehicle import HybridVehicle
-from undertow.vehicles.body import Body
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.vehicles.body import Body
 
 _WEAK = 0.05  # of the strongest direction: what thrusters do less along is left to the vehicle
 _UNACTUATED = 0.5  # of a unit force or moment: what thrusters leave of it at least

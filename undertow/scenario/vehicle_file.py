@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
+from undertow.physics.vehicles.vehicle import Vehicle
 from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
 from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
-from undertow.vehicles.vehicle import Vehicle
 
 _FROM = {"weight": "mass", "buoyancy": "volume"}  # where the key itself is not given
 

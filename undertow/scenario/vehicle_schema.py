@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean, joined, known_key
 from undertow.core.measurement import BODY_AXES
-from undertow.faults.targets import is_target
+from undertow.physics.faults.targets import is_target
+from undertow.physics.vehicles.facts import Facts
+from undertow.physics.vehicles.published import Hull, Layout, assemble, inertia_about_origin
+from undertow.physics.vehicles.thruster_labels import check_own
+from undertow.physics.vehicles.vehicle import Vehicle
 from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import checked
-from undertow.vehicles.facts import Facts
-from undertow.vehicles.published import Hull, Layout, assemble, inertia_about_origin
-from undertow.vehicles.thruster_labels import check_own
-from undertow.vehicles.vehicle import Vehicle
 
 _AXES, _SIX = "forward, starboard, down", ", ".join(BODY_AXES)
 SCALARS = {"mass": "kg", "weight": "N", "gravity": "m/s^2", "buoyancy": "N", "volume": "m^3", "water_density": "kg/m^3"}

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.runtime import current_precision
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.loop.loop_runs import LoopRun, RunPlan, numbers_of
-from undertow.loop.sampled import AbstractAccumulator
-from undertow.numerics.random_keys import key_of_seed
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, numbers_of
+from undertow.simulation.loop.sampled import AbstractAccumulator
 
 
 class PreparedRun(NamedTuple):

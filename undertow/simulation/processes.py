@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from typing import Any
 
-from undertow.process_setup import prepare
+from undertow.core.process_setup import prepare
 
 # More processes would wait for each other: the longest tasks take a quarter of the time of all.
 _MOST = 4

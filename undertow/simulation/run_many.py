@@ -14,8 +14,8 @@ import jax
 import numpy as np
 
 from undertow.core import runtime
-from undertow.loop.loop_runs import outcome_of
-from undertow.loop.outcome import Outcome
+from undertow.simulation.loop.loop_runs import outcome_of
+from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.programs import ProgramCache, RunGroup, Runs
 

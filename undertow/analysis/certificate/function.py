@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.robust.estimator import Estimator
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.control.controllers.composite_law import RCAF
+from undertow.control.controllers.robust.estimator import Estimator
+from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.core.arrays import as_array
 
 PerRecord = np.ndarray  # (time,)

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.certificate.function import minimax_weight
-from undertow.controllers.composite_law import RCAF
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.control.controllers.composite_law import RCAF
+from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
 

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
-from undertow.controllers.thruster_allocation import allocate, attained
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.control.controllers.thruster_allocation import allocate, attained
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SETTLING, _STEP = 800, 5e-3  # steps and s that an actuator is given to come to its limit
 _WHOLE = 1e6  # weight of the direction: what is held is held in full proportion

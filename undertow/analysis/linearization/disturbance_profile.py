@@ -10,8 +10,8 @@ from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.core.contracts import Load, Pose
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.numerics.linear_algebra import matvec
+from undertow.core.numerics.linear_algebra import matvec
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow
 

@@ -12,8 +12,8 @@ from jaxtyping import Array
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement, Model
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.plants.reachability import lost_directions
+from undertow.physics.plants.reachability import lost_directions
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
 _SETTLING = 400  # sampling times that an actuator is given to come to a force

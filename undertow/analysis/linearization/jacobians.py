@@ -19,7 +19,7 @@ from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Load, Target, Water
 from undertow.core.measurement import with_outputs
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 Part = TypeVar("Part")
 

@@ -12,7 +12,7 @@ from undertow.analysis.linearization.linear_loop import LinearLoop, close_contin
 from undertow.analysis.linearization.minimal_realization import multipliers, visible
 from undertow.analysis.small_signal import first_crossing
 from undertow.core.errors import BadInput
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 # Inputs and signals of the controllable poles: no controller can stabilise degrees of freedom that no input moves.
 _REACHED_BY, _SHOWN_BY = ("input", "noise"), ("error", "u")

@@ -11,7 +11,7 @@ from undertow.analysis.temporal.parsing import Entries, Known, parse_formula
 from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.core.metric import Metric
 from undertow.core.status import Status
-from undertow.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 # Robustness of a run that failed at its end; one that failed earlier has less, down to twice that.
 _FAILED = -1.0

@@ -7,7 +7,7 @@ from undertow.analysis import drift, small_signal
 from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import lyapunov_residual, of_paper
 from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
-from undertow.controllers.composite_law import RCAF
+from undertow.control.controllers.composite_law import RCAF
 
 
 @register(RCAF)

@@ -11,9 +11,9 @@ from undertow.analysis.certificate import hypotheses
 from undertow.analysis.certificate.function import estimation_bound, fastest_uncertainty, of_robust
 from undertow.analysis.small_signal import of_axis
 from undertow.analysis.theory.contract import RunCertificate, SteadyWindow, Theory, register
-from undertow.controllers.law_signals import INERTIA
-from undertow.controllers.robust.knowledge import regressor_names, strongest
-from undertow.controllers.robust.robust_law import RobustRCAF
+from undertow.control.controllers.law_signals import INERTIA
+from undertow.control.controllers.robust.knowledge import regressor_names, strongest
+from undertow.control.controllers.robust.robust_law import RobustRCAF
 
 
 @register(RobustRCAF)

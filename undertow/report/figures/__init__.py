@@ -1,10 +1,7 @@
 """Figures as matplotlib objects, made from datasets and plain numbers, and their files."""
 
-from undertow.report.figures.fidelity import fidelity_figure as fidelity_figure
-from undertow.report.figures.paper import paper_figures as paper_figures
 from undertow.report.figures.run import run_figures as run_figures
 from undertow.report.figures.run import run_plots as run_plots
-from undertow.report.figures.sweep import sweep_figure as sweep_figure
 from undertow.report.figures.writing import png as png
 from undertow.report.figures.writing import save as save
 from undertow.report.figures.writing import save_all as save_all

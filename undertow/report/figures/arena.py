@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from undertow.arena.leader_board import Board, Standing
-from undertow.arena.robustness import PARAMETERS
-from undertow.arena.scores import FINEST, LOST
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
 from undertow.report.formats import plain
+from undertow.studies.arena.leader_board import Board, Standing
+from undertow.studies.arena.robustness import PARAMETERS
+from undertow.studies.arena.scores import FINEST, LOST
 
 _SHOWN = 6  # laws with a colour in the charts of robustness; the others are grey
 _COLUMNS, _WIDTH, _HEIGHT = 3, 2.6, 1.75  # panels, in

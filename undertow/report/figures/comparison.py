@@ -7,13 +7,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from undertow.analysis.metrics import for_people, output_groups, titled_name
-from undertow.comparison.findings import Findings
 from undertow.core.status import Status
 from undertow.report.figures import style
 from undertow.report.figures.campaign import beside, distributions_figure, key_height, looks_of
 from undertow.report.figures.limits import fit_log
 from undertow.report.figures.pareto import pareto_figure
 from undertow.report.figures.paths import PLANE, plan_figure
+from undertow.studies.comparison.findings import Findings
 
 _COLUMNS = 3
 _BAND = (0.05, 0.95)

@@ -8,8 +8,8 @@ import xarray as xr
 
 from undertow.report.figures.multiples import Mark
 from undertow.report.figures.recorded import input_names
-from undertow.simulation.run_facts import RunFacts
-from undertow.simulation.run_result import lost_thrusters
+from undertow.scenario.results.run_facts import RunFacts
+from undertow.scenario.results.run_result import lost_thrusters
 
 _ONSET, _FOUND = (0, (1, 1.5)), (0, (4, 2))  # dashes
 

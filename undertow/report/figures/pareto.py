@@ -5,10 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.analysis.metrics import for_people, titled_name
-from undertow.comparison.findings import Findings
-from undertow.comparison.pareto import Front
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
+from undertow.studies.comparison.findings import Findings
+from undertow.studies.comparison.pareto import Front
 
 _COLUMNS, _PALE = 2, 0.3
 _WIDE = 30.0  # ratio of largest and smallest from which on an axis is logarithmic

@@ -6,11 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.campaign.store_layout import SAMPLES
-from undertow.comparison.findings import Findings
 from undertow.core.status import Status
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
+from undertow.studies.campaign.store_layout import SAMPLES
+from undertow.studies.comparison.findings import Findings
 
 PLANE = ("north", "east")
 

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.core.contracts import AbstractPlant
-from undertow.loop.dataset import input_names
-from undertow.prediction.predict import Prediction
 from undertow.report.figures import style
+from undertow.simulation.loop.dataset import input_names
+from undertow.studies.prediction.predict import Prediction
 
 _MARKS = ("o", "s", "^", "D")
 _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#7a5c00")

@@ -11,7 +11,7 @@ from undertow.report.figures.certificate import certificate, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
-from undertow.simulation.run_facts import RunFacts
+from undertow.scenario.results.run_facts import RunFacts
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2

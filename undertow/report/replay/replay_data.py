@@ -17,12 +17,12 @@ import xarray as xr
 from undertow.core import runtime
 from undertow.core.contracts import AbstractPlant
 from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS
-from undertow.loop.closed_loop import ClosedLoop
-from undertow.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
-from undertow.plants.hybrid_vehicle import HybridVehicle
+from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.vehicles.facts import facts_of
+from undertow.physics.vehicles.vehicle import Vehicle
 from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
-from undertow.vehicles.facts import facts_of
-from undertow.vehicles.vehicle import Vehicle
+from undertow.simulation.loop.closed_loop import ClosedLoop
 
 COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7")  # of several runs; safe for colour-blind readers
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from undertow.loop.dataset import to_dataset
 from undertow.report.replay.replay_data import COLOURS, FRAMES, Replay, replay_of
 from undertow.report.replay.replay_section import not_made
 from undertow.scenario.build import Built
 from undertow.scenario.prepare import prepare
-from undertow.simulation.run_facts import hull_of
+from undertow.scenario.results.run_facts import hull_of
+from undertow.simulation.loop.dataset import to_dataset
 from undertow.simulation.run_many import run_many
 
 MOST = len(COLOURS)  # vehicles in one scene, each in a colour of its own

@@ -1,0 +1,1 @@
+"""What the computer on board does: references, control laws, navigation, supervision."""

@@ -1,0 +1,178 @@
+"""From a demanded acceleration to inputs: the path that laws with acceleration as output share.
+
+A law decides an acceleration; everything after it is common: the modelled forces are compensated, as they are at the
+velocity of the target, the model is inverted, forces are allocated within the limits of the actuators, and the
+actuators are commanded. What limits took away comes back to the law as `Given`, so that it need not wind up.
+"""
+
+import abc
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from undertow.control.controllers.options import ActuationOptions
+from undertow.control.controllers.reference_filter import FilterState, ReferenceFilter
+from undertow.control.controllers.thruster_allocation import allocate, attained
+from undertow.core import checks
+from undertow.core.actuator_model import AbstractActuatorModel
+from undertow.core.contracts import AbstractController, Measurement, Target, TrackingError
+from undertow.core.numerics.linear_algebra import matvec
+from undertow.core.param import Param, param
+
+PerAxis = Float[Array, " n"]
+
+MOTORS = ("steady", "computed")
+
+
+class Actuation(eqx.Module):
+    """How a demanded acceleration is carried out.
+
+    Raises:
+        BadInput: `actuator_rate` or `direction` not positive, or an unknown `motor`.
+    """
+
+    filter: ReferenceFilter | None
+    actuator_rate: Float[Param, ""] = param("1/s", "bandwidth of the actuator loop", symbol="lambda")
+    direction: Float[Param, ""] = param("", "cost of a departure from the desired direction relative to a loss of size")
+    feedforward: bool = eqx.field(static=True, default=True)
+    motor: str = eqx.field(static=True, default="steady")
+
+    def __check_init__(self):
+        checks.choice("motor", self.motor, MOTORS)
+        for name in ("actuator_rate", "direction"):
+            checks.positive(name, getattr(self, name))
+
+
+class ActuatedState(NamedTuple):
+    """State z: that of the law itself, and that of the path."""
+
+    law: Any
+    actuators: Any  # estimated state of the actuators
+    filter: FilterState | None
+
+
+class Given(NamedTuple):
+    """What the applied input gives."""
+
+    known: PerAxis  # modelled acceleration F + G f, m/s^2, rad/s^2
+    missing: PerAxis  # acceleration that the actuators are driven to, less the demanded one: what limits take, and
+    # along directions in which no actuator acts all of it
+    share: Float[Array, ""]  # of the demanded acceleration, along its direction, 0 to 1
+
+
+class Plan(NamedTuple):
+    """Decisions of one instant."""
+
+    actuators: Any
+    off: TrackingError
+    desired: PerAxis  # of the actuators: the demanded acceleration less what the model compensates
+    forces: Float[Array, " m"]  # for that, without limits
+    signals: dict[str, Array]
+
+
+class AbstractAccelerationLaw(AbstractController):
+    """A law given by the acceleration that it demands: `begin`, `demand` and `adapt`."""
+
+    actuation: eqx.AbstractVar[Actuation]
+
+    @abc.abstractmethod
+    def begin(self, y: Measurement, r: Target) -> PyTree:
+        """State of the law itself before the first measurement is used."""
+
+    @abc.abstractmethod
+    def demand(self, own: PyTree, y: Measurement, off: TrackingError) -> tuple[PerAxis, dict[str, Array]]:
+        """Acceleration, m/s^2 and rad/s^2, and the values of the law's signals.
+
+        Args:
+            own: state of the law.
+            y: measurement.
+            off: errors from the target after the filter of jumps, and its acceleration.
+        """
+
+    @abc.abstractmethod
+    def adapt(self, own: PyTree, y: Measurement, off: TrackingError, given: Given, dt: Float[Array, ""]) -> PyTree:
+        """State of the law one sampling time later."""
+
+    def init(self, y: Measurement, r: Target) -> ActuatedState:
+        smoothing = None if self.actuation.filter is None else self.actuation.filter.init(y.position)
+        return ActuatedState(self.begin(y, r), self._actuators().init(), smoothing)
+
+    def command(self, z: ActuatedState, y: Measurement, r: Target):
+        path, plan, actuators, effect = self.actuation, self._plan(z, y, r), self._actuators(), self._effect(y)
+        forces = allocate(effect, plan.forces, *actuators.range(plan.actuators, path.actuator_rate), path.direction)
+        u = actuators.command(plan.actuators, forces, path.actuator_rate)
+        return u, plan.signals | {"attained_share": attained(effect, plan.forces, forces)}
+
+    def advance(self, z: ActuatedState, y: Measurement, r: Target, u_applied, dt) -> ActuatedState:
+        path, plan, actuators, effect = self.actuation, self._plan(z, y, r), self._actuators(), self._effect(y)
+        heading = lambda u: actuators.target_of(plan.actuators, u, path.actuator_rate)
+        asked, going = heading(actuators.command(plan.actuators, plan.forces, path.actuator_rate)), heading(u_applied)
+        share = attained(effect, asked, going)
+        known = self._drift(y) + matvec(effect, actuators.force(plan.actuators, u_applied))
+        missing = matvec(effect, going - asked + plan.forces) - plan.desired
+        coordinates = self.model.coordinates
+        return ActuatedState(
+            law=self.adapt(z.law, y, plan.off, Given(known, missing, share), dt),
+            actuators=actuators.advance(plan.actuators, u_applied, dt),
+            filter=None if path.filter is None else path.filter.advance(z.filter, r, coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
+        )
+
+    def known_acceleration(self, z: ActuatedState, y: Measurement, u_applied) -> PerAxis:
+        actuators = self._actuators()
+        given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
+        return self._drift(y) + matvec(self._effect(y), given)
+
+    def _actuators(self) -> AbstractActuatorModel:
+        actuators = self.model.actuators
+        return actuators.quasi_static() if self.actuation.motor == "steady" else actuators
+
+    def _effect(self, y: Measurement) -> Float[Array, "n m"]:
+        return self.model.dynamics.gain(y)
+
+    def _within_reach(self, y: Measurement, values: PerAxis) -> PerAxis:
+        """What the actuators give of an acceleration: all of it, but for directions in which none acts."""
+        return matvec(self._effect(y), self.model.dynamics.invert(y, values))
+
+    def _drift(self, y: Measurement) -> PerAxis:
+        return self.model.dynamics.drift(y) if self.actuation.feedforward else jnp.zeros_like(y.position)
+
+    def _compensated(self, y: Measurement, off: TrackingError) -> PerAxis:
+        if not self.actuation.feedforward:
+            return jnp.zeros_like(y.position)
+        return self.model.drift_at_target_velocity(y, off.rate)
+
+    def _plan(self, z: ActuatedState, y: Measurement, r: Target) -> Plan:
+        dynamics, coordinates, _ = self.model
+        smoothing = self.actuation.filter
+        target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
+        off = coordinates.tracking_error(y, target)
+        acceleration, signals = self.demand(z.law, y, off)
+        desired = acceleration - self._compensated(y, off)
+        estimated = self._actuators().update_from_report(z.actuators, y.actuator)
+        return Plan(estimated, off, desired, dynamics.invert(y, desired), signals)
+
+
+def actuation_for(sampling_time: float, frequency, options: ActuationOptions = ActuationOptions()) -> Actuation:
+    """The path of a law, with its defaults.
+
+    Args:
+        sampling_time: that of the loop, s.
+        frequency: natural frequency of the closed loop, rad/s; one number or one per axis.
+        options: of the law.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    reference_frequency = options.reference_frequency
+    if reference_frequency is None:
+        reference_frequency = jnp.minimum(jnp.asarray(frequency, dtype=float) / 2, 2.0)
+    unfiltered = not checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
+    return Actuation(
+        filter=None if unfiltered else ReferenceFilter(reference_frequency),
+        actuator_rate=0.15 / sampling_time if options.actuator_rate is None else options.actuator_rate,
+        direction=options.direction,
+        feedforward=options.feedforward,
+        motor=options.motor,
+    )

@@ -1,0 +1,186 @@
+"""Linear-quadratic regulator with an integral (LQI), with the lag of the actuators in its model."""
+
+import functools
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.control.controllers.bandwidths import Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
+from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
+from undertow.control.controllers.options import ActuationOptions, DesignConditions
+from undertow.core import checks
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.numerics.riccati import regulator_gain
+from undertow.core.option_groups import flat_options
+from undertow.core.param import Param, param
+
+PerAxis = Float[Array, " n"]
+
+_LEAST_LAG = 1e-12  # s
+_INTEGRAL, _RATE = 0.1, 1.0  # weights
+
+
+class LQIState(NamedTuple):
+    """State of the law, m/s^2 and rad/s^2."""
+
+    integral: PerAxis
+    acceleration: PerAxis  # that the actuators give, from their nominal lag
+
+
+class LQI(AbstractAccelerationLaw):
+    """a = a_d + K_e e + K_v e_dot + K_q integral of e - K_a (a_given - a_d), gains of the discrete Riccati equation.
+
+    One axis is x_ddot = a_given + load, tau a_given_dot + a_given = a, sampled with a held. The gains minimise the sum
+    of (rho w^3 q)^2 + (w^2 e)^2 + (sigma w e_dot)^2 + a^2, with q the integral of e. Without lag and for a short
+    sampling time they are K_q = rho w^3, K_v^2 = 2 K_e + (sigma w)^2 and K_e^2 = w^4 + 2 K_q K_v.
+
+    Raises:
+        BadInput: a number of the wrong sign.
+    """
+
+    model: Model
+    actuation: Actuation
+    frequency: Float[Param, "..."] = param(
+        "rad/s", "frequency at which an error costs as much as the input", symbol="w", range=(0.1, 30.0)
+    )
+    integral_weight: Float[Param, "..."] = param("", "weight of the integral", symbol="rho", range=(0.01, 1.0))
+    rate_weight: Float[Param, "..."] = param("", "weight of the rate of the error", symbol="sigma", range=(0.1, 10.0))
+    lag: Float[Param, ""] = param("s", "nominal time constant of the actuators", symbol="tau")
+    sampling_time: Float[Param, ""] = param("s", "sampling time of the design", symbol="T")
+    gains: Float[Param, "*#n 4"] = param(
+        "1/s^3, 1/s^2, 1/s, -", "gains on integral, error, rate and given acceleration", symbol="K"
+    )
+
+    def __check_init__(self):
+        for name in ("frequency", "integral_weight", "rate_weight"):
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
+            checks.positive(name, getattr(self, name))
+        checks.not_negative("lag", self.lag, "s")
+        checks.positive("sampling_time", self.sampling_time, "s")
+
+    def begin(self, y: Measurement, r: Target) -> LQIState:
+        return LQIState(jnp.zeros_like(y.position), jnp.zeros_like(y.position))
+
+    def demand(self, own: LQIState, y: Measurement, off: TrackingError):
+        error, rate, acceleration = off
+        _, of_error, of_rate, of_given = jnp.moveaxis(self.gains, -1, 0)
+        demanded = acceleration + of_error * error + of_rate * rate + own.integral
+        return demanded - of_given * (own.acceleration - acceleration), {"estimate": -own.integral / (1 + of_given)}
+
+    def adapt(self, own: LQIState, y: Measurement, off: TrackingError, given: Given, dt) -> LQIState:
+        """State one sampling time later; what limits take away is given back to the integral, as in `pid`."""
+        of_integral, _, of_rate, _ = jnp.moveaxis(self.gains, -1, 0)
+        back = jnp.minimum(jnp.sqrt(of_integral / of_rate), 1 / dt) * given.missing
+        driven, _ = self.demand(own, y, off)
+        reached = -jnp.expm1(-dt / jnp.maximum(self.lag, _LEAST_LAG))
+        return LQIState(
+            own.integral + dt * (of_integral * off.error + back),
+            own.acceleration + reached * (driven + given.missing - own.acceleration),
+        )
+
+    def signals(self):
+        return ESTIMATE | ATTAINED_SHARE
+
+
+def lqi_gains(frequency, integral_weight, rate_weight, lag, dt) -> Float[Array, "4"]:
+    """Gains on the integral (1/s^3), error (1/s^2), its rate (1/s) and the given acceleration, of one axis."""
+    kept = jnp.exp(-dt / jnp.maximum(lag, _LEAST_LAG))
+    moved = lag * (1 - kept)  # integral of the decaying part, and the integral of that
+    drift = lag * (dt - moved)
+    zero, one = jnp.zeros_like(dt), jnp.ones_like(dt)
+    # State: integral, error, rate of the error, given acceleration; the last one lowers the rate.
+    transition = jnp.stack(
+        [
+            jnp.stack([one, dt, zero, zero]),
+            jnp.stack([zero, one, dt, -drift]),
+            jnp.stack([zero, zero, one, -moved]),
+            jnp.stack([zero, zero, zero, kept]),
+        ]
+    )
+    entry = jnp.stack([zero, -(dt**2 / 2 - drift), -(dt - moved), 1 - kept])
+    weight = jnp.stack([integral_weight * frequency**3, frequency**2, rate_weight * frequency, zero]) ** 2
+    gain = regulator_gain(transition, entry, jnp.diag(weight))
+    return gain * jnp.asarray([-1.0, -1.0, -1.0, 1.0])
+
+
+@eqx.filter_jit
+def _gains_of_axes(frequency, integral_weight, rate_weight, lag, dt) -> Float[Array, "k 4"]:
+    frequency, integral_weight, rate_weight = jnp.broadcast_arrays(frequency, integral_weight, rate_weight)
+    return jax.vmap(lqi_gains, (0, 0, 0, None, None))(frequency, integral_weight, rate_weight, lag, dt)
+
+
+@functools.lru_cache(maxsize=1024)
+def lqi_frequency(axis: Axis, integral_weight: float, rate_weight: float, lag: float) -> float:
+    """Frequency w of the law with these weights, designed for this lag (s), by the rule of `bandwidths.py`, rad/s."""
+    dt = axis.sampling_time
+    with jax.ensure_compile_time_eval():
+        numbers = (jnp.asarray(value, dtype=float) for value in (integral_weight, rate_weight, lag, dt))
+        gains = np.asarray(_gains_of_axes(jnp.asarray(bandwidth_grid(axis), dtype=float), *numbers))
+
+    def law(_, s):
+        kept = np.exp(-dt / max(lag, _LEAST_LAG))
+        of_integral, of_error, of_rate, of_given = (column[:, None] for column in gains.T)
+        inner = 1 + of_given * (1 - kept) / (np.exp(s * dt) - kept)
+        return Law((of_error + of_integral / s) / inner, of_rate / inner)
+
+    return best_frequency(axis, law)
+
+
+@flat_options("motor", "actuator_rate")
+def lqi(
+    model: Model,
+    *,
+    conditions: DesignConditions = DesignConditions(),
+    frequency=None,
+    integral_weight=_INTEGRAL,
+    rate_weight=_RATE,
+    lag: float | None = None,
+    actuation: ActuationOptions = ActuationOptions(),
+) -> LQI:
+    """Linear-quadratic regulator with an integral, about trim: Anderson and Moore (1990). Body axes.
+
+    The model of an axis is a double integrator behind the nominal lag of the actuators; weight, buoyancy and drag are
+    compensated, so that it is the same at every trim. Couplings between axes are those that the inverse of the model
+    leaves.
+
+    Args:
+        model: nominal model, from `plant.model()`.
+        frequency: w, at which an error costs as much as the input, rad/s; one number or one per axis. None: the one of
+            least predicted cost that keeps the margins of `bandwidths.py`.
+        integral_weight: rho, weight of the integral of the error relative to w^3.
+        rate_weight: sigma, weight of its rate relative to w.
+        lag: nominal time constant of the actuators, s; None: that of the model. 0 for a double integrator alone.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of w, 2 at most; 0 for no filter.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    model = model.in_body_axes()
+    axes = axes_of(model, conditions)
+    known = (axes[0].lag or 0.0) if lag is None else lag
+    if frequency is None:
+        given = ((integral_weight, _INTEGRAL), (rate_weight, _RATE), (known, 0.0))
+        nominal = [float(np.max(value)) if checks.known(value) else usual for value, usual in given]
+        frequency = alike([lqi_frequency(axis, *nominal) for axis in axes])
+    for name, value in (("frequency", frequency), ("integral_weight", integral_weight), ("rate_weight", rate_weight)):
+        checks.per_axis(name, value, len(axes))
+        checks.positive(name, value)
+    checks.not_negative("lag", known, "s")
+    numbers = (jnp.asarray(value, dtype=float) for value in (frequency, integral_weight, rate_weight))
+    rows = jnp.broadcast_arrays(jnp.zeros(len(axes)), *numbers)[1:]
+    gains = _gains_of_axes(*rows, *(jnp.asarray(value, dtype=float) for value in (known, conditions.sampling_time)))
+    return LQI(
+        model=model,
+        actuation=actuation_for(conditions.sampling_time, frequency, actuation),
+        frequency=frequency,
+        integral_weight=integral_weight,
+        rate_weight=rate_weight,
+        lag=known,
+        sampling_time=conditions.sampling_time,
+        gains=gains,
+    )

@@ -1,0 +1,187 @@
+"""A neural network that learns the uncertainty while it controls, with guaranteed bounds: Lewis et al. (1996)."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, ROBUST_TERM
+from undertow.control.controllers.options import ActuationOptions, DesignConditions
+from undertow.core import checks
+from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.errors import BadInput
+from undertow.core.numerics.linear_algebra import matvec, safe_sqrt
+from undertow.core.option_groups import flat_options
+from undertow.core.param import Param, param
+from undertow.core.signals import Signal
+
+PerAxis = Float[Array, " n"]
+
+_WHOLE = 0.999  # an attained share below this means that limits bind
+_SIZE = {"weights_size": Signal((), "1", "Frobenius norm of all weights of the network")}
+
+
+class Weights(NamedTuple):
+    """State of the law: the weights of the network."""
+
+    output: Float[Array, "hidden+1 n"]  # W, m/s^2, rad/s^2; the first row is a bias
+    hidden: Float[Array, "inputs hidden"]  # V; the first row is a bias
+
+
+class Seen(NamedTuple):
+    """The network at one instant."""
+
+    filtered: PerAxis  # r = e_dot + Lambda e, m/s, rad/s
+    inputs: Float[Array, " inputs"]  # x
+    layer: Float[Array, " hidden"]  # sigma(V^T x), without the bias
+    size: Float[Array, ""]  # |Z|_F
+
+
+class Neural(AbstractAccelerationLaw):
+    """a = a_d + Lambda e_dot + K_v r + W^T sigma(V^T x) + K_z (|Z|_F + Z_M) r with r = e_dot + Lambda e.
+
+    W_dot = F sigma r^T - F sigma' V^T x r^T - kappa F |r| W, V_dot = G x (sigma'^T W r)^T - kappa G |r| V, by Euler's
+    method. Inputs x: 1, e, e_dot, the velocity, the acceleration of the target, and the sines of positions that are
+    angles. Nothing is learnt while limits bind, nor from errors that no input moves. The tracking error and the weights
+    are ultimately bounded.
+
+    Raises:
+        BadInput: a gain of the wrong sign.
+    """
+
+    model: Model
+    actuation: Actuation
+    start: Float[Array, "inputs hidden"]  # V at the start
+    slope: Float[Param, "..."] = param("1/s", "pole of the filtered error", symbol="Lambda", range=(0.1, 30.0))
+    gain: Float[Param, "..."] = param("1/s", "gain of the filtered error", symbol="K_v", range=(0.1, 30.0))
+    adaptation: Float[Param, "..."] = param(
+        "1/s^2", "adaptation gain of the output layer", symbol="F", range=(1e-3, 30.0)
+    )
+    hidden_adaptation: Float[Param, ""] = param("", "adaptation gain of the hidden layer", symbol="G")
+    e_modification: Float[Param, ""] = param("", "decay of the weights with the error", symbol="kappa")
+    robust_gain: Float[Param, ""] = param("1/s", "gain of the robust term per size of the weights", symbol="K_z")
+    weights_bound: Float[Param, ""] = param("", "bound of the size of the ideal weights", symbol="Z_M")
+
+    def __check_init__(self):
+        for name in ("slope", "gain"):
+            checks.positive(name, getattr(self, name), "1/s")
+        for name in ("adaptation", "hidden_adaptation", "e_modification", "robust_gain", "weights_bound"):
+            checks.not_negative(name, getattr(self, name))
+        for name in ("slope", "gain", "adaptation"):
+            checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
+
+    def begin(self, y: Measurement, r: Target) -> Weights:
+        return Weights(jnp.zeros((self.start.shape[1] + 1, y.position.shape[0])), self.start)
+
+    def demand(self, own: Weights, y: Measurement, off: TrackingError):
+        seen = self._seen(own, y, off)
+        learnt = own.output[0] + matvec(own.output[1:].T, seen.layer)
+        robust = self.robust_gain * (seen.size + self.weights_bound) * seen.filtered
+        demanded = off.acceleration + self.slope * off.rate + self.gain * seen.filtered + learnt + robust
+        return demanded, {"estimate": -learnt, "robust_term": robust, "weights_size": seen.size}
+
+    def adapt(self, own: Weights, y: Measurement, off: TrackingError, given: Given, dt) -> Weights:
+        seen = self._seen(own, y, off)
+        inner = seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
+        r = self._within_reach(y, seen.filtered)  # an error that no input moves would be learnt for ever
+        size = safe_sqrt((r**2).sum())
+        regressor = jnp.concatenate([jnp.ones(1), seen.layer - inner * matvec(own.hidden.T, seen.inputs)])
+        by_output = (self.adaptation * r)[None, :] * regressor[:, None] - (
+            self.e_modification * size * self.adaptation * own.output
+        )
+        back = inner * matvec(own.output[1:], r)
+        by_hidden = self.hidden_adaptation * (
+            seen.inputs[:, None] * back[None, :] - self.e_modification * size * own.hidden
+        )
+        step = jnp.where(given.share < _WHOLE, 0.0, dt)
+        return Weights(own.output + step * by_output, own.hidden + step * by_hidden)
+
+    def signals(self):
+        return ESTIMATE | ROBUST_TERM | _SIZE | ATTAINED_SHARE
+
+    def _seen(self, own: Weights, y: Measurement, off: TrackingError) -> Seen:
+        inputs = _inputs(self.model, y, off)
+        layer = jax.nn.sigmoid(matvec(own.hidden.T, inputs))
+        size = safe_sqrt((own.output**2).sum() + (own.hidden**2).sum())
+        return Seen(off.rate + self.slope * off.error, inputs, layer, size)
+
+
+@flat_options()
+def neural(
+    model: Model,
+    *,
+    conditions: DesignConditions = DesignConditions(),
+    hidden: int = 8,
+    seed: int = 0,
+    slope=None,
+    gain=None,
+    adaptation=None,
+    hidden_adaptation=1.0,
+    e_modification=0.1,
+    robust_gain=0.02,
+    weights_bound=10.0,
+    actuation: ActuationOptions = ActuationOptions(),
+) -> Neural:
+    """Neural-network control with e-modification: Lewis, Yesildirek and Liu (1996). Body axes.
+
+    The network learns the part of the acceleration that the model lacks, without training beforehand; at the start it
+    gives zero. The weights are tuned by the source's modified backpropagation, for which it proves bounds of error and
+    weights. Unlike there, the mass matrix is that of the model and not learnt, and the target's position and velocity
+    are inputs only through the errors.
+
+    Args:
+        model: nominal model, from `plant.model()`.
+        hidden: neurons of the hidden layer.
+        seed: of the hidden weights at the start, uniform within 0.5 over the root of the number of inputs.
+        slope: Lambda, pole of the filtered error, 1/s; one number or one per axis. None: the frequency of `pid`.
+        gain: K_v, gain of the filtered error, 1/s; None: the frequency of `pid`.
+        adaptation: F, adaptation gain of the output layer, 1/s^2; None: a quarter of K_v Lambda over hidden / 4 + 1,
+            so that the bias and the neurons together act on a constant load as an integral gain of that quarter.
+        hidden_adaptation: G, adaptation gain of the hidden layer.
+        e_modification: kappa, decay of the weights with the size of the filtered error.
+        robust_gain: K_z, gain of the robust term per size of the weights, 1/s.
+        weights_bound: Z_M, bound of the size of the ideal weights.
+        reference_frequency: that of the filter of reference jumps, rad/s; None: half of sqrt(K_v Lambda), 2 at most;
+            0 for no filter.
+
+    Raises:
+        BadInput: a value is out of its range.
+    """
+    if hidden < 1:
+        raise BadInput("hidden", "be at least 1", hidden)
+    model = model.in_body_axes()
+    if slope is None or gain is None:
+        axes = axes_of(model, conditions)
+        w = alike([pid_frequency(axis) for axis in axes])
+        slope, gain = w if slope is None else slope, w if gain is None else gain
+    for name, value in (("slope", slope), ("gain", gain)):
+        checks.positive(name, value, "1/s")
+    stiffness = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
+    still = jnp.zeros(len(model.coordinates.angles))
+    resting = model.coordinates.measurement(still, still)
+    count = eqx.filter_eval_shape(_inputs, model, resting, TrackingError(still, still, still)).shape[0]
+    spread = 0.5 / np.sqrt(count)
+    return Neural(
+        model=model,
+        actuation=actuation_for(conditions.sampling_time, jnp.sqrt(stiffness), actuation),
+        start=jnp.asarray(np.random.default_rng(seed).uniform(-spread, spread, (count, hidden))),
+        slope=slope,
+        gain=gain,
+        adaptation=stiffness / (hidden + 4) if adaptation is None else adaptation,
+        hidden_adaptation=hidden_adaptation,
+        e_modification=e_modification,
+        robust_gain=robust_gain,
+        weights_bound=weights_bound,
+    )
+
+
+def _inputs(model: Model, y: Measurement, off: TrackingError) -> Float[Array, " inputs"]:
+    """Inputs x of the network."""
+    turning = np.flatnonzero(np.array(model.coordinates.angles))
+    sines = jnp.sin(y.position[turning])
+    return jnp.concatenate([jnp.ones(1), off.error, off.rate, model.coordinates.velocity(y), off.acceleration, sines])

@@ -1,0 +1,84 @@
+"""Drift of the observer's estimate where no sensor measures an output itself, only its rate.
+
+The errors are those of white noise and constant offsets that are integrated: a rate once, an acceleration twice.
+Inclination errors count as accelerations: gravity times the angle. With a sensor of velocity, an error of the
+acceleration acts for period / dvl_blend only. What else there is adds to it, so that the drift is at least this large.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jax.typing import ArrayLike
+
+from undertow.physics.sensors.imu import IMU
+from undertow.physics.sensors.motion import gravity
+from undertow.physics.sensors.sensor import AbstractSensor, AbstractVelocitySensor
+
+_REMEDIES = {"north and east": "position_fix", "down": "depth", "yaw": "compass"}
+
+
+class _Error(NamedTuple):
+    """An error that is integrated: density of its white part (unit^2 s), and its offset (unit)."""
+
+    density: float
+    offset: float
+
+
+def drift_advice(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: float) -> tuple[str, ...]:
+    """A sentence where an output drifts in `duration` (s), with the sensors that prevent it."""
+    found = drifts(sensors, dvl_blend, duration)
+    if not found:
+        return ()
+    sizes = {
+        what: f"{np.degrees(size):.2g} degrees" if what == "yaw" else f"{size:.2g} m" for what, size in found.items()
+    }
+    far = " and ".join(f"{size} ({what})" for what, size in sizes.items())
+    remedies = " and ".join(f"`{_REMEDIES[what]}`" for what in found)
+    unbiased = not any(np.any(np.asarray(one.sampling.bias)) for one in sensors)
+    alone = " by noise alone, to which the biases of real sensors add" if unbiased else ""
+    return (
+        f"no sensor measures {', '.join(found)}: the estimate drifts by about {far} in {duration:g} s, one standard "
+        f"deviation{alone}. Add {remedies} to `navigation.sensors`",
+    )
+
+
+def drifts(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: float) -> dict[str, float]:
+    """Standard deviation of the error (m, rad) after `duration` (s) of what no sensor measures.
+
+    Empty where a sensor does not say what it measures, or without an IMU.
+    """
+    imu = next((one for one in sensors if isinstance(one, IMU)), None)
+    if imu is None or any(one.fixes is None for one in sensors):
+        return {}
+    fixed = {output for one in sensors for output in one.fixes or ()}
+    noise, bias = (np.broadcast_to(np.asarray(one, dtype=float), 8) for one in (imu.sampling.noise, imu.sampling.bias))
+    g, period = float(gravity()[2]), float(imu.sampling.period)
+    error = lambda index, of_gravity: _Error(
+        period * (noise[index] ** 2 + (of_gravity * noise[0]) ** 2), float(np.hypot(bias[index], of_gravity * bias[0]))
+    )
+    found = {}
+    if not {"north", "east"} <= fixed:
+        found["north and east"] = _of_position(sensors, dvl_blend, error(5, g), 0, duration)
+    if "down" not in fixed:
+        found["down"] = _of_position(sensors, dvl_blend, error(7, 0.0), 2, duration)
+    if "yaw" not in fixed:
+        found["yaw"] = _once(error(4, 0.0), duration)
+    return {what: float(drift) for what, drift in found.items() if drift > 0}
+
+
+def _of_position(
+    sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, acceleration: _Error, axis: int, duration: float
+) -> float:
+    """With the first sensor of velocity, or from the acceleration alone."""
+    for one in sensors:
+        if isinstance(one, AbstractVelocitySensor) and np.isfinite(noise := float(one.velocity_noise()[axis])):
+            held = float(np.asarray(one.sampling.period) / np.asarray(dvl_blend))
+            offset = float(np.ravel(np.broadcast_to(np.asarray(one.sampling.bias, dtype=float), 3))[axis])
+            density = float(one.sampling.period) * noise**2 + acceleration.density * held**2
+            return _once(_Error(density, float(np.hypot(offset, acceleration.offset * held))), duration)
+    return float(np.sqrt(acceleration.density * duration**3 / 3 + (acceleration.offset * duration**2 / 2) ** 2))
+
+
+def _once(rate: _Error, duration: float) -> float:
+    return float(np.sqrt(rate.density * duration + (rate.offset * duration) ** 2))

@@ -1,5 +1,0 @@
-"""Estimation of the lumped uncertainty: the fuzzy system and the identification model whose error is its input."""
-
-from undertow.estimation.fuzzy_system import FuzzySystem as FuzzySystem
-from undertow.estimation.fuzzy_system import gaussian_sets as gaussian_sets
-from undertow.estimation.series_parallel import SeriesParallel as SeriesParallel

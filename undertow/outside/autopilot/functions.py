@@ -1,0 +1,88 @@
+"""The functions of a controller that is stepped: its first step, the following ones, its output, the reference."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.contracts import AbstractController, Measurement, Target
+from undertow.core.numerics.random_keys import key_of_seed
+from undertow.outside.autopilot.measured_motion import Format, Motion
+from undertow.outside.autopilot.output import Output
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.controller_step import Answer, Memory, first_step, next_step
+
+
+class Given(NamedTuple):
+    """What a step is given.
+
+    Attributes:
+        motion: as measured.
+        actuator: what the actuators report; None or a tree.
+        target: to follow.
+        health: of the actuators, see `Measurement`; None for a loop in which none announces anything.
+    """
+
+    motion: Motion
+    actuator: Any
+    target: Target
+    health: Any = None
+
+
+class Functions:
+    """Functions of parts and arrays that JAX can trace, and examples of their arguments in the present precision.
+
+    Args:
+        loop: with the controller.
+        form: of measured motions; for a plant that is no vehicle it does not matter.
+        output: conversion of the command.
+
+    Attributes:
+        form: None for a plant that is no vehicle.
+        given, applied, time: examples.
+    """
+
+    def __init__(self, loop: ClosedLoop, form: Format, output: Output):
+        self.controller, self.output, self.reference = loop.controller, output, loop.reference
+        truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
+        self.form = None if truth.body is None else form
+        kind = jax.dtypes.canonicalize_dtype(float)
+        number = lambda shape: np.zeros(shape, dtype=kind)
+        zero: Any = number(len(loop.plant.outputs))
+        motion = Motion(zero, number(0), zero)
+        if self.form is not None:
+            names = form.columns()
+            upright = np.array([float(name == "w") for name in names.attitude], dtype=kind)
+            motion = Motion(number(3), upright, number(len(names.velocity)))
+        actuator = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), truth.actuator)
+        self.given = Given(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
+        self.applied, self.time = number(loop.plant.inputs()), number(())
+
+    def first(self, law: AbstractController, given: Given) -> tuple[Memory, Answer]:
+        """The step with which control begins."""
+        return first_step(law, self._measured(law, given), given.target)
+
+    def following(self, law: AbstractController, memory: Memory, given: Given, applied: Any, dt: Any):
+        """A step `dt` (s) after the last one."""
+        return next_step(law, memory, self._measured(law, given), given.target, applied, dt)
+
+    def _measured(self, law: AbstractController, given: Given):
+        measured = given.motion.measurement(law.model.coordinates, self.form, given.actuator)
+        return measured._replace(health=given.health)
+
+
+def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
+    """Health of actuators that all work; None where nobody announces anything, or would listen."""
+    if loop.controller.takes_raw_readings:
+        return np.ones(loop.plant.inputs(), dtype=jax.dtypes.canonicalize_dtype(float))
+    if loop.faults is None:
+        return None
+    faults, key = loop.faults, key_of_seed(0)
+
+    def health(truth: Measurement):
+        realization = faults.realize(key)
+        state = faults.init(realization, truth, jnp.zeros(loop.plant.inputs()))
+        return faults.measurement(realization, state, jnp.zeros(()), truth)[0].health
+
+    return jax.tree.map(lambda one: np.ones(one.shape, one.dtype), jax.eval_shape(health, truth))

@@ -1,0 +1,254 @@
+"""Episodes of any number of vehicles, started and stepped together: what environments of one and of many share."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from undertow.control.controllers.policy_interface import PolicyInterface, policy_interface_of
+from undertow.core import checks, runtime
+from undertow.core.contracts import Outputs
+from undertow.core.errors import BadInput
+from undertow.core.numerics.integrators import METHODS
+from undertow.core.numerics.random_keys import key_of_seed
+from undertow.core.status import Status
+from undertow.outside.gymnasium.variants import Vary, variants_of
+from undertow.scenario import factory
+from undertow.scenario.build import build
+from undertow.scenario.reading import from_data, read
+from undertow.simulation.loop import plant_step
+from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
+from undertow.simulation.loop.outcome import Ending, going
+from undertow.simulation.loop.plant_step import PlantState
+from undertow.simulation.loop.recording import freeze_on_failure, instant
+from undertow.simulation.loop.stepped_batch import BatchStep, Starter
+
+
+class Cost(NamedTuple):
+    """Quadratic cost of a step, whose negative is the reward.
+
+    |e_p|^2 / position^2 + |e_a|^2 / angle^2 + effort mean(a^2) + variation mean((a - a_before)^2), with the tracking
+    errors e_p and e_a of the true state after the step and the action a as a share of its bound. Where the episode
+    fails, `failure` is added once.
+    """
+
+    position: float = 1.0  # error with a cost of one, m
+    angle: float = 1.0  # rad
+    effort: float = 0.01
+    variation: float = 0.01
+    failure: float = 100.0
+
+    def check(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            BadInput: a scale is not positive, or a weight is negative.
+        """
+        for name in ("position", "angle"):
+            checks.positive(f"cost.{name}", getattr(self, name))
+        for name in ("effort", "variation", "failure"):
+            checks.not_negative(f"cost.{name}", getattr(self, name))
+
+
+class Plan(NamedTuple):
+    """What all episodes share, and what is not traced."""
+
+    interface: PolicyInterface
+    cost: Cost
+    dt: float
+    method: str
+    substeps: int
+
+
+class _Known(NamedTuple):
+    """Numbers of one episode."""
+
+    loop: ClosedLoop
+    start: tuple[Outputs, Outputs]
+    key: Any
+
+
+class _State(NamedTuple):
+    """State of one episode."""
+
+    vehicle: PlantState
+    action: Any  # the one before
+    observation: Any
+    step: Any
+    ending: Ending
+
+
+class Seen(NamedTuple):
+    """What a step shows, with a leading axis over episodes."""
+
+    observation: Any
+    reward: Any
+    status: Any  # a Status code
+    position: Any  # true outputs, m and rad
+    error: Any  # tracking error of the true state, m and rad
+
+
+class Episodes:
+    """A number of episodes of one scenario that are started and stepped together.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping. Its controller is left out.
+        count: how many.
+        action: what actions mean, see `PolicyInterface`.
+        scale: input that a normalised action of 1 stands for, in its unit; None for its limit.
+        cost: of a step.
+        vary: key path -> distribution, as in campaigns: what differs from episode to episode beside the seed.
+        variants: how many sets of varied values there are; an episode takes one of them by its seed.
+        allow_code: whether the Python code that an earlier run.nc names may run.
+
+    Attributes:
+        interface: meaning of observations and actions.
+        steps: of an episode, until its time is over.
+        dt: sampling time, s.
+        dtype: of observations, by the precision of the scenario.
+        backend: `simd` or `xla`.
+
+    Raises:
+        BadInput: something given cannot be used.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | Mapping[str, Any],
+        count: int,
+        action: str = "normalised",
+        scale: Any = None,
+        cost: Cost | Mapping[str, float] | None = None,
+        vary: Vary | None = None,
+        variants: int = 64,
+        allow_code: bool = False,
+    ):
+        text = from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario), allow_code=allow_code)
+        built = build(text)
+        settings = built.scenario.loop
+        if settings.kind != "sampled":
+            raise BadInput("loop.kind", "be sampled for an environment", settings.kind)
+        weights = _cost(cost)
+        self.dt, self.steps = settings.dt, round(settings.duration / settings.dt)
+        self._precision = built.scenario.precision
+        self.dtype = np.dtype(self._precision)
+        with runtime.on_processor(), runtime.in_precision(self._precision):
+            model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model.options, folder=text.folder)
+            self.interface = policy_interface_of(model, action, scale)
+            plan = Plan(self.interface, weights, settings.dt, settings.method, settings.substeps)
+            found, constant = variants_of(built, vary or {}, variants)
+            leaves = [jax.tree.leaves(eqx.filter(one, eqx.is_array)) for one in found]
+            self._numbers = [np.stack(column) for column in zip(*leaves, strict=True)]
+            self._compile(plan, _Known(*found[0], key_of_seed(0)), constant, count)
+
+    def _compile(self, plan: Plan, known: _Known, constant: list[bool], count: int) -> None:
+        arrays, rest = eqx.partition(known, eqx.is_array)
+        whole = lambda arrays: eqx.combine(arrays, rest)
+        self._form = jax.tree.structure(arrays)
+
+        def prepare(arrays: Any) -> tuple[Realization, Any]:
+            known = whole(arrays)
+            return known.loop.realize(known.key), known.start
+
+        def begin(prepared: tuple[Realization, Any]) -> Any:
+            realization, start = prepared
+            return eqx.filter(realization, eqx.is_array), _begin(plan, realization, start)
+
+        self._starter = Starter(prepare, begin, arrays, [*constant, False])
+        realized, (state, _) = self._starter(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
+        realized, state = jax.tree.map(lambda leaf: leaf[0], (realized, state))
+        still = eqx.filter(known.loop.realize(known.key), eqx.is_array, inverse=True)
+        of_loop = len(jax.tree.leaves(eqx.filter(known.loop, eqx.is_array)))
+        self._same = [*constant[:of_loop], *[False] * (len(jax.tree.leaves(realized)) - of_loop)]
+        action = np.asarray(plan.interface.first())
+        function = lambda realized, state, action: _step(plan, eqx.combine(realized, still), state, action)
+        self._stepper = BatchStep(function, realized, state, action, count, self._same)
+        self.backend = self._stepper.backend
+
+    def start(self, seeds: NDArray, which: NDArray) -> Seen:
+        """Begin episodes.
+
+        Args:
+            seeds: of everything random in them, as `seed` of a scenario; shape (k,).
+            which: numbers of the episodes, shape (k,).
+        """
+        variant = seeds % len(self._numbers[0])
+        numbers = [*(column[variant] for column in self._numbers), _keys(seeds)]
+        with runtime.on_processor(), runtime.in_precision(self._precision):
+            realized, (state, seen) = self._starter(jax.tree.unflatten(self._form, numbers))
+        varying = [leaf for leaf, same in zip(jax.tree.leaves(realized), self._same, strict=True) if not same]
+        self._stepper.put("numbers", varying, which)
+        self._stepper.put("state", state, which)
+        return seen
+
+    def step(self, actions: NDArray) -> Seen:
+        """One step of every episode; those that have failed stay as they are."""
+        self._stepper.put("inputs", actions)
+        return self._stepper()
+
+
+def _begin(plan: Plan, realization: Realization, start: Any) -> tuple[_State, Seen]:
+    zero, action = jnp.zeros(()), plan.interface.first()
+    vehicle, seen = plant_step.begin(realization, start)
+    r = realization.loop.reference.at(zero)
+    blank = jnp.concatenate([jnp.zeros(len(plan.interface.bounds())), action])
+    observation = _observed(plan, seen.measurement, r, action, blank)
+    state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), going())
+    error = plan.interface.coordinates.difference(r.position, seen.truth.position)
+    return state, Seen(observation, zero, state.ending.status, seen.truth.position, error)
+
+
+def _step(plan: Plan, realization: Realization, state: _State, action: Any) -> tuple[_State, Seen]:
+    """As `sampled.control_step`, with the command of an action in place of a law's."""
+    loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
+    t, before = instant(state.step, dt), state.vehicle
+    action = interface.within_bounds(action)
+    command = interface.command(action)
+    applied = loop.plant.admissible(before.plant, command)
+    vehicle = plant_step.hold(realization, before, t, dt, applied, METHODS[plan.method], plan.substeps)
+    states = (before.plant, ()), (vehicle.plant, ())
+    (x, _), ending = freeze_on_failure(loop, *states, state.ending, t, dt, command)
+    now = instant(state.step + 1, dt)
+    vehicle, seen = plant_step.observe(realization, vehicle._replace(plant=x), now, applied)
+    r = loop.reference.at(now)
+    observation = _observed(plan, seen.measurement, r, action, state.observation)
+    error = interface.coordinates.difference(r.position, seen.truth.position)
+    failing = (ending.status != int(Status.OK)) & (state.ending.status == int(Status.OK))
+    reward = -_cost_of(plan, error, action, state.action) - plan.cost.failure * failing.astype(float)
+    new = _State(vehicle, action, observation, state.step + 1, ending)
+    return new, Seen(observation, reward, ending.status, seen.truth.position, error)
+
+
+def _observed(plan: Plan, y: Any, r: Any, action: Any, before: Any) -> Any:
+    """The observation; entries that are not finite were not measured, and are those of the observation before."""
+    found = plan.interface.observation(y, r, action)
+    return jnp.where(jnp.isfinite(found), found, before)
+
+
+def _cost_of(plan: Plan, error: Any, action: Any, before: Any) -> Any:
+    low, high = map(jnp.asarray, plan.interface.action_bounds())
+    size = jnp.maximum(-low, high)
+    used, changed = ((part / size) ** 2 for part in (action, action - before))
+    turns = np.array(plan.interface.coordinates.angles, dtype=bool)
+    scales = jnp.asarray(np.where(turns, plan.cost.angle, plan.cost.position))
+    return ((error / scales) ** 2).sum() + plan.cost.effort * used.mean() + plan.cost.variation * changed.mean()
+
+
+def _cost(given: Any) -> Cost:
+    if isinstance(given, Mapping):
+        if unknown := set(given) - set(Cost._fields):
+            raise BadInput("cost", f"have the keys {', '.join(Cost._fields)}", ", ".join(sorted(map(str, unknown))))
+        given = Cost(**given)
+    found = Cost() if given is None else given
+    found.check()
+    return found
+
+
+def _keys(seeds: NDArray) -> NDArray:
+    """`key_of_seed` of many seeds of 32 bits: (0, seed)."""
+    return np.stack([np.zeros_like(seeds), seeds], axis=1).astype(np.uint32)

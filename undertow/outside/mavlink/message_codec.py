@@ -1,0 +1,81 @@
+"""Bytes of datagrams from MAVLink messages, and messages from bytes, with or without signatures."""
+
+from typing import Any
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from undertow.outside.mavlink.signing import SignedParser, ahead_of, present, signing_of
+
+_UNSIGNED = "Invalid signature"  # pymavlink's words for a message without a signature or with a wrong one
+
+
+class MessageCodec:
+    """Packs our messages, and parses those of others.
+
+    Args:
+        system, component: our ids.
+        key: 32 bytes with which messages are signed, and must be; None for no signatures.
+
+    Attributes:
+        counts: messages that were refused, by reason.
+    """
+
+    def __init__(self, system: int, component: int, key: bytes | None = None):
+        self._packer: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._signing = None if key is None else signing_of(key)
+        if self._signing is not None:
+            self._packer.signing = self._signing
+        self.counts = {"unsigned": 0, "wrongly signed": 0}
+
+    def packed(self, messages: list[Any]) -> list[bytes]:
+        """Messages as datagrams, numbered on."""
+        found = []
+        if self._signing is not None:
+            self._signing.timestamp = max(self._signing.timestamp, present())
+        for message in messages:
+            found.append(message.pack(self._packer))
+            self._packer.seq = (self._packer.seq + 1) % 256
+        return found
+
+    def packed_ahead(self, messages: list[Any]) -> list[bytes]:
+        """As `packed`, for datagrams that a watchdog sends later, instead of what is sent meanwhile."""
+        if self._signing is None:
+            return self.packed(messages)
+        before, self._signing.timestamp = self._signing.timestamp, ahead_of(self._signing)
+        found = self.packed(messages)
+        self._signing.timestamp = before
+        return found
+
+    def overtake(self) -> None:
+        """A watchdog may have sent what was packed ahead: what comes now is newer."""
+        if self._signing is not None:
+            self._signing.timestamp = ahead_of(self._signing, times=2)
+
+    def parsed(self, data: bytes) -> list[Any]:
+        """Messages in the bytes of a datagram; what is none is left out, and what is refused is counted."""
+        if self._signing is None:
+            return parsed(data)
+        wrong = self._signing.badsig_count
+        found = _parse(SignedParser(self._signing), data)
+        refused = sum(isinstance(one, mavlink.MAVLink_bad_data) and one.reason == _UNSIGNED for one in found)
+        wrong = self._signing.badsig_count - wrong
+        self.counts["wrongly signed"] += wrong
+        self.counts["unsigned"] += refused - wrong
+        return _known(found)
+
+
+def parsed(data: bytes) -> list[Any]:
+    """Messages in the bytes of a datagram; what is none is left out, and so are those of an unknown kind.
+
+    Without knowing the kind, pymavlink cannot check the sum of a message: random bytes pass as one.
+    """
+    return _known(_parse(mavlink.MAVLink(None), data))
+
+
+def _parse(parser: Any, data: bytes) -> list[Any]:
+    parser.robust_parsing = True
+    return parser.parse_buffer(data) or []
+
+
+def _known(found: list[Any]) -> list[Any]:
+    return [one for one in found if not isinstance(one, mavlink.MAVLink_bad_data | mavlink.MAVLink_unknown)]

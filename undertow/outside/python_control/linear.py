@@ -1,0 +1,169 @@
+"""Plant, controller and closed loop of a scenario, linearised exactly, as `StateSpace`s of python-control.
+
+The derivatives are those of automatic differentiation, at the equilibrium that `undertow analyze` uses. Limits, dead
+zones and measurement errors are left out, as there: signals are deviations from the equilibrium, inside the limits.
+
+So are states from which no output follows (counters, the energy ledger), and an attitude is three angles in place of a
+quaternion, whose length nothing can change: both are poles at the border of stability, with which Riccati equations and
+steady gains have no answer.
+"""
+
+import dataclasses
+from typing import Any
+
+import control as ct
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.core.errors import BadInput
+from undertow.outside.python_control.signals import signals_of, state_names, target_of, vector_of, vector_of_measurement
+from undertow.outside.python_control.states import LinearSystem, seen, with_angles
+from undertow.outside.python_control.systems import Scenario, built_of, computing, measurement_of, sampled_of
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.build import Built
+from undertow.studies.prediction.operating_point import operating_point
+
+
+def linear_plant(
+    scenario: Scenario, *, sampled: bool = False, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
+    """The plant of a scenario, linearised at an equilibrium.
+
+    Args:
+        scenario: a .yaml file or an earlier run.nc, the same as a mapping, or built.
+        sampled: False for continuous time; True for the sampling time, exact for an input that is held.
+        position: reference at which the loop rests, m and rad; None for that of `undertow analyze`.
+        load: constant acceleration of the outputs, m/s^2 and rad/s^2; None for zero, or for the mean one of
+            `undertow analyze` where there is no position either.
+        all_states: whether the states are those of `plant`, one by one.
+
+    Raises:
+        BadInput: the scenario cannot be used, or its loop has no equilibrium there.
+    """
+    built = _without_ledger(built_of(scenario), all_states)
+    return _plant(built, _equilibrium(built, position, load), sampled, all_states)
+
+
+def linear_controller(
+    scenario: Scenario, *, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
+    """The controller of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
+
+    Raises:
+        BadInput: as of `linear_plant`, or the loop is continuous.
+    """
+    built = _without_ledger(sampled_of(scenario, "controller"), all_states)
+    return _controller(built, _equilibrium(built, position, load), all_states)
+
+
+def linear_closed_loop(
+    scenario: Scenario, *, position: Any = None, load: Any = None, all_states: bool = False
+) -> ct.StateSpace:
+    """The closed loop of a scenario at its sampling time, linearised at an equilibrium; for arguments see above.
+
+    Raises:
+        BadInput: as of `linear_controller`.
+    """
+    built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
+    at, of = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
+    plant, law = _plant(built, at, True, all_states), _controller(built, at, all_states)
+    ends = np.cumsum([len(of.measured), len(of.desired)])
+    (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
+    u_x, shown = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
+    own = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
+    a, b = own + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
+    c, d = np.vstack([shown, u_x]), np.vstack([np.zeros((len(shown), len(of.desired))), d_r])
+    outputs, states = of.measured | of.command, plant.state_labels + law.state_labels
+    system = ct.ss(a, b, c, d, built.scenario.loop.dt)
+    return _named(system, "closed_loop", of.desired | outputs, list(of.desired), list(outputs), states)
+
+
+def _without_ledger(built: Built, all_states: bool) -> Built:
+    """The scenario with a plant that keeps no account of its energy, unless all states are asked for."""
+    plant = built.closed_loop.plant
+    if all_states or not isinstance(plant, HybridVehicle) or not plant.power.ledger:
+        return built
+    power = plant.power
+    with computing(built):
+        plain = HybridVehicle(plant.vehicle, plant.thruster, power.battery, power.esc, False, plant.inflow_loss)
+    return built._replace(closed_loop=dataclasses.replace(built.closed_loop, plant=plain))
+
+
+def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
+    loop, dt = built.closed_loop, built.scenario.loop.dt
+    axes = len(loop.plant.outputs)
+    for name, given in (("position", position), ("load", load)):
+        if given is not None and np.shape(given) != (axes,):
+            raise BadInput(
+                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(given)}"
+            )
+    with computing(built):
+        if position is None:
+            if load is not None:
+                raise BadInput("position", "be given with a load")
+            at = operating_point(built).mean
+        else:
+            at = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
+    if not at.found:
+        raise BadInput(
+            "load", "leave the loop an equilibrium", f"one in which a state changes by {at.moving:.2g} per s"
+        )
+    return at
+
+
+def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
+    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    plant, zero = loop.plant, jnp.zeros(())
+
+    def moved(state: Any, u: Any) -> Any:
+        unloaded = plant.no_load()
+        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(at.at["load"]))
+        return vector_of(plant.dynamics(zero, at.parts.plant_state(state), u, pushed))
+
+    def shown(state: Any) -> Any:
+        return vector_of_measurement(plant.output(zero, at.parts.plant_state(state)))
+
+    with computing(built):
+        state, u = jnp.asarray(at.at["plant"]), jnp.asarray(at.at["u"])
+        a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
+        c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
+        names = state_names(at.parts.plant_state(state), "plant")
+        found = LinearSystem(a, b, c, names)
+        found = found if all_states else seen(with_angles(found, np.asarray(state)))
+    system = ct.ss(found.a, found.b, found.c, np.zeros((len(c), b.shape[1])))
+    if sampled:
+        system = ct.sample_system(system, built.scenario.loop.dt, "zoh")
+    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), found.names)
+
+
+def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpace:
+    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
+    sizes = np.cumsum([len(of.measured), len(of.desired)])
+
+    def both(state: Any, given: Any) -> Any:
+        measured, desired, applied = jnp.split(given, sizes)
+        z, y, r = at.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
+        return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
+
+    with computing(built):
+        x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
+        state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
+        given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
+        (a, b), (c, d) = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given))
+        names = state_names(at.parts.law_state(state), "law")
+    found = LinearSystem(a, b, c, names)
+    found = found if all_states else seen(found)
+    inputs = of.measured | of.desired | of.applied
+    system = ct.ss(found.a, found.b, found.c, d, built.scenario.loop.dt)
+    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), found.names)
+
+
+def _named(
+    system: Any, name: str, units: dict[str, str], inputs: list[str], outputs: list[str], states: list[str]
+) -> ct.StateSpace:
+    named: Any = ct.ss(system, inputs=inputs, outputs=outputs, states=states, name=name)
+    named.units = units
+    return named

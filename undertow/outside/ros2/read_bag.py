@@ -1,0 +1,131 @@
+"""Poses, velocities, wrenches and thruster commands of a rosbag2, in this package's axes."""
+
+import functools
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from undertow.core.errors import BadInput
+from undertow.logs.unfinished_bag import whole_files
+from undertow.outside.ros2.frames import between_attitudes, between_frd_and_flu
+from undertow.outside.ros2.from_messages import SECOND, Frames, motion_of, target_of, wrench_from
+
+# Frames whose axes are east, north, up by REP 105 or by habit.
+_ANY_WORLD = Frames(("odom", "map", "world", "earth"))
+
+Series = tuple[NDArray, NDArray]  # times, s; values, a row each
+
+
+def read_rosbag2(
+    path: str | Path, topics: Iterable[str] | None = None, frames: Frames = _ANY_WORLD
+) -> dict[str, Series]:
+    """Poses, velocities, wrenches and arrays of a rosbag2, in this package's axes and SI units.
+
+    Args:
+        path: folder of the bag, of either storage.
+        topics: those that are read; None for all of the types below.
+        frames: names of the frames whose axes are those of REP 103. Messages in another frame, and others that cannot
+            be used, are left out, with a warning. Readings of an IMU are in the axes of its own frame.
+
+    Returns:
+        Name -> (times, s, at which the bag has it; values, a row each). Odometry /t gives `/t/position` (north, east,
+        down), `/t/quaternion` (w, x, y, z, body -> world) and `/t/velocity` (u, v, w, p, q, r); PoseStamped
+        `/t/pose` (north, east, down, roll, pitch, yaw); WrenchStamped `/t/wrench` (body axes); Imu `/t/quaternion`,
+        `/t/rates` and `/t/specific_force` (body axes); Float64MultiArray `/t`.
+
+    Raises:
+        BadInput: no bag is there, it is damaged, or has none of the topics.
+    """
+    only = None if topics is None else set(topics)
+    rows: dict[str, list[tuple[float, NDArray]]] = {}
+    refused: dict[str, list[BadInput]] = {}
+    for topic, kind, nanoseconds, data in _messages(Path(path), only):
+        try:
+            found = _READERS[kind](_decoded(kind, data, topic), frames, topic)
+        except BadInput as error:
+            refused.setdefault(topic, []).append(error)
+            continue
+        for name, value in found.items():
+            rows.setdefault(topic + name, []).append((nanoseconds / SECOND, value))
+    for topic, errors in refused.items():
+        warnings.warn(f"Left out: {len(errors)} messages of {topic}. The first: {errors[0]}", stacklevel=2)
+    if not rows:
+        which = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
+        raise BadInput(str(path), f"have messages that can be used {which}", "without")
+    return {name: _series(name, each) for name, each in rows.items()}
+
+
+def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
+    """Topic, type, time (ns) and bytes of the messages of known types."""
+    notes: list[str] = []
+    try:
+        with whole_files(path, notes) as files:
+            if notes:
+                warnings.warn(f"{path}: {'; '.join(notes)}", stacklevel=3)
+            for file in files:
+                yield from _messages_of(file, only)
+    except (BadInput, OSError):
+        raise
+    except Exception as error:  # whatever rosbags, SQLite, YAML or zstd say of damaged bytes
+        raise BadInput(
+            str(path), "be a rosbag2", f"damaged, or something else ({type(error).__name__}: {error})"
+        ) from None
+
+
+def _messages_of(file: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
+    with Reader(file) as reader:
+        chosen = [one for one in reader.connections if one.msgtype in _READERS and (only is None or one.topic in only)]
+        for one, nanoseconds, data in reader.messages(chosen) if chosen else ():
+            yield one.topic, one.msgtype, nanoseconds, bytes(data)
+
+
+def _series(name: str, rows: list[tuple[float, NDArray]]) -> Series:
+    times, values = zip(*rows, strict=True)
+    widths = {len(value) for value in values}
+    if len(widths) > 1:
+        raise BadInput(name, "have arrays of one length", f"{', '.join(map(str, sorted(widths)))} long")
+    return np.array(times), np.array(values)
+
+
+def _odometry(message: Any, frames: Frames, topic: str) -> dict[str, NDArray]:
+    motion = motion_of(message, frames, topic)
+    return {f"/{name}": value for name, value in motion._asdict().items()}
+
+
+def _imu(message: Any, frames: Frames, topic: str) -> dict[str, NDArray]:
+    given = message.orientation
+    vector = lambda one: between_frd_and_flu([one.x, one.y, one.z])
+    return {
+        "/quaternion": between_attitudes([given.w, given.x, given.y, given.z]),
+        "/rates": vector(message.angular_velocity),
+        "/specific_force": vector(message.linear_acceleration),
+    }
+
+
+@functools.cache
+def _typestore() -> Any:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _decoded(kind: str, data: bytes, topic: str) -> Any:
+    try:
+        return _typestore().deserialize_cdr(data, kind)
+    except Exception as error:  # of struct, NumPy, UTF-8 and rosbags
+        got = f"{len(data)} bytes that do not hold one ({type(error).__name__}: {error})"
+        raise BadInput(topic, f"have messages of type {kind}", got) from None
+
+
+# Type -> what its messages hold, by the end of the name.
+_READERS: dict[str, Callable[[Any, Frames, str], dict[str, NDArray]]] = {
+    "nav_msgs/msg/Odometry": _odometry,
+    "sensor_msgs/msg/Imu": _imu,
+    "geometry_msgs/msg/PoseStamped": lambda message, frames, topic: {"/pose": target_of(message, frames, topic)},
+    "geometry_msgs/msg/WrenchStamped": lambda message, frames, topic: {"/wrench": wrench_from(message, frames, topic)},
+    "std_msgs/msg/Float64MultiArray": lambda message, frames, topic: {"": np.array(message.data, dtype=float)},
+}

@@ -1,0 +1,85 @@
+"""C5: the modelling error as fuzzy input needs fewer rules than the state, and estimates better."""
+
+from typing import Any
+
+from undertow.paper.claims.finding import Finding, Runs, claim, steady
+from undertow.paper.horizons import Long, sampled
+from undertow.paper.running import BatchedRun
+from undertow.paper.setup import FIDELITIES, same_loop_gain, scenario
+
+# Law -> words, options; all with the same gamma |xi|^2.
+_LAWS: dict[str, tuple[str, dict[str, Any]]] = {
+    "error_5": ("modelling error, 5 rules", {}),
+    "error_1": ("modelling error, 1 rule", same_loop_gain("error", 1)),
+    "state_25": ("state, 25 rules", same_loop_gain("state", 5)),
+}
+
+_AS_GOOD = 1.05  # times the estimation error
+
+
+def _fuzzy_input_batched(quick: bool) -> dict:
+    """The state, one rule and five rules at every fidelity level, at the same loop gain."""
+    return {
+        _name(level, law): scenario(
+            f"Table 1 at fidelity {level}, fuzzy input: {words}, the same gamma |xi|^2",
+            fidelity=level,
+            controller=options | {"weights_bound": float("inf")},
+            disturbance={"kind": "u2"},  # which is U1 for 20 s
+            loop=sampled(20.0),
+        )
+        for level in (FIDELITIES[2:3] if quick else FIDELITIES)
+        for law, (words, options) in _LAWS.items()
+    }
+
+
+@claim(
+    "C5",
+    "With the modelling error as input fewer rules are needed than with the state, and the estimate is better.",
+    batched=_fuzzy_input_batched,
+)
+def fuzzy_input(runs: Runs, long: Long) -> Finding:
+    """Estimation error and chattering at every fidelity level; at the printed gamma at `ideal`."""
+    same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
+    levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
+    found = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
+    said = [
+        f"{level}: " + "; ".join(f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS)
+        for level in levels
+    ]
+    text = (
+        f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, "
+        "since its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering "
+        f"from 10 s to 20 s of U1, 1 kHz: {'. '.join(said)}."
+    )
+    numbers = {"same_gamma": list(same_gamma), "levels": found}
+    simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"
+    alike, better = [], []
+    for level, laws in found.items():
+        own, others = laws["error_5"], [laws["error_1"], laws["state_25"]]
+        if own is None:
+            continue
+        if all(other and other["estimation_rms"] <= _AS_GOOD * own["estimation_rms"] for other in others):
+            alike.append(level)
+        elif not any(other and other["estimation_rms"] <= _AS_GOOD * own["estimation_rms"] for other in others):
+            better.append(level)
+    if not better:
+        return Finding("fails", text, _name(levels[0], "state_25"), simulated, numbers)
+    verdict = f"holds if the thruster lags (level {' and '.join(better)}) and with five sets, not one"
+    verdict += f"; at the same loop gain it makes no difference at {' and '.join(alike)}" if alike else ""
+    return Finding(verdict, text, _name(better[0], "error_1"), simulated, numbers)
+
+
+def _name(level: str, law: str) -> str:
+    return f"c05_{level}_{law}"
+
+
+def _metrics(run: BatchedRun) -> dict[str, float] | None:
+    found = run.windows[0]
+    return found and {metric: found[metric] for metric in ("tracking_rms", "estimation_rms", "input_variation")}
+
+
+def _shown(run: BatchedRun) -> str:
+    found = _metrics(run)
+    if found is None:
+        return f"ends at {run.ended:.2g} s"
+    return f"{found['estimation_rms']:.3g} ({found['input_variation']:.3g} V/s)"

@@ -1,0 +1,53 @@
+"""The chapter `The robust variant`: every fidelity level, the ablations, the conclusions."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from undertow.paper.ablations import study
+from undertow.paper.ablations.verdicts import ABLATIONS
+from undertow.paper.robust_variant import fidelity
+from undertow.paper.robust_variant.conclusions import conclusions
+from undertow.paper.running import begin_all
+from undertow.scenario.results.run_result import ScenarioResult
+from undertow.simulation.processes import Tasks
+
+Chapter = tuple[dict[str, Any], dict[str, ScenarioResult]]
+
+
+def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
+    """Begin to run the chapter; scenarios and campaigns are saved as all others of `reproduce`.
+
+    Args:
+        folder: folder of `scenarios/` and `runs/`.
+        quick: fewer fidelity levels, ablations and seeds.
+        tasks: where the runs and the ablations are tasks.
+
+    Returns:
+        Function that waits for the entries of results.json, and the runs of the fidelity comparison.
+    """
+    selected = [one for one in ABLATIONS if not (quick and one.long)]
+    compared = begin_all(fidelity.scenarios(quick), folder, tasks)
+    # The longest begin first, so that no process waits for the last one.
+    order = sorted(selected, key=study.trials_of, reverse=True)
+    later = {one.id: tasks.begin(f"ablation {one.id}", ablation, one.id, quick, folder) for one in order}
+
+    def finished() -> Chapter:
+        runs, found = compared(), [later[one.id].result() for one in selected]
+        rows = fidelity.table(runs, quick)
+        results = {
+            "quick": quick,
+            "seeds": found[0]["variants"][0]["seeds"],
+            "left_out": [one.id for one in ABLATIONS if one not in selected],
+            "fidelity": rows,
+            "ablations": found,
+            "conclusions": conclusions(rows, found),
+        }
+        return results, runs
+
+    return finished
+
+
+def ablation(name: str, quick: bool, folder: Path) -> dict[str, Any]:
+    """The ablation of an id, run."""
+    return study.run(next(one for one in ABLATIONS if one.id == name), quick, folder)

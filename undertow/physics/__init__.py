@@ -1,0 +1,1 @@
+"""What the world does: vehicles, thrusters, power, water, sensors, and what goes wrong with them."""

@@ -1,0 +1,49 @@
+"""A disturbance replayed from samples."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from undertow.core import checks
+from undertow.core.contracts import Load
+from undertow.core.errors import BadInput
+from undertow.core.param import Param, param
+from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+
+
+class Table(AbstractSmoothDisturbance):
+    """Samples of the lumped acceleration, linear in between, constant before the first and after the last.
+
+    Raises:
+        BadInput: fewer than two samples, not finite, or times that do not increase.
+    """
+
+    samples: Float[Param, "rows columns"] = param("s, then m/s^2 or rad/s^2", "rows (t, d1, d2, ...)")
+
+    def __check_init__(self):
+        shape = np.shape(self.samples)
+        if len(shape) != 2 or shape[0] < 2 or shape[1] < 2:
+            raise BadInput("samples", "have two or more rows (t, d1, d2, ...)", f"of shape {shape}")
+        checks.finite("samples", self.samples)
+        if checks.known(self.samples):
+            steps = np.diff(np.asarray(self.samples)[:, 0])
+            if not (steps > 0).all():
+                raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+
+    def at(self, realization, t, pose, load: Load) -> Load:
+        axes = load.acceleration.shape[0]
+        if self.samples.shape[1] != 1 + axes:
+            raise BadInput("samples", f"have columns t, d1..d{axes}", f"a table of {self.samples.shape[1]} columns")
+        times, values = self.samples[:, 0], self.samples[:, 1:]
+        signal = jax.vmap(jnp.interp, in_axes=(None, None, 1))(t, times, values)
+        return load._replace(acceleration=load.acceleration + signal)
+
+
+def table(samples) -> Table:
+    """Lumped acceleration replayed from rows (t, d1, d2, ...); in a scenario, `file: d.csv` gives them.
+
+    Args:
+        samples: rows of time (s) and one value per axis (m/s^2, rad/s^2), linear in between.
+    """
+    return Table(samples)

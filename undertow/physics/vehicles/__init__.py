@@ -1,0 +1,7 @@
+"""Vehicles: equation of motion of the body, and published parameters. One file per vehicle."""
+
+from undertow.core.catalogue import publish
+from undertow.physics.vehicles.body import Body as Body
+from undertow.physics.vehicles.vehicle import Vehicle as Vehicle
+
+__getattr__ = publish(__name__)

@@ -1,7 +1,0 @@
-"""Power supply of the thrusters: battery, electronic speed controllers and energy balance. One file per part."""
-
-from undertow.core.catalogue import publish
-from undertow.power.battery import Battery as Battery
-from undertow.power.esc import ESC as ESC
-
-__getattr__ = publish(__name__)

@@ -1,4 +1,0 @@
-"""The ablations A1 to A21 of the theory page: campaign files, and a verdict on each.
-
-`undertow campaign undertow/reproduction/ablations/a08_sampling.yaml` runs one of them alone.
-"""

@@ -1,0 +1,291 @@
+"""Both loops as SIMD batches: many runs of one kind at once, by the batch compiler.
+
+Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixed steps, to rounding; their bits depend
+neither on the machine nor on the other runs.
+
+This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
+`unavailable` says why. What is unsupported runs by XLA: simulation/run_scenario.py falls back for a run,
+loop/batch_runner.py for many.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PRNGKeyArray
+
+from undertow.core.numerics.integrators import COMPACT_METHODS, METHODS
+from undertow.core.process_setup import cache_folder
+from undertow.core.status import Status
+from undertow.simulation.loop import continuous, sampled
+from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
+from undertow.simulation.loop.outcome import Outcome
+from undertow.simulation.loop.recording import instant
+
+if TYPE_CHECKING:
+    from simdjit import BatchStep, Driver, Unsupported
+else:
+    try:
+        from simdjit import Unsupported
+    except ImportError as error:
+        _REASON = (
+            f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
+        )
+
+        class Unsupported(Exception):
+            """The batch compiler cannot make a program; the message says why."""
+
+    else:
+        _REASON = ""
+
+
+def unavailable() -> str:
+    """Why no run can be a SIMD batch on this machine; empty where runs can."""
+    return "" if TYPE_CHECKING else _REASON
+
+
+def gpu() -> "Driver | None":
+    """The GPU that runs SIMD batches; None where there is none."""
+    if unavailable():
+        return None
+    import simdjit
+
+    return simdjit.gpu()
+
+
+def simd_width(bits: int) -> int:
+    """How many numbers of `bits` bits fit a vector register of this processor; 1 without the batch compiler."""
+    if unavailable():
+        return 1
+    import simdjit
+
+    return simdjit.simd_width(bits)
+
+
+# Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
+# number is the same for a campaign and for a trial that is repeated alone, so that both have the same bits.
+_PLANNED = 1_000_000
+
+# Steps of all runs together from which on a longer program pays: it takes 0.1 to 0.3 s more to compile.
+_FEW = 2_000_000
+
+
+def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
+    """`simdjit.Step`: one step of one run, called by somebody else's clock.
+
+    Raises:
+        Unsupported: the function uses an operation that the batch compiler lacks, or there is no batch compiler.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Step
+
+    return Step(function, numbers, state, inputs, cache_folder() / "native")
+
+
+def kept_steps(
+    function: Callable, numbers: Any, state: Any, inputs: Any, runs: int, constant: Sequence[bool]
+) -> "BatchStep":
+    """`simdjit.BatchStep`: one step of many runs, called by somebody else's clock.
+
+    Raises:
+        Unsupported: as of `kept_step`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import BatchStep
+
+    return BatchStep(function, numbers, state, inputs, runs, constant, cache_folder() / "native")
+
+
+def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence[bool]) -> Callable[[Any], Any]:
+    """The start of runs as `SimdBatchRunner` makes it: from numbers with a leading axis over runs to results with one.
+
+    Args:
+        prepare: numbers -> everything random and what else does not change, as in a run.
+        begin: prepared -> results.
+        numbers: of one run.
+        constant: which of its arrays are equal in all runs.
+
+    Raises:
+        Unsupported: as of `kept_step`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Loop
+
+    begun = lambda known, carry, k: begin(known)
+    cache, nothing = cache_folder() / "native", np.zeros(())
+    loop = Loop(prepare, lambda known: nothing, lambda known, carry, k: carry, begun, numbers, constant, cache=cache)
+    return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
+
+
+# Numbers of an array; of a larger one, such as the commands of a long log, the program would take a minute to compile.
+_LARGEST = 4_000
+
+
+class SimdBatchRunner:
+    """Runs of one kind, compiled once.
+
+    Args:
+        run: one of them.
+        plan: how they are run.
+        constant: which arrays of `run` are equal in all runs, in the order of its leaves; they shorten the program.
+        width: runs at once; as many as fit a register unless given.
+        driver: that of the GPU; None for this processor.
+        runs: how many it is compiled for, where that is known: few steps are worth a shorter program. Any number can
+            be run, with the same bits.
+
+    Raises:
+        Unsupported: a part uses an operation that the batch compiler lacks, XLA would take less time by estimate, or
+            there is no batch compiler.
+        OSError: the driver of the GPU fails.
+    """
+
+    def __init__(
+        self,
+        run: LoopRun,
+        plan: RunPlan,
+        constant: list[bool],
+        width: int = 0,
+        driver: "Driver | None" = None,
+        runs: float = math.inf,
+    ):
+        if unavailable():
+            raise Unsupported(unavailable())
+        from simdjit import Loop
+
+        numbers, rest = eqx.partition(run, eqx.is_array)
+        if (largest := max(leaf.size for leaf in jax.tree.leaves(numbers))) > _LARGEST:
+            raise Unsupported(f"a table of {largest} numbers, more than {_LARGEST}")
+        self._plan = plan
+        # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
+        compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW
+        integrate, dt = (COMPACT_METHODS if compact else METHODS)[plan.method], plan.dt
+
+        def realize(numbers):
+            loop, accumulators, at, key = eqx.combine(numbers, rest)
+            return loop.realize(key), accumulators, at
+
+        def start(known):
+            realization, accumulators, at = known
+            if plan.continuous:
+                return continuous.begin(realization, at)
+            return sampled.begin(realization, at, accumulators)
+
+        def control_step(known, carry, k):
+            realization, accumulators, _ = known
+            if plan.continuous:
+                return continuous.step(realization, jnp.asarray(dt), carry, k)
+            return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
+
+        def record(known, carry, k):
+            t = instant(k, jnp.asarray(dt))
+            signals = known[0].record(t, *carry[0])
+            return t, {name: signals[name] for name in plan.signals}
+
+        cache = cache_folder() / "native"
+        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache, _PLANNED)
+
+    @property
+    def operations(self) -> int:
+        """Arithmetic operations of one step of one run: law, integration of the plant, accumulators.
+
+        Stages of integration that are a loop are counted once.
+        """
+        return self._program.operations
+
+    def run(self, numbers: Any, steps: int | None = None) -> Outcome:
+        """Run a batch; the outcome has NumPy arrays with a leading axis over runs.
+
+        Args:
+            numbers: arrays of the runs, as in `run`, with a leading axis over runs.
+            steps: how many; as planned unless given.
+        """
+        steps, every = self._plan.steps if steps is None else steps, self._plan.every
+        carry, (time, signals) = self._program.run(numbers, steps, every)
+        states, accumulated, (status, ended, wrong) = carry
+        until: Any = np.where(status == int(Status.OK), steps * self._plan.dt, ended)
+        return Outcome(time, signals, accumulated, states[:2], status, until, wrong)
+
+
+def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
+    """What is random of the disturbance of a run with this key, to the last bit.
+
+    Raises:
+        Unsupported: as of `simulate`.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    from simdjit import Loop
+
+    numbers, rest = eqx.partition((loop, key), eqx.is_array)
+
+    def realize(numbers):
+        loop, key = eqx.combine(numbers, rest)
+        return loop.realize(key).disturbance_realization
+
+    constant = [decides_structure(leaf) for leaf in jax.tree.leaves(numbers)]
+    kept, nothing = lambda known, carry, k: carry, lambda known, carry, k: jnp.zeros(())
+    program = Loop(realize, lambda known: known, kept, nothing, numbers, constant, 1, None, cache_folder() / "native")
+    carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
+    return jax.tree.map(lambda leaf: leaf[0], carry)
+
+
+def simulate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    dt: float = 1e-3,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    record_every: int = 10,
+    accumulators: tuple[sampled.AbstractAccumulator, ...] = (),
+    method: str = "rk4",
+    substeps: int = 1,
+) -> Outcome:
+    """One run; arguments, result and errors of `sampled.simulate`.
+
+    Raises:
+        Unsupported: a part uses an operation that the batch compiler lacks, or there is no batch compiler.
+    """
+    steps, loop = sampled.steps_of(duration, dt, record_every), loop.starting_at(position)
+    start = loop.outputs_at_start(position, velocity)
+    run = LoopRun(loop, accumulators, start, jax.random.PRNGKey(0) if key is None else key)
+    return _alone(run, RunPlan(steps, dt, record_every, tuple(loop.signals()), method, substeps))
+
+
+def integrate(
+    loop: ClosedLoop,
+    *,
+    duration: float,
+    record_step: float = 1e-2,
+    key: PRNGKeyArray | None = None,
+    position: Any = None,
+    velocity: Any = None,
+    dt: float = 1e-3,
+) -> Outcome:
+    """One run of plant and law as one ODE; arguments, result and errors of `continuous.simulate` with fixed steps.
+
+    Raises:
+        Unsupported: as of `simulate`.
+    """
+    continuous.check(loop)
+    loop, _ = loop.starting_at(position), continuous.records_of(duration, record_step)
+    steps, every, dt = continuous.grid_of(duration, record_step, dt)
+    start = loop.outputs_at_start(position, velocity)
+    run = LoopRun(loop, (), start, jax.random.PRNGKey(0) if key is None else key)
+    outcome = _alone(run, RunPlan(steps, dt, every, tuple(loop.signals()), continuous=True))
+    return continuous.explained(loop, run.key, outcome, dt)
+
+
+def _alone(run: LoopRun, plan: RunPlan) -> Outcome:
+    arrays = eqx.filter(run, eqx.is_array)
+    batch = SimdBatchRunner(run, plan, [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
+    return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)

@@ -1,0 +1,1 @@
+"""Many runs of a scenario: campaigns, comparisons, tuning, falsification, the arena, predictions, speed."""

@@ -1,0 +1,220 @@
+"""Build the trials of a task: many at once where their numbers can be traced, otherwise one by one.
+
+Building a trial takes a millisecond of Python. Trials that differ only in numbers are built together: the scenario is
+built once with arrays of the varied values in place of numbers (`jax.vmap`), which gives the numbers of all of them, to
+the bit. A part whose constructor looks at its numbers, by NumPy for example, cannot be built so, nor can a trial that
+breaks a condition of a constructor: these are built one by one.
+"""
+
+import contextlib
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from pydantic import BaseModel
+
+from undertow.core import checks, runtime
+from undertow.core.arrays import as_array
+from undertow.core.errors import BadInput, within
+from undertow.scenario.build import Built, build, build_scenario
+from undertow.scenario.part_cache import PartCache
+from undertow.scenario.prepare import loop_run
+from undertow.scenario.reading import Text, key_path
+from undertow.simulation.loop.loop_runs import numbers_of, structure
+from undertow.simulation.prepared_run import RunBatch, batch_of
+from undertow.studies.campaign.requirements import recorded
+from undertow.studies.campaign.trial_results import prepare_trial
+from undertow.studies.campaign.trials import Trials
+
+# Trials of a kind that are built both ways: where one of them differs in one bit, all are built one by one. The
+# arithmetic of a constructor may be rounded in another way for many trials than for one: XLA divides by a number that
+# all share by multiplying with its reciprocal. That shows in every seventh number or so.
+_COMPARED = 48
+_SEARCHED = 2048  # samples among which as many of a kind have to be
+
+# Sections of a scenario whose numbers become numbers of the program; the others are settings of the run.
+_TRACED = ("plant", "model", "controller", "reference", "disturbance", "navigation", "metrics", "initial")
+
+
+class Kind(NamedTuple):
+    """What trials have to share in order to be built together."""
+
+    combination: int  # of `cross`
+    others: str  # values that are no fractions
+
+
+class Together(NamedTuple):
+    """Valid trials of a task that differ only in numbers."""
+
+    places: np.ndarray  # in the task
+    first: Built  # one of them
+    batch: RunBatch
+
+
+def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
+    """One trial, ready to run.
+
+    Raises:
+        BadInput: its scenario cannot be built.
+    """
+    with within(location=several.location, note=f"trial {row}"):
+        return build_data(several, part_cache, several.data(row))
+
+
+def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
+    """Build a scenario of the campaign.
+
+    Raises:
+        BadInput: the scenario cannot be built.
+    """
+    return build(Text(data, "", several.scenario.folder, {}), part_cache)
+
+
+def valid_trials(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
+    """Index and trial of each valid row, one at a time: a large task does not keep them all in memory."""
+    for place, row in enumerate(rows):
+        with contextlib.suppress(BadInput):
+            yield place, build_trial(several, part_cache, row)
+
+
+def build_trials(
+    several: Trials,
+    part_cache: PartCache,
+    trials: np.ndarray,
+    sampled: Mapping[str, list[Any]],
+    traceable: dict[Kind, bool],
+) -> Iterator[Together]:
+    """The valid trials among some: those whose numbers can be traced together, the others each by itself.
+
+    Args:
+        several: the trials of the campaign.
+        part_cache: parts that they share.
+        trials: their numbers in the campaign.
+        sampled: their sampled values, by key path.
+        traceable: which kinds of trials can be traced, as far as known, completed here; a matter of the campaign only.
+    """
+    varied = _fractions(several)
+    for kind, places in _by_kind(several, trials, sampled, varied).items():
+        if kind not in traceable:
+            traceable[kind] = _traceable(several, part_cache, kind, varied)
+        numbers = {key: np.array(sampled[key])[places] for key in varied}
+        found = _together(several, part_cache, trials[places], numbers) if traceable[kind] else None
+        if found is not None:
+            yield found._replace(places=places[found.places])
+            places = np.delete(places, found.places)
+        for place, built in valid_trials(several, part_cache, trials[places].tolist()):
+            yield Together(places[[place]], built, batch_of(prepare_trial(built, recorded(several.campaign, built))))
+
+
+def _fractions(several: Trials) -> list[str]:
+    """Key paths of `vary` whose values are fractions; the others are counts, words or parts."""
+    fraction = lambda spread: all(type(value) is float for value in spread.choice or ())
+    return [key for key, spread in several.campaign.vary.items() if fraction(spread)]
+
+
+def _by_kind(
+    several: Trials, trials: np.ndarray, sampled: Mapping[str, list[Any]], varied: list[str]
+) -> dict[Kind, np.ndarray]:
+    """Places of trials by kind: one combination of `cross`, and the same values where these are no fractions."""
+    others = [column for key, column in sampled.items() if key not in varied]
+    groups: dict[Kind, list[int]] = {}
+    for place, trial in enumerate(trials.tolist()):
+        kind = Kind(trial % len(several.combinations), repr([column[place] for column in others]))
+        groups.setdefault(kind, []).append(place)
+    return {kind: np.array(places) for kind, places in groups.items()}
+
+
+def _traceable(several: Trials, part_cache: PartCache, kind: Kind, varied: list[str]) -> bool:
+    """Whether the first trials of a kind have the same bits when they are built together and alone."""
+    if any(key_path(key)[0] not in _TRACED for key in varied):
+        return False
+    samples = np.arange(min(_SEARCHED, several.campaign.trials))
+    trials = samples * len(several.combinations) + kind.combination
+    sampled = several.sampled(trials)
+    alike = _by_kind(several, trials, sampled, varied).get(kind, samples[:0])[:_COMPARED]
+    if len(alike) < _COMPARED:
+        return False
+    numbers = {key: np.array(sampled[key])[alike] for key in varied}
+    return _together(several, part_cache, trials[alike], numbers, _COMPARED) is not None
+
+
+def _together(
+    several: Trials, part_cache: PartCache, trials: np.ndarray, varied: Mapping[str, np.ndarray], compared: int = 1
+) -> Together | None:
+    """Those of some trials that meet all conditions; None where their numbers cannot be traced.
+
+    Args:
+        several: the trials of the campaign.
+        part_cache: parts that they share.
+        trials: their numbers in the campaign.
+        varied: values of the keys that vary.
+        compared: how many valid ones, from the first one on, are built alone too and have to have the same bits.
+    """
+    alone = dict(itertools.islice(valid_trials(several, part_cache, trials.tolist()), compared))
+    if not alone:
+        return None
+    first = alone[min(alone)]
+    batch = batch_of(prepare_trial(first, recorded(several.campaign, first)))
+    try:
+        form = structure(batch.first.run)
+        numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.numbers.copy(), [])
+    except Exception:  # whatever a constructor, of a user's own too, does with numbers that are not known
+        return None
+    numbers[-1] = np.stack([np.zeros_like(several.seeds(trials)), several.seeds(trials)], axis=1)  # the random keys
+    good = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
+    for place in np.flatnonzero(good[: max(alone) + 1]).tolist():
+        if place not in alone or not _same(batch.first.run, numbers, place, loop_run(alone[place])):
+            return None
+    places = np.flatnonzero(good)
+    own = [None if number is None else number[places] for number in numbers]
+    return Together(places, first, batch._replace(numbers=own, size=len(places)))
+
+
+def _same(first: Any, numbers: list[np.ndarray | None], place: int, alone: Any) -> bool:
+    """Whether a trial has the same bits as when it is built alone."""
+    if structure(first) != structure(alone):
+        return False
+    here = [leaf if number is None else number[place] for leaf, number in zip(numbers_of(first), numbers, strict=True)]
+    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in zip(here, numbers_of(alone), strict=True))
+
+
+def _traced(
+    part_cache: PartCache, first: Built, varied: Mapping[str, np.ndarray], form: Any
+) -> tuple[list[np.ndarray | None], list[np.ndarray]]:
+    """Numbers of the program with a leading axis over trials, None for those that do not vary; and the conditions."""
+    vary: list[bool] = []
+
+    def numbers(values: dict[str, Any]) -> tuple[list[Any], list[Any]]:
+        scenario = first.scenario
+        for key, value in values.items():
+            scenario = with_value(scenario, key_path(key), value)
+        with checks.recorded_conditions() as conditions:
+            run = loop_run(build_scenario(scenario, first.text, part_cache.copy()))
+        if structure(run) != form:
+            raise checks.Unknown
+        vary[:] = [isinstance(leaf, Tracer) for leaf in numbers_of(run)]
+        return [leaf for leaf in numbers_of(run) if isinstance(leaf, Tracer)], conditions
+
+    with runtime.in_precision("float64"):
+        found, conditions = jax.vmap(numbers)(dict(varied))
+    columns = map(np.asarray, found)
+    return [next(columns) if varies else None for varies in vary], list(map(np.asarray, conditions))
+
+
+def with_value(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
+    """A scenario, or what is in it, with another value at a path; a list of numbers becomes an array."""
+    if not path:
+        return value
+    step, *rest = path
+    if isinstance(node, BaseModel):
+        return node.model_copy(update={str(step): with_value(getattr(node, str(step)), tuple(rest), value)})
+    if isinstance(node, jax.Array):
+        return node.at[step].set(value)
+    inner = node.copy()
+    inner[step] = with_value(node[step], tuple(rest), value)
+    numeric = isinstance(inner, list) and all(isinstance(entry, float | int | Tracer) for entry in inner)
+    return jnp.stack([as_array(entry) for entry in inner]) if numeric else inner

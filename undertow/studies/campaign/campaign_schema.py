@@ -1,0 +1,265 @@
+"""Keys of a campaign file, their defaults and their checks."""
+
+import math
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from undertow.core.errors import BadInput
+from undertow.scenario.json_schema import scenario_schema
+from undertow.scenario.reading import Text, dump, parse, read
+from undertow.scenario.schema import RunRequirement, Scenario, Strict, complaint, kind_of
+from undertow.studies.campaign.labels import by_name, words
+
+# List entries in brackets only: each key has one spelling, so that duplicates are noticed.
+_PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+# Tasks of a campaign, and trials of the smallest and the largest task, unless `chunk` is given.
+_TASKS, _SMALL, _LARGE = 100, 256, 4096
+
+VARIANT = "variant"  # the axis of `variants`, beside those of `cross`
+
+
+class Distribution(Strict):
+    """Distribution of one parameter: exactly one of these keys."""
+
+    uniform: Pair | None = Field(None, description="low, high")
+    log_uniform: Pair | None = Field(None, description="low, high, both positive")
+    normal: Pair | None = Field(None, description="mean, standard deviation")
+    choice: list[Any] | None = Field(None, min_length=1, description="one of these values, equally likely")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_name(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or {"distribution", "kind", "type"} & set(given):
+            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+            raise ValueError(f"be a distribution with its numbers, such as {{uniform: [{low}, {high}]}}")
+        return given
+
+    @model_validator(mode="after")
+    def _one(self) -> "Distribution":
+        given = [name for name in type(self).model_fields if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError("have one of uniform, log_uniform, normal, choice")
+        pair = getattr(self, given[0])
+        if given[0] in ("uniform", "log_uniform") and not pair[0] < pair[1]:
+            raise ValueError("have low below high")
+        if given[0] == "log_uniform" and not pair[0] > 0:
+            raise ValueError("have positive bounds")
+        if given[0] == "normal" and not pair[1] >= 0:
+            raise ValueError("have a standard deviation that is not negative")
+        return self
+
+
+class Requirement(RunRequirement):
+    """A bound on a metric, or a temporal formula, that a share of all trials must keep."""
+
+    share: float = Field(0.95, gt=0, description="smallest share of the trials that must keep the bound")
+
+    @field_validator("share")
+    @classmethod
+    def _provable(cls, given: float) -> float:
+        if given >= 1:
+            raise ValueError("be less than 1, because no number of trials can demonstrate 100 %; 0.99, for example")
+        return given
+
+
+class Series(Strict):
+    """Signals to record for every trial."""
+
+    signals: list[str] = Field(
+        ["position", "error"],
+        min_length=1,
+        description="names of variables of run.nc, as written by `undertow simulate`",
+    )
+    every: float = Field(1.0, gt=0, description="time between records, s")
+
+    @field_validator("signals")
+    @classmethod
+    def _once(cls, given: list[str]) -> list[str]:
+        if len(set(given)) < len(given):
+            raise ValueError("name every signal once")
+        return given
+
+
+class Campaign(Strict):
+    """One campaign: a scenario and what varies from trial to trial."""
+
+    description: str = Field("", description="free text, the title of the page")
+    scenario: str | dict[str, Any] = Field(description="name of a scenario file, or the scenario itself")
+    trials: int = Field(1000, ge=1, le=10**9, description="number of samples")
+    design: Literal["random", "latin", "sobol"] = Field("random", description="sampling of the space of `vary`")
+    vary: dict[str, Distribution] = Field(
+        default_factory=dict, description="Monte Carlo: key path of the scenario -> its distribution"
+    )
+    cross: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="sweep: key path -> values, as a list or by name; all combinations run the same samples and seeds",
+    )
+    variants: dict[str, dict[str, Any]] = Field(
+        default_factory=dict,
+        description="name -> key paths and their values: whatever changes together; an axis after those of `cross`",
+    )
+    requirements: dict[str, Requirement] = Field(
+        default_factory=dict,
+        description="metric -> bound that it must keep; or any name -> formula that the run must keep",
+    )
+    series: Series | None = Field(None, description="signals to record; none by default")
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
+    chunk: int | None = Field(
+        None,
+        ge=1,
+        le=100_000,
+        description="trials per task, which does not affect the results; default: a hundredth, from 256 to 4096",
+    )
+
+    @field_validator("scenario", mode="before")
+    @classmethod
+    def _file_or_mapping(cls, given: Any) -> Any:
+        if not isinstance(given, str | dict):
+            raise ValueError("be the name of a file, or a mapping of keys to values")
+        return given
+
+    @field_validator("cross", mode="before")
+    @classmethod
+    def _named(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        for key, values in given.items():
+            if not isinstance(values, list | dict):
+                raise ValueError(f"have a list of values for `{key}`, or values by names")
+        return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
+
+    @property
+    def axes(self) -> dict[str, dict[str, Any]]:
+        """Values by names along every axis: the key paths of `cross`, then `variant`."""
+        return self.cross | ({VARIANT: self.variants} if self.variants else {})
+
+    @property
+    def formulas(self) -> dict[str, str]:
+        """Temporal formulas of the requirements, by name."""
+        return {name: one.formula for name, one in self.requirements.items() if one.formula is not None}
+
+    @property
+    def keys(self) -> list[str]:
+        """Every key path whose value is not that of the scenario in all trials."""
+        return [*self.vary, *self.cross, *(key for variant in self.variants.values() for key in variant)]
+
+    @property
+    def trials_per_task(self) -> int:
+        """Trials per task: so many that what is done once per task takes little time, so few that progress is seen."""
+        return self.chunk or min(max(self.number // _TASKS, _SMALL), _LARGE)
+
+    @property
+    def number(self) -> int:
+        """Number of trials: the samples, for every combination of `cross` and `variants`."""
+        return math.prod(len(entries) for entries in self.axes.values()) * self.trials
+
+
+# Keys of the sections that a campaign has several times, or not at all by default.
+SECTIONS = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+
+
+def campaign_json_schema() -> dict[str, Any]:
+    """JSON schema (draft 7) of a campaign file, for editors."""
+    scenario, schema = scenario_schema(), Campaign.model_json_schema()
+    definitions = {**scenario.pop("$defs"), **schema["$defs"], "Scenario": scenario}
+    named = {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/Scenario"}]}
+    schema["properties"]["scenario"] |= named
+    schema["properties"]["cross"]["additionalProperties"] = {"anyOf": [{"type": "array"}, {"type": "object"}]}
+    return {**schema, "$schema": scenario.pop("$schema"), "$defs": definitions}
+
+
+_SHARED = set(Scenario.model_fields) & set(Campaign.model_fields)
+_REMEDIES = {
+    "scenario": "Run it: undertow simulate {name}; or name it in a campaign file: `scenario: {name}`",
+    "vehicle file": "Name it in a scenario, as `plant: {{vehicle: {name}}}`, and that in a campaign",
+}
+
+
+def validate(text: Text) -> Campaign:
+    """Validate the contents of a campaign file.
+
+    Raises:
+        BadInput: unknown key, wrong type, value out of range.
+    """
+    if (kind := kind_of({key: text.data[key] for key in text.data if key not in _SHARED})) in _REMEDIES:
+        name = text.name or "NAME.yaml"
+        raise BadInput(name, "be a campaign", f"a {kind}", hint=_REMEDIES[kind].format(name=name))
+    try:
+        found = Campaign.model_validate(text.data)
+    except ValidationError as errors:
+        raise complaint(errors, text, Campaign) from None
+    pairs = [(section, key) for section in ("vary", "cross") for key in getattr(found, section)]
+    for section, key in pairs:
+        _check_key(section, key, [other for _, other in pairs], text.where((section, key)))
+    if found.variants and VARIANT in found.cross:
+        raise BadInput(f"cross.{VARIANT}", "be left out beside `variants`", where=text.where(("cross", VARIANT)))
+    for name, variant in found.variants.items():
+        for key in variant:
+            _check_key("variants", key, [*found.vary, key], text.where(("variants", name, key)))
+    for key, entries in found.cross.items():
+        _check_entries(key, entries, text.where(("cross", key)))
+    return found
+
+
+def _check_key(section: str, key: str, every: list[str], where: str) -> None:
+    """A key path of `vary` or `cross`."""
+    if not _PATH.fullmatch(key):
+        must = "be a key path such as plant.vehicle.mass or initial.position[0]"
+        raise BadInput(section, must, repr(key), where=where)
+    if key.startswith("scenario."):
+        raise BadInput(key, "start inside the scenario", hint=f"Write `{key.removeprefix('scenario.')}`", where=where)
+    if key == "seed":
+        hint = "Every trial has its own seed, which follows from the `seed` of the campaign"
+        raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
+    if every.count(key) > 1:
+        raise BadInput(
+            f"{section if section == 'variants' else 'cross'}.{key}", "not be in `vary` as well", where=where
+        )
+    for other in every:
+        if other.startswith((f"{key}.", f"{key}[")):
+            raise BadInput(other, f"not be given together with {key}, which contains it", where=where)
+
+
+def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
+    """The values of one key of `cross`."""
+    name = f"cross.{key}"
+    if not entries:
+        raise BadInput(name, "have an entry", where=where)
+    if set(entries) <= set(Distribution.model_fields):
+        hint = f"Distributions belong to `vary`. Here, write `{key}: [first, second]`, or names and values"
+        raise BadInput(name, "be a list, or values by names", f"{next(iter(entries))} alone", hint=hint, where=where)
+    known: dict[str, str] = {}
+    for word, entry in entries.items():
+        same = known.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
+        if same != word:
+            raise BadInput(name, "have entries that differ", f"twice {words(entry)}", where=where)
+
+
+def read_campaign(path: Path) -> tuple[Campaign, Text]:
+    """A campaign from its file, and the text of the file.
+
+    Raises:
+        BadInput: the file is not a valid campaign.
+    """
+    text = read(path, file="campaign")
+    return validate(text), text
+
+
+def read_text(text: str, folder: Path) -> tuple[Campaign, Text]:
+    """A campaign from the text of `whole`; relative paths in it start at `folder`."""
+    parsed = parse(text, "", folder, file="campaign")
+    return validate(parsed), parsed
+
+
+def whole(campaign: Campaign, scenario: dict) -> str:
+    """The complete campaign as YAML, without `chunk` and free text, which do not affect the results."""
+    unused = set() if campaign.variants else {"variants"}
+    data = campaign.model_dump(exclude_none=True, exclude={"chunk", "description"} | unused)
+    return dump(data | {"scenario": scenario})

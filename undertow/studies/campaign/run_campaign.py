@@ -1,0 +1,65 @@
+"""Run the missing tasks of a campaign with an executor and write their results to the store."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.simulation.executors import Executor
+from undertow.studies.campaign import task as tasks
+from undertow.studies.campaign.columns import METRICS, coordinates, labels
+from undertow.studies.campaign.fingerprint import identity
+from undertow.studies.campaign.prepare import Prepared
+from undertow.studies.campaign.store import Store
+from undertow.studies.campaign.store_layout import layout
+
+STORE = "trials.zarr"
+
+
+class Tally(NamedTuple):
+    """Progress of a campaign. `failed` and `invalid` do not count trials done before it was resumed."""
+
+    trials: int
+    done: int
+    failed: int
+    invalid: int
+
+    def after(self, status: np.ndarray) -> "Tally":
+        """Progress after one more task."""
+        invalid = int(np.count_nonzero(status == tasks.INVALID))
+        failed = int(np.count_nonzero(status)) - invalid
+        return Tally(self.trials, self.done + len(status), self.failed + failed, self.invalid + invalid)
+
+
+Watch = Callable[[Tally], None]  # called after each task
+
+
+def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch) -> None:
+    """Run the missing tasks of a campaign, with its store in the folder `out`.
+
+    Raises:
+        BadInput: the folder holds another campaign.
+        OSError: the disk is full, or the cluster is lost; finished tasks are kept.
+    """
+    several, text, folder = prepared.trials, prepared.text, prepared.folder
+    store = Store(
+        out / STORE,
+        layout(several.campaign),
+        identity(text, prepared.named),
+        labels(several, prepared.first, prepared.metrics),
+        coordinates(several, prepared.first),
+        {METRICS: json.dumps({name: list(metric) for name, metric in prepared.metrics.items()})},
+    )
+    try:
+        missing = store.missing()
+        tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
+        watch(tally)
+        work = [(text, str(folder), store.layout, number) for number in missing]
+        for i, columns in executor(tasks.run_block, work):
+            store.write(missing[i], columns)
+            tally = tally.after(columns["status"])
+            watch(tally)
+    finally:
+        store.close()

@@ -1,0 +1,95 @@
+"""Samples of a campaign: points of the unit cube, their seeds, and the parameter values they stand for."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt32
+from scipy.special import ndtri
+
+from undertow.core.errors import BadInput
+from undertow.studies.campaign.campaign_schema import Campaign, Distribution
+
+# Streams of random numbers from one seed.
+_POINTS, _SEEDS = 0, 1
+
+# Samples per block, and number of cached blocks. Sobol's sequence needs a power of two.
+_BLOCK, _KEPT = 4096, 8
+_MOST_LATIN = 10_000_000
+
+# The quantiles of a normal distribution are infinite at 0 and 1.
+_EDGE = 2.0**-53
+
+
+class Samples:
+    """Points of the unit cube and seeds, equal on every machine and with every executor.
+
+    Blocks are computed on demand, so that a billion samples take no memory. Only a Latin hypercube is computed as a
+    whole.
+
+    Raises:
+        BadInput: too many samples for a Latin hypercube.
+    """
+
+    def __init__(self, campaign: Campaign):
+        if campaign.design == "latin" and campaign.trials > _MOST_LATIN:
+            hint = "`random` and `sobol` have no such limit"
+            raise BadInput("trials", f"be at most {_MOST_LATIN} with `design: latin`", campaign.trials, hint=hint)
+        self._campaign = campaign
+        self._block = campaign.trials if campaign.design == "latin" else _BLOCK
+        self._points = functools.lru_cache(_KEPT)(self._make_points)
+        self._seeds = functools.lru_cache(_KEPT)(self._make_seeds)
+
+    def points(self, samples: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
+        """Points of samples, in [0, 1), in the order of `vary`."""
+        return _entries(self._points, self._block, samples)
+
+    def seeds(self, samples: Int[np.ndarray, " n"]) -> UInt32[np.ndarray, " n"]:
+        """Seeds of all random numbers of samples."""
+        return _entries(self._seeds, _BLOCK, samples)
+
+    def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
+        seed, dimensions = self._campaign.seed, len(self._campaign.vary)
+        if not dimensions:
+            return np.zeros((self._block, 0))
+        if self._campaign.design == "random":
+            return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
+        from scipy.stats import qmc  # takes as long to import as all else here
+
+        chance = np.random.default_rng([seed, _POINTS])
+        if self._campaign.design == "latin":
+            return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
+        sequence = qmc.Sobol(dimensions, rng=chance)
+        if block:  # SciPy cannot go forward by nothing
+            sequence.fast_forward(block * self._block)
+        return sequence.random(self._block)
+
+    def _make_seeds(self, block: int) -> np.ndarray:
+        return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
+
+
+def _entries(made: Callable[[int], np.ndarray], size: int, samples: np.ndarray) -> np.ndarray:
+    """Entries of a sequence that is made in blocks of a size."""
+    blocks, rows = np.divmod(samples, size)
+    whole = made(int(blocks[0]) if len(blocks) else 0)
+    found = np.empty((len(samples), *whole.shape[1:]), dtype=whole.dtype)
+    for block in np.unique(blocks):
+        here = blocks == block
+        found[here] = made(int(block))[rows[here]]
+    return found
+
+
+def quantiles(spread: Distribution, shares: Float[np.ndarray, " n"]) -> list[Any]:
+    """Parameter values for coordinates in [0, 1): the quantiles of the distribution."""
+    if spread.uniform is not None:
+        low, high = spread.uniform
+        return (low + shares * (high - low)).tolist()
+    if spread.log_uniform is not None:
+        low, high = spread.log_uniform
+        return [low * (high / low) ** share for share in shares.tolist()]
+    if spread.normal is not None:
+        mean, deviation = spread.normal
+        return (mean + deviation * ndtri(np.clip(shares, _EDGE, 1 - _EDGE))).tolist()
+    choices = spread.choice or []
+    return [choices[min(int(share * len(choices)), len(choices) - 1)] for share in shares.tolist()]

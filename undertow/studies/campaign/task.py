@@ -1,0 +1,167 @@
+"""A task of a campaign: build and run some trials. It is given as text and numbers, so that any process can run it."""
+
+import contextlib
+import functools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from undertow.analysis.metrics import gathered_meanings
+from undertow.core import runtime
+from undertow.core.errors import BadInput
+from undertow.core.metric import Metric
+from undertow.scenario.build import Built
+from undertow.scenario.part_cache import PartCache
+from undertow.simulation.prepared_run import RunBatch
+from undertow.simulation.programs import ProgramCache
+from undertow.studies.campaign.build_trials import Kind, build_data, build_trial, build_trials, valid_trials
+from undertow.studies.campaign.campaign_schema import read_text
+from undertow.studies.campaign.requirements import formula_metrics, recorded, robustness
+from undertow.studies.campaign.store_layout import Layout
+from undertow.studies.campaign.trial_results import prepare_trial, run_prepared
+from undertow.studies.campaign.trials import Trials, trials, varied_keys
+
+# Status of a trial whose scenario cannot be built, in addition to those of `undertow.core.status`.
+INVALID = -1
+
+# Success of a trial that was invalid, or has no criterion.
+NOT_JUDGED = -1
+
+
+class Site(NamedTuple):
+    """Objects that a process keeps between the tasks of one campaign."""
+
+    trials: Trials
+    part_cache: PartCache
+    programs: ProgramCache
+    traceable: dict[Kind, bool]  # see `build_trials`
+    probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
+    alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
+
+    def metrics(self) -> dict[str, Metric]:
+        """Metrics that any of the trials may have. Each has a column, which is NaN where a trial has no such metric."""
+        found: dict[str, Metric] = {}
+        for built in (*self.probes().values(), *self.alternatives()):
+            found = gathered_meanings(built.closed_loop, built.metrics) | found
+        return found | formula_metrics(self.trials.campaign)
+
+
+@functools.lru_cache(maxsize=2)
+def site(text: str, folder: str) -> Site:
+    """The campaign of this text in this process; relative paths in it start at the folder."""
+    several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
+    rows = several.probes()
+    probes = functools.cache(lambda: {rows[place]: built for place, built in valid_trials(several, part_cache, rows)})
+    others = functools.cache(lambda: list(_alternatives(several, part_cache)))
+    programs = ProgramCache(lambda: [prepare_trial(built, None) for built in probes().values()], gpu=True)
+    return Site(several, part_cache, programs, {}, probes, others)
+
+
+def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
+    """Columns of the trials of a task."""
+    return run_trials(text, folder, layout.trials(task).tolist())
+
+
+def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    """Run the trials of these numbers and return their columns: sampled values, status and metrics."""
+    with runtime.on_processor():
+        return _ran(site(text, folder), rows)
+
+
+def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
+    trials = np.array(rows, dtype=np.int64)
+    sampled = here.trials.sampled(trials)
+    columns = {f"vary:{key}": column for key, column in _columns(here.trials, sampled)}
+    columns["trial"], columns["seed"] = trials.astype(np.uint32), here.trials.seeds(trials)
+    where: list[int] = []
+    criteria: list[Mapping[str, float]] = []
+    firsts: list[Built] = []
+
+    def batches() -> Iterator[RunBatch]:
+        for found in build_trials(here.trials, here.part_cache, trials, sampled, here.traceable):
+            where.extend(found.places.tolist())
+            firsts.extend([found.first] * len(found.places))
+            judged = found.first.window()[0] < found.first.scenario.loop.duration
+            criteria.extend([found.first.resolved["success"] if judged else {}] * len(found.places))
+            yield found.batch
+
+    campaign = here.trials.campaign
+    asked = recorded(campaign, next(iter(here.probes().values()))) if campaign.formulas else campaign.series
+    result = run_prepared(batches(), here.programs)
+    if result is None:  # no trials: the arrays of one trial, cut to length zero
+        one_trial = run_prepared([prepare_trial(next(iter(here.probes().values())), asked)], here.programs)
+        result = jax.tree.map(lambda values: values[:0], one_trial)
+    robust = robustness(campaign, firsts, result.series, result.status, result.ended)
+    scatter = functools.partial(_scatter, len(rows), where)
+    columns["status"] = scatter(result.status, INVALID)
+    columns["ended"] = scatter(result.ended, np.nan)
+    columns["backend"] = scatter(result.backend, INVALID)
+    columns["success"] = scatter(_success(criteria, result.metrics), NOT_JUDGED)
+    undefined = np.full(len(where), np.nan)
+    found = {name: result.metrics.get(name, undefined) for name in here.metrics()}
+    found |= robust
+    kept = campaign.series.signals if campaign.series is not None else ()
+    found |= {f"series:{name}": result.series[name] for name in kept}
+    if "precision" in campaign.keys:  # one array holds both
+        found = {name: values.astype(np.float64) for name, values in found.items()}
+    return columns | {name: scatter(values, np.nan) for name, values in found.items()}
+
+
+def _alternatives(several: Trials, part_cache: PartCache) -> Iterator[Built]:
+    """They may name other files, and have metrics of their own."""
+    for data in several.alternatives():
+        with contextlib.suppress(BadInput):
+            yield build_data(several, part_cache, data)
+
+
+def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.ndarray]) -> np.ndarray:
+    """1 where all that a trial is judged by stays below its limit, 0 where not, `NOT_JUDGED` without a criterion."""
+    found = np.full(len(criteria), NOT_JUDGED, dtype=np.int8)
+    for i, criterion in enumerate(criteria):
+        if criterion:  # what is not defined, as in a run that failed, is NaN and below nothing
+            found[i] = all(name in metrics and metrics[name][i] < most for name, most in criterion.items())
+    return found
+
+
+def _columns(several: Trials, sampled: Mapping[str, list[Any]]) -> Iterable[tuple[str, np.ndarray]]:
+    """Sampled values; the index of the choice where they are not numbers."""
+    for key, entries in varied_keys(several.campaign):
+        pick: Any = float if entries is None else list(entries.values()).index
+        yield key, np.array([pick(value) for value in sampled[key]], dtype=float)
+
+
+def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
+    """An array with values at their rows and `empty` elsewhere."""
+    whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
+    whole[where] = values
+    return whole
+
+
+# Trials that are built again: each takes milliseconds.
+_MOST = 200
+
+
+class InvalidTrials(NamedTuple):
+    """Trials that are invalid for the same reason."""
+
+    why: str  # the error of the first of them
+    trials: int
+
+
+def reasons(several: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
+    """The reasons why trials are invalid, the most frequent first.
+
+    Args:
+        several: the trials.
+        rows: numbers of the invalid trials; only the first 200 are built again.
+    """
+    part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
+    for row in rows[:_MOST]:
+        try:
+            build_trial(several, part_cache, int(row))
+        except BadInput as error:
+            found.setdefault((error.name, error.must), []).append(str(error))
+    return tuple(InvalidTrials(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))

@@ -1,0 +1,190 @@
+"""Candidates of a comparison: controllers by name, file or options, and whole scenarios."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.core import catalogue
+from undertow.core.errors import BadInput, did_you_mean
+from undertow.scenario import factory
+from undertow.scenario.build import build
+from undertow.scenario.reading import Text, from_data, read
+from undertow.scenario.schema import Part, named_law, validate
+from undertow.studies.campaign.labels import words
+
+OWN = "scenario"  # stands for the controller of the scenario itself
+_CODE = ".py:"
+_FILES = (".yaml", ".yml", ".nc")
+
+# Keys of a scenario in which candidates do not differ: each trial has its own seed, and the rest is not simulated.
+_NOT_COMPARED = {"description", "seed", "tune"}
+
+
+class Candidate(NamedTuple):
+    """One side of a comparison.
+
+    Attributes:
+        name: in tables and figures.
+        changes: key path of the scenario -> value, like an entry of `variants` in a campaign.
+        source: the scenario file that the gains come from; None where a name or options were given.
+    """
+
+    name: str
+    changes: dict[str, Any]
+    source: Path | None
+
+
+def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Candidate]:
+    """Controllers that are compared on one scenario.
+
+    Args:
+        given: entries such as `robust`, `pid`, `./mine.py:smc`, `tuned.yaml`, `scenario` or `NAME=ENTRY`; or name ->
+            entry, where an entry may also be a mapping like the key `controller` of a scenario.
+        scenario: the scenario.
+        path: its file, for the entry `scenario`; None where it has none.
+
+    Raises:
+        BadInput: fewer than two, or one of them is no controller.
+    """
+    pairs = given.items() if isinstance(given, Mapping) else map(_split, given)
+    own = lambda name: _own(name, scenario, path)
+    found = [own(name) if entry == OWN else _controller(name, entry) for name, entry in pairs]
+    if len(found) < 2:
+        hint = "For example: --controllers robust,pid. The word `scenario` stands for the scenario's own controller"
+        raise BadInput("--controllers", "name at least two controllers", len(found), hint=hint)
+    return _unique(found)
+
+
+def laws(given: Sequence[str]) -> list[Candidate]:
+    """Controllers that need no scenario: entries as of `controllers`, but for `scenario`.
+
+    Raises:
+        BadInput: one of them is no controller.
+    """
+    return _unique([_controller(name, entry) for name, entry in map(_split, given)])
+
+
+def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candidate], dict[str, list[str]]]:
+    """Scenarios that are compared as a whole.
+
+    Returns:
+        The first of them, with the contents of all files that it names; the candidates; and what differs, as key ->
+        the value in each.
+
+    Raises:
+        BadInput: one of the scenarios is invalid.
+    """
+    texts = [read(path, allow_code=allow_code) for path in paths]
+    for path, text in zip(paths, texts, strict=True):
+        if "scenario" in text.data:
+            hint = "A campaign file is compared alone: its own `cross` or `variants`, or with --controllers"
+            raise BadInput(str(path), "be a scenario where several are given", "a campaign", hint=hint)
+    resolved = [build(text).resolved for text in texts]
+    whole = [_flat(each) for each in resolved]
+    keys = dict.fromkeys(key for each in whole for key in each)
+    different = [key for key in keys if any(each.get(key) != whole[0].get(key) for each in whole)]
+    alike = [path.stem for path in paths]
+    names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
+    # A scenario may be without metrics of its own, faults and a supervisor.
+    found = [
+        Candidate(name, {key: each.get(key, None if key == "supervisor" else []) for key in different}, path)
+        for name, each, path in zip(names, whole, paths, strict=True)
+    ]
+    return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(found), _differing(texts)
+
+
+def _differing(texts: Sequence[Text]) -> dict[str, list[str]]:
+    """Key -> its value in each scenario as the user wrote it, for the keys that differ."""
+    written = [_flat(validate(text).model_dump()) for text in texts]
+    keys = dict.fromkeys(key for each in written for key in each)
+    shown = {key: [words(each.get(key, "not given")) or "none" for each in written] for key in keys}
+    return {key: values for key, values in shown.items() if len(set(values)) > 1}
+
+
+def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a scenario that decide its runs; those of sections that are no parts one by one, as `loop.dt`."""
+    found: dict[str, Any] = {}
+    for key, value in data.items():
+        if key in _NOT_COMPARED:
+            continue
+        if key in ("loop", "steady") and isinstance(value, Mapping):
+            found |= {f"{key}.{inner}": one for inner, one in value.items()}
+        else:
+            found[key] = value
+    return found
+
+
+def _split(entry: str) -> tuple[str, str]:
+    """Name and entry of `NAME=ENTRY`; no name where there is none."""
+    name, equals, value = entry.partition("=")
+    return (name.strip(), value.strip()) if equals else ("", entry.strip())
+
+
+def _own(name: str, scenario: Text, path: Path | None) -> Candidate:
+    """The controller of the scenario itself."""
+    part = part_of(validate(scenario).controller, scenario.folder)
+    return Candidate(name or f"{label(part)} (scenario)", {"controller": part}, path)
+
+
+def _controller(name: str, entry: Any) -> Candidate:
+    if isinstance(entry, Mapping):
+        part = named_law(from_data(entry).data)
+        return Candidate(name or label(part), {"controller": part}, None)
+    if not isinstance(entry, str) or not entry:
+        raise BadInput("--controllers", "name controllers, separated by commas", repr(entry))
+    if entry.endswith(_FILES):
+        return _of_file(name, Path(entry))
+    part = _named(entry)
+    return Candidate(name or label(part), {"controller": part}, None)
+
+
+def _of_file(name: str, path: Path) -> Candidate:
+    """The controller of a scenario file, of `tuned.yaml` for example."""
+    text = read(path, "--controllers")
+    part = part_of(validate(text).controller, text.folder)
+    return Candidate(name or f"{label(part)} ({path.stem})", {"controller": part}, path)
+
+
+def part_of(controller: Part, folder: Path) -> dict[str, Any]:
+    """A controller of a scenario in `folder` as data that any other scenario may have."""
+    data = controller.model_dump()
+    return data | {"kind": factory.portable_name(data["kind"], folder)}
+
+
+def _named(entry: str) -> dict[str, Any]:
+    """A controller by the name of a preset, by its own name, or by a file of Python code and a function."""
+    if _CODE in entry:
+        catalogue.find("controllers", entry, Path(), "--controllers")
+        return {"kind": factory.portable_name(entry, Path())}
+    presets, parts = catalogue.presets("controllers"), catalogue.names("controllers")
+    if entry in presets or entry in parts:
+        return catalogue.spelled_out("controllers", {"kind": entry})
+    hint = f"Name the function as well: {entry}:FUNCTION" if entry.endswith(".py") else ""
+    known = [*presets, *parts, OWN]
+    must = "name presets, controllers, ./file.py:function or scenario files"
+    raise BadInput("--controllers", must, entry, hint=hint or did_you_mean(entry, known))
+
+
+def label(part: Mapping[str, Any]) -> str:
+    """Short name of a controller: its preset, its function or its kind."""
+    return str(part.get("preset") or part["kind"].rpartition(":")[2])
+
+
+def file_stem(number: int, name: str) -> str:
+    """Name of the files of a candidate: its number, from 0, and its name in letters of every file system."""
+    return f"{number + 1}-{in_letters(name)}"
+
+
+def in_letters(name: str) -> str:
+    """A name in letters of every file system."""
+    return re.sub(r"[^a-zA-Z0-9_-]+", "-", name).strip("-")
+
+
+def _unique(found: Sequence[Candidate]) -> list[Candidate]:
+    """With a number behind names that occur again."""
+    names: list[str] = []
+    for one in found:
+        number = 1 + sum(other.name == one.name for other in found[: len(names)])
+        names.append(one.name if number == 1 else f"{one.name} {number}")
+    return [one._replace(name=name) for one, name in zip(found, names, strict=True)]

@@ -1,0 +1,141 @@
+"""The result of a comparison, and `ut.compare`, which runs one from Python."""
+
+import dataclasses
+import os
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from undertow.analysis.metrics import MEANINGS
+from undertow.core import checks
+
+# What a campaign needs is imported where it is used: SciPy and zarr add filters of warnings to the process, and to look
+# at a name of undertow changes nothing.
+if TYPE_CHECKING:
+    from undertow.studies.campaign.store_results import Results
+    from undertow.studies.comparison.findings import Findings
+    from undertow.studies.comparison.paired import Difference
+    from undertow.studies.comparison.prepare import PreparedComparison
+
+# Metrics that are compared, where they are defined: those that mean the same for every law.
+_COMPARED = (
+    "position_rms",
+    "attitude_rms",
+    "tracking_rms",
+    "settling_time",
+    "energy",
+    "input_rms",
+    "input_variation",
+    "saturated_fraction",
+)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Comparison:
+    """A finished comparison.
+
+    Attributes:
+        dataset: a column for every metric, seed, status and series, with the dimension `controller` (or `scenario`, or
+            the swept key of a campaign file) and `sample`.
+        findings: medians, paired differences, failures, and how the gains came about.
+    """
+
+    dataset: xr.Dataset
+    findings: "Findings"
+
+    @property
+    def differences(self) -> "tuple[Difference, ...]":
+        """Every two candidates in every metric."""
+        return self.findings.differences
+
+    def table(self, style: str = "markdown") -> str:
+        """Metrics and differences as a table.
+
+        Args:
+            style: `markdown`; `latex`, which needs the packages booktabs and tabularx; or `csv`, a line per metric and
+                candidate.
+
+        Raises:
+            BadInput: another style.
+        """
+        from undertow.studies.comparison.tables import STYLES, table
+
+        checks.choice("style", style, tuple(STYLES))
+        return table(self.findings, style)
+
+    def __repr__(self) -> str:
+        from undertow.studies.comparison.sentences import sentences
+
+        names = ", ".join(self.findings.names)
+        return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
+
+
+def read_comparison(folder: Path, results: "Results", ready: "PreparedComparison") -> Comparison:
+    """The result of a comparison whose campaign has run in a folder and was read from there."""
+    from undertow.studies.campaign.columns import DONE
+    from undertow.studies.campaign.run_campaign import STORE
+    from undertow.studies.comparison.findings import find
+
+    with xr.open_zarr(folder / STORE, consolidated=False) as opened:
+        dataset = opened.drop_vars(DONE).load()
+    (axis,) = results.campaign.axes
+    named = {ready.dimension: np.array(ready.names)}
+    dataset = dataset.rename({axis: ready.dimension} if axis != ready.dimension else {}).assign_coords(named)
+    own = [name for name in results.metrics if name not in MEANINGS]
+    metrics = [name for name in (*_COMPARED, *own) if name in results.metrics]
+    tuning = {name: note.sentence for name, note in zip(ready.names, ready.notes, strict=True)}
+    findings = find(dataset, ready.dimension, metrics, tuning, ready.differing)
+    return Comparison(dataset, findings._replace(nominal_model=ready.prepared.trials.nominal_model()))
+
+
+def compare(
+    scenario: str | Path | Mapping[str, Any] | Sequence[str | Path],
+    controllers: Sequence[str] | Mapping[str, Any] | None = None,
+    trials: int | None = None,
+    *,
+    tune: int | None = None,
+    workers: int | None = None,
+    allow_code: bool = False,
+) -> Comparison:
+    """Compare controllers on one scenario, or several scenarios, trial by trial with the same samples and seeds.
+
+    What `undertow compare` does, with the same numbers, and without its files.
+
+    Args:
+        scenario: a scenario file or a scenario as data; several scenario files; or a campaign file.
+        controllers: such as `["robust", "pid", "./mine.py:smc", "runs/heavy-tuned/tuned.yaml"]`, or name -> entry,
+            where an entry may also be a mapping such as `{"kind": "pid", "frequency": 2}`.
+        trials: samples for each; None for 20, or the number of the campaign file. One where nothing is random.
+        tune: evaluations with which the gains of every controller are tuned first; None to compare them as they are.
+        workers: number of threads; None for all cores.
+        allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
+
+    Raises:
+        BadInput: anything wrong with the scenario, the controllers or the number of trials.
+    """
+    from undertow.simulation.executors import make_executor
+    from undertow.studies.campaign.run_campaign import run_campaign
+    from undertow.studies.campaign.store_results import load
+    from undertow.studies.comparison.equal_budgets import equal_budgets
+    from undertow.studies.comparison.prepare import prepare_comparison
+
+    given: Any = scenario
+    if isinstance(scenario, str | Path):
+        given = [Path(scenario)]
+    elif not isinstance(scenario, Mapping):
+        given = list(map(Path, scenario))
+    with tempfile.TemporaryDirectory() as kept:
+        tuner = None
+        if tune is not None:
+            tuner = lambda candidates, base: equal_budgets(candidates, base, tune, Path(kept))
+        ready = prepare_comparison(given, controllers, trials, allow_code, tuner)
+    for sentence in ready.advice:
+        warnings.warn(sentence, stacklevel=2)
+    with tempfile.TemporaryDirectory() as folder, make_executor(None, workers or os.cpu_count() or 1) as executor:
+        run_campaign(ready.prepared, Path(folder), executor, lambda tally: None)
+        return read_comparison(Path(folder), load(Path(folder)), ready)

@@ -1,0 +1,50 @@
+"""Conditions that tuned controllers are judged in: other seeds, other parameter sets of the vehicle, other seas."""
+
+from typing import Any
+
+from undertow.scenario.build import build
+from undertow.scenario.reading import Text
+from undertow.studies.comparison.equal_budgets import EqualBudgets
+
+SET = "plant.vehicle.parameters"
+_WAVES, _HEIGHT = "waves", "height"
+
+
+def held_out(text: Text, scenario: Text, budgets: EqualBudgets) -> Text:
+    """The campaign file of a comparison on held-out conditions.
+
+    The seeds of the trials are those of the campaign, which no training run has. The parameter set of the plant is one
+    of the held-out sets, of which the nominal model knows nothing, and wave heights are between the smallest and the
+    largest held-out size. A key that the user varies stays.
+
+    Args:
+        text: the scenario, or a campaign file that has it.
+        scenario: the scenario.
+        budgets: how its controllers were tuned.
+    """
+    if budgets.held_out is None:
+        return text
+    data = dict(text.data) if "scenario" in text.data else {"scenario": text.data}
+    asked, vary = data.get("vary") or {}, {}
+    resolved = build(scenario).resolved
+    sets = budgets.held_out.sets
+    if len(sets) > 1 and not any(key.startswith("plant.vehicle") or key == "plant" for key in asked):
+        vary[SET] = {"choice": list(sets)}
+    low, high = min(budgets.held_out.sizes), max(budgets.held_out.sizes)
+    for key, height in _heights(scenario.data.get("disturbance"), resolved["disturbance"]).items():
+        if low < high and height > 0 and not any(key.startswith(other) for other in asked):
+            vary[key] = {"uniform": [low * height, high * height]}
+    lines = text.lines if "scenario" in text.data else {("scenario", *place): one for place, one in text.lines.items()}
+    return text._replace(data=data | {"vary": {**asked, **vary}}, lines=lines)
+
+
+def _heights(written: Any, resolved: Any) -> dict[str, float]:
+    """Key path -> wave height, m, of every disturbance with waves."""
+    listed = isinstance(written, list)
+    entries = resolved if isinstance(resolved, list) else [resolved]
+    place = lambda number: f"disturbance[{number}]" if listed else "disturbance"
+    return {
+        f"{place(number)}.{_HEIGHT}": float(one[_HEIGHT])
+        for number, one in enumerate(entries)
+        if one.get("kind") == _WAVES and isinstance(one.get(_HEIGHT), int | float)
+    }

@@ -1,0 +1,70 @@
+"""Computing time of one step of a controller: the median of many calls of its single compiled step."""
+
+import statistics
+import time
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.contracts import Target
+from undertow.scenario.build import Built, in_its_precision
+from undertow.simulation.loop.controller_step import first_step, next_step
+from undertow.simulation.loop.stepped import Step
+
+HOW_LONG = (
+    "Computing time is the median over the calls of one compiled step of the law alone, on this machine; it differs "
+    "from run to run. A step by XLA includes about 100 \u00b5s for the call."
+)
+
+_CALLS, _BEFORE = 2000, 200
+_LONGEST = 0.5  # s, for the calls of one law
+
+
+class StepTime(NamedTuple):
+    """Time of one control step of a law by itself, without plant and navigation.
+
+    Attributes:
+        median: s.
+        backend: `simd` or `xla`, see `undertow.simulation.loop.stepped.Step`.
+    """
+
+    median: float
+    backend: str
+
+
+def step_times(built: Mapping[str, Built]) -> dict[str, StepTime]:
+    """Time of a step of every law, by name. It depends on the machine and on what else runs there."""
+    return {name: step_time(one) for name, one in built.items()}
+
+
+@in_its_precision
+def step_time(built: Built) -> StepTime:
+    """Time of a step of the law of a scenario, at rest at the origin of the reference."""
+    loop, dt = built.closed_loop, built.scenario.loop.dt
+    law, plant = loop.controller, loop.plant
+    numbers, rest = eqx.partition(law, eqx.is_array)
+    own = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
+    y = plant.output(jnp.zeros(()), plant.initial_state())
+    if law.takes_raw_readings:
+        y = y._replace(health=jnp.ones(plant.inputs()))
+    target: Target = loop.reference.at(jnp.zeros(()))
+    applied, interval = jnp.zeros(plant.inputs()), jnp.asarray(dt)
+    memory, _ = first_step(law, y, target)
+
+    def step(numbers: Any, memory: Any, inputs: Any) -> tuple[Any, Any]:
+        measured, desired, was_applied, elapsed = inputs
+        return next_step(eqx.combine(numbers, rest), memory, measured, desired, was_applied, elapsed)
+
+    compiled = Step(step, own(numbers), own(memory), own((y, target, applied, interval)))
+    taken, begun = [], time.perf_counter()
+    for _ in range(_BEFORE):
+        compiled()
+    while len(taken) < _CALLS and time.perf_counter() - begun < _LONGEST:
+        start = time.perf_counter()
+        compiled()
+        taken.append(time.perf_counter() - start)
+    return StepTime(statistics.median(taken) if taken else (time.perf_counter() - begun) / _BEFORE, compiled.backend)

@@ -1,0 +1,185 @@
+"""The tables of a comparison as Markdown, LaTeX (booktabs) and CSV."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from undertow.analysis.metrics import for_people, infinite, titled_name
+from undertow.studies.comparison.findings import Findings, Median
+from undertow.studies.comparison.paired import Difference
+from undertow.studies.comparison.sentences import digits, relative
+from undertow.studies.comparison.step_time import StepTime
+
+NOTE = (
+    "Median over completed trials [95 % interval of the median]; metrics of the steady window. "
+    "* marks an established difference from the first column (Wilcoxon signed-rank test with Holm's correction)."
+)
+STEP = "computing time per step (\u00b5s)"
+_NOTHING = "-"
+
+
+class Rows(NamedTuple):
+    """A table of text: column titles and rows, of which the first entry names the row."""
+
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+def medians(
+    found: Findings, times: Mapping[str, StepTime] | None = None, number: Callable[[float], str] = digits
+) -> Rows:
+    """Metrics by candidate, below the number of completed trials.
+
+    Args:
+        found: what a comparison found.
+        times: computing time of a step of each law, for a last row; None where it was not measured.
+        number: how a number is written.
+    """
+    first = found.names[0]
+    rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
+    if any(judged for _, judged in found.successes.values()):
+        kept = (found.successes[name] for name in found.names)
+        rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in kept)))
+    for metric, by_name in found.medians.items():
+        marked = {one.candidate for one in found.differences if one.baseline == first and _is(one, metric)}
+        unit = found.units[metric]
+        cells = (f"{median(by_name[name], unit, number)}{'*' * (name in marked)}" for name in found.names)
+        rows.append((titled(found, metric), *cells))
+    if times:
+        rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
+    return Rows(("metric", *found.names), rows)
+
+
+def _time(one: StepTime | None) -> str:
+    """A time in microseconds, marked where the step could not be compiled by the batch compiler."""
+    if one is None:
+        return _NOTHING
+    return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
+
+
+def paired(found: Findings, number: Callable[[float], str] = digits) -> Rows:
+    """Differences of every two candidates in every metric."""
+    rows = []
+    for one in found.differences:
+        unit = found.units[one.metric]
+        of = lambda count, one=one: f"{count} of {one.pairs}"
+        rows.append(
+            (
+                f"{one.candidate} - {one.baseline}",
+                titled(found, one.metric),
+                median(Median(one.median, one.low, one.high, one.pairs), unit, number),
+                _NOTHING if math.isnan(one.relative) else relative(one, unit),
+                of(one.smaller),
+                _NOTHING if math.isnan(one.p_holm) else digits(one.p_holm),
+                "yes" if one.established else "no",
+            )
+        )
+    head = ("pair", "metric", "median difference", "relative", "smaller in", "p (Holm)", "established")
+    return Rows(head, rows)
+
+
+def median(one: Median, unit: str, number: Callable[[float], str] = digits) -> str:
+    """A median with its interval, in the unit of tables for people."""
+    if math.isnan(one.value):
+        return _NOTHING
+    value, low, high = (value_in(each, unit, number) for each in one[:3])
+    return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
+
+
+def value_in(value: float, unit: str, number: Callable[[float], str] = digits) -> str:
+    """A value in the unit of tables for people, without its name."""
+    return infinite(unit) if math.isinf(value) else number(for_people(value, unit)[0])
+
+
+def titled(found: Findings, metric: str) -> str:
+    """A metric with its unit."""
+    unit = for_people(0.0, found.units[metric])[1]
+    return f"{titled_name(metric)} ({unit})" if unit else titled_name(metric)
+
+
+def _is(one: Difference, metric: str) -> bool:
+    return one.metric == metric and one.established
+
+
+def table(found: Findings, style: str) -> str:
+    """Both tables in one of `STYLES`."""
+    return STYLES[style](found)
+
+
+def _markdown(found: Findings) -> str:
+    parts = [_markdown_rows(medians(found)), f"{NOTE}\n", _markdown_rows(paired(found))]
+    return "\n".join(parts)
+
+
+def _markdown_rows(rows: Rows) -> str:
+    line = lambda cells: f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
+    ruler = f"|{'---|' * len(rows.head)}\n"
+    return "".join([line(rows.head), ruler, *map(line, rows.rows)])
+
+
+def _latex(found: Findings) -> str:
+    pairs = "Paired differences: median over the trials that both completed [95 % interval]."
+    lines = ["% Needs \\usepackage{booktabs,tabularx}. Wide tables fit on a page as table* or within landscape.", ""]
+    lines += [*_floating(medians(found, number=even_digits), NOTE, "medians"), ""]
+    return "\n".join([*lines, *_floating(paired(found, number=even_digits), pairs, "differences")]) + "\n"
+
+
+def even_digits(value: float) -> str:
+    """A number as `digits` writes it, with zeros at its end: three digits in every cell of a column."""
+    if not value or not 1e-4 <= abs(value) < 1000:
+        return digits(value)
+    return f"{value:#.3g}".rstrip(".")
+
+
+def _floating(rows: Rows, caption: str, label: str) -> list[str]:
+    """A table as wide as the text, whose first column takes what the others leave."""
+    line = lambda cells: f"{' & '.join(map(_escaped, cells))} \\\\"
+    columns = "X" + "r" * (len(rows.head) - 1)
+    body = ["\\toprule", line(rows.head), "\\midrule", *map(line, rows.rows), "\\bottomrule"]
+    begin = ["\\begin{table}", "\\centering", f"\\caption{{{_escaped(caption)}}}", f"\\label{{tab:{label}}}"]
+    begin.append(f"\\begin{{tabularx}}{{\\linewidth}}{{{columns}}}")
+    return [*begin, *body, "\\end{tabularx}", "\\end{table}"]
+
+
+_LATEX = re.compile(
+    r"(?<![\w.])(?P<sign>-?)(?P<mantissa>\d+(?:\.\d+)?)e(?P<power>[+-]\d+)|(?P<minus>(?<![\w.])-(?=[\d. ]))"
+    r"|\^(?P<exponent>-?\d+)|(?P<infinite>\binf\b)|(?P<special>[\\~^*&%$#_{}])"
+)
+_SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "*": r"$^{*}$"}
+
+
+def _escaped(cell: str) -> str:
+    """A cell as LaTeX: minus signs, powers of ten, exponents of units and special characters."""
+
+    def written(found: re.Match) -> str:
+        if found["mantissa"]:
+            return rf"${found['sign']}{found['mantissa']} \times 10^{{{int(found['power'])}}}$"
+        if found["minus"]:
+            return "$-$"
+        if found["infinite"]:
+            return r"$\infty$"
+        if found["exponent"]:
+            return f"$^{{{found['exponent']}}}$"
+        return _SPECIAL.get(found["special"], f"\\{found['special']}")
+
+    return _LATEX.sub(written, cell)
+
+
+def _csv(found: Findings) -> str:
+    stream = io.StringIO()
+    fields = [name for name in Difference._fields if name != "metric"]
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["metric", "unit", "candidate_median", "baseline_median", *fields, "established"])
+    for one in found.differences:
+        by_name = found.medians[one.metric]
+        values = [by_name[one.candidate].value, by_name[one.baseline].value]
+        writer.writerow(
+            [one.metric, found.units[one.metric], *values, *(getattr(one, name) for name in fields), one.established]
+        )
+    return stream.getvalue()
+
+
+STYLES: dict[str, Callable[[Findings], str]] = {"markdown": _markdown, "latex": _latex, "csv": _csv}

@@ -1,0 +1,98 @@
+"""How the gains of a controller came about, in a sentence: a comparison with an untuned rival is no fair one."""
+
+import inspect
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from undertow.core import catalogue
+from undertow.core.contracts import AbstractController
+from undertow.scenario import factory
+from undertow.studies.campaign.labels import words
+from undertow.studies.tuning.cost import times_other
+from undertow.studies.tuning.tunable_parameters import law_of
+
+_RULE = "gains from the rule of `controllers/bandwidths.py`"
+_TABLE_1 = ("rcaf", "paper")
+_NO_GAINS = ("kind", "preset", "sampling_time", "velocity_noise")  # the last two follow from the rest of a scenario
+
+
+class TuningNote(NamedTuple):
+    """How the gains of a controller came about."""
+
+    sentence: str
+    tuned: bool  # by `undertow tune`, or by a rule for this plant
+
+
+def tuning_note(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path, source: Path | None
+) -> TuningNote:
+    """How the gains of a controller came about.
+
+    Args:
+        part: the controller as its scenario has it: kind, preset and options.
+        law: the controller itself.
+        dt: its sampling time, s.
+        folder: where relative file names of the scenario start.
+        source: the scenario file that the gains come from, if any.
+    """
+    searched = _searched(part, source)
+    if searched is not None:
+        return searched
+    kind, preset, given, main = _given(part, law, dt, folder)
+    short, where = kind.rpartition("/")[2], f" in {source}" if source else ""
+    options = ", ".join(f"{name} {words(value)}" for name, value in given.items())
+    if main is not None:
+        instead = {main, *law_of(kind, preset, law).instead.get(main, ())}
+        if not instead & set(given):
+            return TuningNote(f"{_RULE}{f', with {options} given{where}' if given else ''}", True)
+    if given:
+        return TuningNote(f"gains given{where} ({options}), not tuned by `undertow tune`", False)
+    if (kind, preset) == _TABLE_1:
+        return TuningNote("gains of Table 1 of the paper, not tuned for this scenario", False)
+    return TuningNote(f"default gains of `{short}`, not tuned", False)
+
+
+def _given(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path
+) -> tuple[str, str | None, dict[str, Any], str | None]:
+    """Kind, preset, the gains that do not have their default value, and the gain that a rule sets unless it is given.
+
+    A rule sets the first tunable gain of a law of the catalogue, where its default is None.
+    """
+    kind = part["kind"]
+    function = catalogue.find("controllers", kind, folder)
+    presets = catalogue.presets_of(function)
+    preset = part.get("preset", catalogue.usual_preset(function)) if presets else None
+    defaults = inspect.signature(presets[preset] if preset else function).parameters
+    known = law_of(kind, preset, law)
+    tunable = [name.partition("[")[0] for name in known.ranges(dt)]
+    ours = kind in catalogue.names("controllers")
+    ruled = [name for name in tunable[:1] if ours and name in defaults and defaults[name].default is None]
+    names = set(tunable)
+    names |= {other for several in known.instead.values() for other in several}
+    gains = [name for name in part if name in names or (not names and name not in _NO_GAINS)]
+    changed = lambda name: name not in defaults or factory.listed(defaults[name].default) != part[name]
+    given = {name: part[name] for name in gains if part[name] is not None and changed(name)}
+    return kind, preset, given, ruled[0] if ruled else None
+
+
+def _searched(part: Mapping[str, Any], source: Path | None) -> TuningNote | None:
+    """What tuning.json beside a scenario says, if its gains are those of the controller; None otherwise."""
+    try:
+        found = json.loads((source or Path()).with_name("tuning.json").read_text(encoding="utf-8"))
+        kept = found["gains"][found["kept"]]
+        if any(part.get(name) != value for name, value in kept["options"].items()):
+            return None
+        cost, before = kept["held_out_cost"], found["gains"]["given"]["held_out_cost"]
+        relation = f"{times_other(cost, before)} with the gains before"
+        if found["kept"] == "given":
+            relation = "the gains before, which no others that were found are better than"
+        said = f"{found['evaluations']} evaluations in {found['elapsed']:.0f} s"
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError):
+        return None  # of another program, or none
+    ending = "" if found.get("finished") else ", stopped by its time budget"
+    return TuningNote(
+        f"tuned by `undertow tune` ({found['method']}, {said}{ending}; held-out cost {cost:.3g}, {relation})", True
+    )

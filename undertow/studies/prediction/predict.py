@@ -1,0 +1,206 @@
+"""Predict a scenario without running it: operating points, margins, noise, frequency responses and metrics."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
+from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.analysis.linearization.linear_loop import LinearLoop
+from undertow.analysis.theory import theory_of
+from undertow.core.arrays import as_array
+from undertow.physics.plants.reachability import open_loop_advice
+from undertow.scenario.build import Built, in_its_precision
+from undertow.studies.prediction.operating_point import OperatingPoint, input_limits, operating_point, predicted
+
+# Quantiles of the loads along the reference at which the loop is linearised.
+SHARES = (0.1, 0.5, 0.9)
+
+_SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: ranges of frequencies and margins
+_HIGHEST = 1.0  # frequency times sampling time: a third of the Nyquist frequency
+_NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
+_DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and its limit
+
+Progress = Callable[[str, float], None]  # called with a message and the share done
+
+
+class Point(NamedTuple):
+    """One operating point."""
+
+    where: str
+    flow: float | None  # speed of the water past the vehicle, m/s; None for other plants
+    at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
+    used: float  # largest |u| as a share of its limit; 0 without a limit
+    poles: np.ndarray  # 1/s
+    radius: float  # spectral radius over one control step; stable below 1
+
+    @property
+    def found(self) -> bool:
+        """Whether the equilibrium exists."""
+        return self.at.found
+
+
+class Noise(NamedTuple):
+    """White noise on the measured velocities, independent at every control step."""
+
+    of_input: np.ndarray  # standard deviation per m/s or rad/s of noise
+    of_estimate: np.ndarray  # 1/s
+    largest: float  # noise, m/s and rad/s, at which three standard deviations of the input reach its limit
+
+
+class Prediction(NamedTuple):
+    """Result of `undertow analyze`."""
+
+    operating_point: OperatingPoint
+    points: tuple[Point, ...]
+    margins: dict[str, float]  # at the point closest to instability
+    noise: Noise
+    frequency: np.ndarray  # rad/s
+    error: np.ndarray  # |e / d| of each axis, (frequencies, axes); s^2
+    estimation: np.ndarray  # |d_hat - d| / |d|, likewise
+    forms: list[ClosedForm]
+    estimators: list[tuple[str, float, float, float | None]]  # axis, w_o rad/s, zeta, |d_til| per |d_dot| s
+    drift: (
+        tuple[float, float] | None
+    )  # largest gain that bounded weights can add, and the gain that destabilises the loop, 1/s
+    authority: ActuatorAuthority
+    lost: tuple[str, ...]
+    metrics: dict[str, float] | None  # of the steady window
+    why_not: str  # reason where there are none
+
+
+@in_its_precision
+def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
+    """Predict a scenario from its linearised closed loop."""
+    progress("equilibrium", 0.0)
+    known = operating_point(built)
+    loop, settings = known.built.closed_loop, built.scenario.loop
+    progress("poles at the operating points", 0.5)
+    points = tuple(_point(known, one) for one in known.around.operating_points(SHARES))
+    worst = max(points, key=lambda point: point.radius).at
+    progress("margins", 0.6)
+    found = _margins(worst, settings.dt)
+    progress("noise and disturbances", 0.9)
+    frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
+    error, estimation = _responses(known.linear, frequency)
+    law, names = loop.controller, loop.plant.outputs
+    metrics, why_not = predicted(known)
+    axes, theory = range(len(names)), theory_of(law)
+    gains = np.asarray(law.model.dynamics.gain(loop.plant.output(as_array(0.0), worst.parts.states(worst.at)[0])))
+    return Prediction(
+        operating_point=known,
+        points=points,
+        margins=found,
+        noise=_noise(known),
+        frequency=frequency,
+        error=error,
+        estimation=estimation,
+        forms=closed_form_poles(law, margins.poles(known.linear), names),
+        estimators=[(names[i], *found, theory.ramp_error(i)) for i in axes if (found := theory.estimator(i))],
+        drift=max((found for i in axes if (found := theory.drift_bound(i, settings.dt))), default=None),
+        authority=actuator_authority(loop, known.mean, known.around.load),
+        lost=open_loop_advice("the gain matrix", gains, names),
+        metrics=metrics,
+        why_not=why_not,
+    )
+
+
+def _point(known: OperatingPoint, acting: OperatingConditions) -> Point:
+    loop, settings = known.built.closed_loop, known.built.scenario.loop
+    at = equilibrium(loop, settings.dt, known.mean.parts.target.position, acting.load, acting.flow)
+    linear = margins.closed(at, settings.dt, settings.kind)
+    low, high = input_limits(known.built, at)
+    used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
+    speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
+    return Point(acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
+
+
+def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
+    low, high = margins.gain_range(at, dt)
+    return {
+        "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),
+        "delay": margins.largest_delay(at, dt, _LONGEST),
+        "lag": margins.largest_lag(at, dt, _LONGEST),
+        "gain_low": low,
+        "gain_high": high,
+    }
+
+
+def _noise(known: OperatingPoint) -> Noise:
+    dt, axes = known.linear.dt, known.around.load.shape[1]
+    sampled = margins.closed(known.mean, dt)
+    one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
+    gain = lambda name: margins.noise_gain(sampled, name, one) / _NOISE
+    of_input, of_estimate = gain("u"), gain("estimate") if "estimate" in sampled.signals else np.zeros(axes)
+    low, high = input_limits(known.built, known.mean)
+    room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
+    return Noise(of_input, of_estimate, largest)
+
+
+def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """|e / d| of each output, and |d_hat - d| / |d| of each axis of the controller, under a load on the same axis.
+
+    The estimate of a law that has none is zero.
+    """
+    answer = {name: margins.response(linear, name, frequency) for name in ("error", "uncertainty")}
+    estimate = margins.response(linear, "estimate", frequency) if "estimate" in linear.signals else 0.0
+    into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs in the controller's axes
+    missed = (estimate - answer["uncertainty"]) @ np.linalg.inv(into_axes)
+    own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
+    return own(answer["error"]), own(missed)
+
+
+def summary(prediction: Prediction) -> dict[str, Any]:
+    """Contents of prediction.json."""
+    known = prediction.operating_point
+    return {
+        "position": known.mean.parts.target.position.tolist(),
+        "mean_load": known.mean.at["load"].tolist(),
+        "points": [
+            {
+                "where": point.where,
+                "flow": point.flow,
+                "load": point.at.at["load"].tolist(),
+                "input": point.at.at["u"].tolist(),
+                "input_used": point.used,
+                "held": point.found,
+                "spectral_radius": point.radius,
+                "poles": [[pole.real, pole.imag] for pole in point.poles],
+            }
+            for point in prediction.points
+        ],
+        "margins": prediction.margins,
+        "noise": {
+            "of_input": prediction.noise.of_input.tolist(),
+            "of_estimate": prediction.noise.of_estimate.tolist(),
+            "largest_velocity_noise": prediction.noise.largest,
+        },
+        "estimators": [
+            dict(zip(("axis", "frequency", "damping", "ramp_error"), row, strict=True)) for row in prediction.estimators
+        ],
+        "closed_forms": [
+            {
+                "meaning": row.meaning,
+                "expected": [row.expected.real, row.expected.imag],
+                "nearest": [row.nearest.real, row.nearest.imag],
+            }
+            for row in prediction.forms
+        ],
+        "drift": prediction.drift,
+        "actuator_authority": {
+            "low": prediction.authority.low.tolist(),
+            "high": prediction.authority.high.tolist(),
+            "demand": prediction.authority.demand.tolist(),
+            "held": prediction.authority.held,
+            "smallest_share": float(prediction.authority.share.min()),
+        },
+        "uncontrollable": list(prediction.lost),
+        "metrics": prediction.metrics,
+        "why_no_metrics": prediction.why_not,
+    }

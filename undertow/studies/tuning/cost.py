@@ -1,0 +1,96 @@
+"""Cost of a run: smooth, dimensionless and finite."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core.param import Param, param
+from undertow.scenario.schema import Weights
+from undertow.simulation.loop.recorded_signals import Signals
+from undertow.simulation.loop.sampled import AbstractAccumulator
+
+Scalar = Float[Array, ""]
+
+_HAIR = 1e-9  # s; times are k dt in floating point
+_SMOOTH = 1e-6  # |x| is rounded below this
+_MOST = 100.0  # upper bound of each part, so that a failed run does not outweigh all others
+
+
+class Sums(NamedTuple):
+    """Running sums over the window."""
+
+    samples: Scalar
+    tracking: Scalar
+    effort: Scalar
+    variation: Scalar
+    span: Scalar  # s
+    last: tuple[Scalar, Float[Array, " m"], Scalar]  # t, share of the input, whether inside
+
+
+class Shares(NamedTuple):
+    """Dimensionless parts of the cost."""
+
+    tracking: Scalar  # rms tracking error, each axis relative to its scale
+    effort: Scalar  # rms input, as a share of its limit
+    variation: Scalar  # total variation of the input per second, as a share of its limit: chattering and noise
+    lost: Scalar  # share of the duration that a failed run lacks
+
+    def cost(self, weights: Weights) -> Scalar:
+        """The weighted sum."""
+        return (
+            weights.tracking * self.tracking
+            + weights.effort * self.effort
+            + weights.variation * self.variation
+            + weights.failure * self.lost
+        )
+
+
+class CostSums(AbstractAccumulator):
+    """Accumulates what `Shares` needs, step by step from `start` on."""
+
+    start: Float[Param, ""] = param("s", "start of the evaluated window")
+    error_scale: Float[Param, " n"] = param("m, rad", "errors with a cost of one")
+    input_scale: Float[Param, ""] = param("unit of the input", "input with a cost of one")
+
+    def init(self, signals: Signals) -> Sums:
+        zero = jnp.zeros(())
+        return Sums(zero, zero, zero, zero, zero, (zero, jnp.zeros_like(signals["input"]), zero))
+
+    def update(self, state: Sums, t: Scalar, signals: Signals) -> Sums:
+        inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
+        last_t, last_share, last_inside = state.last
+        share, between = signals["input"] / self.input_scale, inside * last_inside
+        step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
+        return Sums(
+            samples=state.samples + inside,
+            tracking=state.tracking + inside * _bounded(((signals["error"] / self.error_scale) ** 2).mean(), _MOST**2),
+            effort=state.effort + inside * _bounded((share**2).mean(), _MOST**2),
+            variation=state.variation + between * step.mean(),
+            span=state.span + between * (t - last_t),
+            last=(t, share, inside),
+        )
+
+
+def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
+    """Parts of the cost of a run.
+
+    Args:
+        sums: sums over the window.
+        ended: time of failure, or the duration, s.
+        duration: s.
+    """
+    rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
+    variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
+    found = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
+    return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))
+
+
+def times_other(cost: float, other: float) -> str:
+    """A cost as a multiple of another one, in words that say which is smaller."""
+    return f"{other / cost:.3g} times smaller than" if cost < other else f"{cost / other:.3g} times larger than"
+
+
+def _bounded(x, most: float):
+    """Approximately x while it is small, and below `most`."""
+    return x / (1 + x / most)

@@ -1,0 +1,128 @@
+"""Training and held-out runs: seeds, sizes of the disturbance, and plant variants beside the nominal model."""
+
+import inspect
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from undertow.core import catalogue, checks
+from undertow.core.contracts import AbstractPlant
+from undertow.core.errors import BadInput
+from undertow.core.numerics.random_keys import key_of_seed
+from undertow.scenario import factory
+from undertow.scenario.build import Built
+from undertow.scenario.reading import Text
+from undertow.scenario.schema import TrainingRuns
+
+_HELD_OUT_SEEDS = 1_000_000  # far from the training seeds
+
+
+class Trials(NamedTuple):
+    """Runs that differ in what the nominal model does not include; leaves of `plants` have one entry per trial."""
+
+    plants: AbstractPlant
+    keys: Array
+    sizes: Float[Array, " trials"]
+    variants: tuple[str, ...]  # plant variant of each; "" where there is only one
+
+    @property
+    def number(self) -> int:
+        """Number of trials."""
+        return len(self.variants)
+
+    def part(self, chosen: Any) -> "Trials":
+        """The trials with the given numbers, which may repeat."""
+        pick = lambda tree: jax.tree.map(lambda leaf: leaf[chosen], eqx.filter(tree, eqx.is_array))
+        plants = eqx.combine(pick(self.plants), eqx.filter(self.plants, eqx.is_array, inverse=True))
+        return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.variants[i] for i in chosen))
+
+
+def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
+    """Both sets of trials of a scenario, with different seeds and, where there are several, different parameter sets.
+
+    The nominal model stays the same. Published sets, starting with the nominal one, alternate between the training and
+    the held-out set, which also contains the nominal one.
+
+    Raises:
+        BadInput: a parameter set that the vehicle does not have.
+    """
+    tune, names = built.scenario.tune, parameter_sets(built)
+    own = tuple(dict.fromkeys((*names[:1], *names[1::2])))
+    train = trials(text, built, tune.train, names[::2], "train", built.scenario.seed)
+    return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
+
+
+def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str], key: str, first_seed: int) -> Trials:
+    """Every set with every seed; sizes of the disturbance take turns with the seeds.
+
+    Args:
+        text: the scenario as read.
+        built: the same, built.
+        runs: number of seeds, sizes and sets.
+        default: sets where none are given.
+        key: key of `tune`, for messages.
+        first_seed: first seed; the others follow.
+    """
+    names, known = tuple(runs.sets if runs.sets is not None else default), parameter_sets(built)
+    for i, name in enumerate(names):
+        if not known:
+            raise BadInput(f"tune.{key}.sets", "be left out: there is only one parameter set", list(names))
+        checks.choice(f"tune.{key}.sets[{i}]", name, known)
+    for i, size in enumerate(runs.sizes):
+        checks.not_negative(f"tune.{key}.sizes[{i}]", size)
+    if not runs.sizes:
+        raise BadInput(f"tune.{key}.sizes", "have an entry")
+    if names == ():
+        names = known[:1] if known else ("",)
+    plants = {name: _plant(text, built, name) for name in names}
+    each = [(name, seed) for seed in range(runs.seeds) for name in names]
+    return Trials(
+        plants=stacked([plants[name] for name, _ in each]),
+        keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in each]),
+        sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in each], dtype=float),
+        variants=tuple(name for name, _ in each),
+    )
+
+
+def joined(several: Sequence[Trials]) -> Trials:
+    """All trials of several sets."""
+    numbers = [(eqx.filter(one.plants, eqx.is_array), one.keys, one.sizes) for one in several]
+    arrays, keys, sizes = jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *numbers)
+    plants = eqx.combine(arrays, eqx.filter(several[0].plants, eqx.is_array, inverse=True))
+    return Trials(plants, keys, sizes, tuple(name for one in several for name in one.variants))
+
+
+def parameter_sets(built: Built) -> tuple[str, ...]:
+    """Published parameter sets of the scenario's vehicle, its own first; empty where there is only one."""
+    vehicle = built.resolved["plant"].get("vehicle")
+    if not isinstance(vehicle, dict) or "parameters" not in vehicle:
+        return ()
+    function = catalogue.names("vehicles").get(vehicle["kind"])
+    if function is None or "parameters" not in inspect.signature(function).parameters:
+        return ()
+    names = tuple(getattr(sys.modules[function.__module__], "PARAMETERS", ()))
+    own = vehicle["parameters"]
+    return (own, *(name for name in names if name != own)) if own in names else ()
+
+
+def stacked(plants: Sequence[AbstractPlant]) -> AbstractPlant:
+    """Plants of one kind as one plant with stacked arrays; names and sources are those of the first."""
+    numbers = [jax.tree.leaves(eqx.filter(plant, eqx.is_array)) for plant in plants]
+    tree = jax.tree.structure(eqx.filter(plants[0], eqx.is_array))
+    together = jax.tree.unflatten(tree, [jnp.stack(leaves) for leaves in zip(*numbers, strict=True)])
+    return eqx.combine(together, eqx.filter(plants[0], eqx.is_array, inverse=True))
+
+
+def _plant(text: Text, built: Built, name: str) -> AbstractPlant:
+    """The scenario's plant with another parameter set."""
+    if not name or name == built.resolved["plant"]["vehicle"]["parameters"]:
+        return built.closed_loop.plant
+    given = dict(built.scenario.plant.model_dump())
+    vehicle = given.get("vehicle", built.resolved["plant"]["vehicle"])
+    given["vehicle"] = {**({"kind": vehicle} if isinstance(vehicle, str) else vehicle), "parameters": name}
+    return factory.make("plants", given, text.folder)[0]

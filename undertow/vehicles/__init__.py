@@ -1,7 +1,0 @@
-"""Vehicles: equation of motion of the body, and published parameters. One file per vehicle."""
-
-from undertow.core.catalogue import publish
-from undertow.vehicles.body import Body as Body
-from undertow.vehicles.vehicle import Vehicle as Vehicle
-
-__getattr__ = publish(__name__)
