@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from undertow.logs.result_file import UnreadableResult
+from undertow.report.figures.run_files import plot_run
 from undertow.report.plotted import Plotted
 from undertow.report.plotting import PlottingProcess, plotting_process
 from undertow.scenario.results.run_facts import facts_from
