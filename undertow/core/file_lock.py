@@ -1,7 +1,6 @@
 """One process at a time writes to a path."""
 
 import contextlib
-import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,15 +28,13 @@ def file_lock(path: Path) -> Iterator[None]:
         OSError: it cannot be written to, or its file system has no locks.
     """
     lock_file = lock_of(path)
+    lock_file.touch()  # an error where no file can be made, as in /proc; `filelock` would wait until it can
     # A file system without locks is an error: the mark that `filelock` would set there outlives a killed process.
     lock = FileLock(lock_file, timeout=_PATIENCE, thread_local=False, fallback_to_soft=False)
     try:
         lock.acquire()
     except Timeout:
-        if lock_file.exists():
-            raise InUse("--out", "be a folder that nothing else writes to", str(path)) from None
-        # Nobody has locked it: no file can be made there, as in /proc.
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(lock_file)) from None
+        raise InUse("--out", "be a folder that nothing else writes to", str(path)) from None
     try:
         yield
     finally:
