@@ -28,7 +28,8 @@ def file_lock(path: Path) -> Iterator[None]:
         OSError: it cannot be written to, or its file system has no locks.
     """
     lock_file = lock_of(path)
-    lock_file.touch()  # an error where no file can be made, as in /proc; `filelock` would wait until it can
+    if not lock_file.exists():
+        lock_file.touch()  # an error where no file can be made, as in /proc; `filelock` would wait until it can
     # A file system without locks is an error: the mark that `filelock` would set there outlives a killed process.
     lock = FileLock(lock_file, timeout=_PATIENCE, thread_local=False, fallback_to_soft=False)
     try:
