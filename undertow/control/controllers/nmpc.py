@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.observer_gains import gains_and_path
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
@@ -82,7 +82,7 @@ class NMPC(AbstractAccelerationLaw):
         usable = (own.elapsed > 0) & jnp.isfinite(planned).all()
         return jnp.where(usable, planned, alone), {"estimate": estimate}
 
-    def adapt(self, own: PlannedState, y: Measurement, off: TrackingError, given: Given, dt) -> PlannedState:
+    def adapt(self, own: PlannedState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PlannedState:
         """The plan, moved on by dt and improved from the measured state; made anew where it was not finite."""
         estimate, horizon = self._estimate(own, y), self._horizon(y)
         forces = own.plan.forces

@@ -13,7 +13,7 @@ from undertow.core import checks, runtime
 from undertow.core.checks import numbers
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
-from undertow.outside.autopilot.clock import Clock
+from undertow.outside.autopilot.clock import StepClock
 from undertow.outside.autopilot.filter_functions import EstimatedMotion, FilterFunctions
 from undertow.outside.autopilot.saved_state import packed, unpacked
 from undertow.outside.autopilot.step_log import StepLog, filter_signals
@@ -67,7 +67,7 @@ class NavigationFilter(Uncopied):
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
         self.sampling_time = built.scenario.loop.dt
-        self._clock, self._started = Clock(self.sampling_time), np.zeros((), dtype=bool)
+        self._clock, self._started = StepClock(self.sampling_time), np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))
         declared, values = self.declared_signals(), self._go_on.outputs.signals

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter
 from undertow.core.atomic_io import replacing
 from undertow.core.errors import BadInput
 from undertow.report.figures import style
-from undertow.report.replay.replay_data import COLOURS, Replay, rotations
+from undertow.report.replay.replay_data import COLOURS, ReplayData, rotations
 
 _RATE = 20  # frames per second
 _LONGEST = 30.0  # s of video; a longer run is shown faster
@@ -57,7 +57,7 @@ def check_video(path: Path, folder: Path, overwrite: bool) -> None:
 
 
 def write_video(
-    replay: Replay, path: Path, progress: Callable[[str, float], None] = lambda message, share: None
+    replay: ReplayData, path: Path, progress: Callable[[str, float], None] = lambda message, share: None
 ) -> None:
     """Write a run as MP4, in real time or so much faster that it lasts 30 s; the file appears whole or not at all.
 
@@ -108,7 +108,7 @@ def _encoder(path: str, size: tuple[int, int]) -> Iterator[Callable[[bytes], obj
 class _Scenes:
     """The figure, and what moves in it."""
 
-    def __init__(self, replay: Replay, speed: float):
+    def __init__(self, replay: ReplayData, speed: float):
         self.replay, self.speed = replay, speed
         self.figure = style.blank(12.8, 7.2)
         self.figure.dpi = _DOTS
@@ -182,7 +182,7 @@ class _Scenes:
 class _View:
     """Vehicle, reference, path and arrows from above or from the side."""
 
-    def __init__(self, panel: Axes, replay: Replay, name: str):
+    def __init__(self, panel: Axes, replay: ReplayData, name: str):
         self.replay, self.panel = replay, panel
         self.right, self.up, self.sign = _VIEWS[name]
         self.longest = float(replay.size.max())
@@ -251,7 +251,7 @@ class _View:
         return arrows
 
 
-def _shares(replay: Replay) -> np.ndarray:
+def _shares(replay: ReplayData) -> np.ndarray:
     """Thrust as a share of the limit in its direction, shape (frames, N)."""
     thrust, limits = replay.series["thrust"], replay.thrusters.limits
     return np.abs(thrust) / np.abs(np.where(thrust < 0, limits[:, 0], limits[:, 1]))

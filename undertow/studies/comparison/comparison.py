@@ -19,7 +19,7 @@ from undertow.core import checks
 if TYPE_CHECKING:
     from undertow.studies.campaign.store_results import Results
     from undertow.studies.comparison.findings import Findings
-    from undertow.studies.comparison.paired import Difference
+    from undertow.studies.comparison.paired import PairedDifference
     from undertow.studies.comparison.prepare import PreparedComparison
 
 # Metrics that are compared, where they are defined: those that mean the same for every law.
@@ -49,7 +49,7 @@ class Comparison:
     findings: "Findings"
 
     @property
-    def differences(self) -> "tuple[Difference, ...]":
+    def differences(self) -> "tuple[PairedDifference, ...]":
         """Every two candidates in every metric."""
         return self.findings.differences
 
