@@ -19,7 +19,7 @@ from undertow.scenario.build import build
 from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.reading import read
 from undertow.studies.prediction.predict import predict, summary
-from undertow.studies.prediction.warnings import advice
+from undertow.studies.prediction.scenario_warnings import advice
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 

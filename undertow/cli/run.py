@@ -32,8 +32,8 @@ from undertow.outside.realtime.link import AbstractLink
 from undertow.outside.realtime.log_link import LogLink
 from undertow.outside.realtime.loop_clock import MonotonicClock, SimulatedClock
 from undertow.outside.realtime.loop_settings import LoopSettings, Reason
+from undertow.outside.realtime.loop_statistics import LoopStatistics
 from undertow.outside.realtime.process_priority import scheduled
-from undertow.outside.realtime.statistics import LoopStatistics
 from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.report.run_tables import transition_rows
