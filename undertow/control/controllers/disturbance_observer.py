@@ -10,6 +10,7 @@ from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.observer_gains import gains_and_path
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.tracking_error import pole_placement
+from undertow.control.estimation.sampled_observer import corrected_disturbance
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.option_groups import flat_options
@@ -69,10 +70,8 @@ class DisturbanceObserver(AbstractAccelerationLaw):
         return ESTIMATE | ATTAINED_SHARE
 
     def _estimate(self, own: DisturbanceObserverState, y: Measurement) -> PerAxis:
-        """The estimate, corrected by the part of the measured velocity that was not predicted."""
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
-        gain = -jnp.expm1(-self.bandwidth * step) / step
-        return own.estimate + gain * (self.model.coordinates.velocity(y) - own.predicted)
+        velocity = self.model.coordinates.velocity(y)
+        return corrected_disturbance(own.estimate, own.predicted, velocity, self.bandwidth, own.elapsed)
 
 
 @flat_options()

@@ -9,8 +9,7 @@ from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actu
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.control.controllers.observer_gains import gains_with_feedback
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
-from undertow.control.controllers.tracking_error import check_gains
-from undertow.core import checks
+from undertow.control.controllers.tracking_error import check_second_order_gains
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
@@ -44,10 +43,7 @@ class INDI(AbstractAccelerationLaw):
     feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
-        checks.positive("bandwidth", self.bandwidth, "rad/s")
-        checks.positive("damping", self.damping)
-        per_axis = {"bandwidth": self.bandwidth, "damping": self.damping}
-        check_gains(self.feedback, jnp.eye(2), per_axis, len(self.model.coordinates.angles))
+        check_second_order_gains(self.bandwidth, self.damping, self.feedback, len(self.model.coordinates.angles))
 
     def begin(self, y: Measurement, r: Target) -> INDIState:
         rates = self.model.coordinates.velocity(y)

@@ -25,7 +25,7 @@ from undertow.outside.autopilot.clock import StepClock
 from undertow.outside.autopilot.functions import Functions
 from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 from undertow.outside.autopilot.output import output_of
-from undertow.outside.autopilot.saved_state import packed, unpacked
+from undertow.outside.autopilot.saved_state import packed, restore_arrays
 from undertow.outside.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.physics.power.esc import ESC
 from undertow.scenario.build import Built, build
@@ -313,8 +313,7 @@ class Autopilot(Uncopied):
         Raises:
             BadInput: it is damaged, or of another controller; everything stays as it was.
         """
-        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
-            place[...] = value
+        restore_arrays(self._kept(), state, self._identity())
 
     def _kept(self) -> list[np.ndarray]:
         """Everything that changes from step to step."""

@@ -15,7 +15,7 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
 from undertow.outside.autopilot.clock import StepClock
 from undertow.outside.autopilot.filter_functions import EstimatedMotion, FilterFunctions
-from undertow.outside.autopilot.saved_state import packed, unpacked
+from undertow.outside.autopilot.saved_state import packed, restore_arrays
 from undertow.outside.autopilot.step_log import StepLog, filter_signals
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
@@ -171,8 +171,7 @@ class NavigationFilter(Uncopied):
         Raises:
             BadInput: it is damaged, or of another filter; everything stays as it was.
         """
-        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
-            place[...] = value
+        restore_arrays(self._kept(), state, self._identity())
 
     def _kept(self) -> list[np.ndarray]:
         steps = jax.tree.leaves((self._go_on.state, self._go_on.outputs))
