@@ -38,7 +38,7 @@ from undertow.studies.campaign.fingerprint import Identity
 from undertow.studies.campaign.prepare import prepare
 from undertow.studies.campaign.run_campaign import STORE, run_campaign
 from undertow.studies.campaign.store import Store
-from undertow.studies.campaign.store_layout import Layout
+from undertow.studies.campaign.store_layout import StoreLayout
 from undertow.studies.campaign.store_results import load
 
 VARY = {"initial.position[0]": {"normal": [0.0, 0.1]}, "controller.composite": {"uniform": [10.0, 30.0]}}
@@ -108,7 +108,7 @@ def pieces(trials: int) -> dict:
         for rows in (256, 65_536):
             named = labels(campaign.trials, campaign.first, here.metrics())
             where = Path(name) / f"{rows}.zarr"
-            store = Store(where, Layout((), 4 * rows, (rows,)), Identity("", {}), named, {}, {})
+            store = Store(where, StoreLayout((), 4 * rows, (rows,)), Identity("", {}), named, {}, {})
             chance = np.random.default_rng(0)  # random numbers cannot be compressed
             many = {key: chance.normal(size=rows).astype(values.dtype) for key, values in columns.items()}
             found[f"write_{rows}_ms"] = 1e3 * _shortest(lambda i, s=store, m=many: s.write(i, m))

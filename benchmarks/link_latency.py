@@ -22,7 +22,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.outside.mavlink.message_codec import parsed
-from undertow.outside.realtime.statistics import Durations
+from undertow.outside.realtime.loop_statistics import Durations
 
 SCENARIO = Path(__file__).parents[1] / "examples/bluerov2_heavy.yaml"
 WARM_UP = 50  # steps that are not counted

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import undertow as ut
-from undertow.outside.mujoco_engine import MujocoRun, Submerged, Water, run_in_mujoco
+from undertow.outside.mujoco_engine import MujocoRun, Submerged, UniformFlow, run_in_mujoco
 
 CURRENT = [0.3, 0.2, 0.0]  # m/s: north, east, down
 
@@ -71,7 +71,7 @@ def both_runs(duration: float) -> tuple[ut.Run, MujocoRun]:
     reference = ut.references.setpoint([2, 1, 1, 0, 0, 0.5], settling=8.0)
     current = ut.disturbances.current(CURRENT)
     run = ut.simulate(plant, law, reference, disturbance=current, duration=duration, dt=0.01, record=0.01)
-    body = Submerged(plant.vehicle, water=Water(CURRENT))
+    body = Submerged(plant.vehicle, water=UniformFlow(CURRENT))
     return run, run_in_mujoco(body, thruster, law, reference, duration=duration, dt=0.01)
 
 

@@ -76,7 +76,7 @@ class Faulted(NamedTuple):
     seconds: float
 
 
-class Program(NamedTuple):
+class FaultProgram(NamedTuple):
     """One loop with every kind of fault of one target: runs differ in the one or two that occur.
 
     Attributes:
@@ -117,13 +117,13 @@ class Program(NamedTuple):
 _NUMBERED = ("thruster", "input")
 
 
-def programs() -> list[Program]:
+def programs() -> list[FaultProgram]:
     """Programs with all kinds of faults of all loops."""
     found = []
     for name, loop in LOOPS.items():
         built = build({**loop, **_COMMON, "supervisor": None}).closed_loop
         for target in targets_of(built.plant, built.navigation).values():
-            found.append(Program(name, tuple(list_kinds([target])), target.width))
+            found.append(FaultProgram(name, tuple(list_kinds([target])), target.width))
     return found
 
 
@@ -135,7 +135,7 @@ class Sampled(NamedTuple):
     seed: int
 
 
-def sampled(number: int, seed: int, several: Sequence[Program]) -> list[Sampled]:
+def sampled(number: int, seed: int, several: Sequence[FaultProgram]) -> list[Sampled]:
     """So many runs with random faults, spread over programs in proportion to their kinds."""
     shares = np.array([len(one.kinds) for one in several], dtype=float)
     found = []
@@ -186,7 +186,7 @@ def _shown(watch: Callable[[int, int], None], before: int, failed: int, done: in
     watch(before + done, failed)
 
 
-def runs_with_faults(program: Program, runs: Sequence[Sampled]) -> list[PreparedRun]:
+def runs_with_faults(program: FaultProgram, runs: Sequence[Sampled]) -> list[PreparedRun]:
     """The runs of a program, which is built once; the numbers of their faults are then set in its parts."""
     prepared = watched(build(program.scenario({}, 0)), windows=1)
     with runtime.in_precision(prepared.precision):
@@ -223,7 +223,9 @@ def _input_fault_with(fault: InputFault, entry: Mapping[str, Any]) -> InputFault
     return dataclasses.replace(fault, chosen=np.eye(fault.chosen.shape[0])[int(number) - 1])
 
 
-def _other_bytes(program: Program, runs: Sequence[Sampled], found: Mapping[int, Judged], seed: int) -> list[Failure]:
+def _other_bytes(
+    program: FaultProgram, runs: Sequence[Sampled], found: Mapping[int, Judged], seed: int
+) -> list[Failure]:
     """N6: runs whose bytes differ when they are built from their scenarios and run in the opposite order."""
     runs = runs[::-1]
     again = judged_runs([program.scenario(run.faults, run.seed) for run in runs])

@@ -31,7 +31,7 @@ class Attack(NamedTuple):
 Make = Callable[[random.Random, Mapping[str, bytes]], tuple[dict[str, bytes | None], list[str]]]
 
 
-class Kind(NamedTuple):
+class InputKind(NamedTuple):
     """A kind of hostile input: its share, and what makes one from chance and the valid files of `material.py`."""
 
     share: float
@@ -168,15 +168,15 @@ def _store(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[s
     return {**store, "c.yaml": _encoded(specimens.CAMPAIGN)}, words
 
 
-KINDS: dict[str, Kind] = {
-    "scenario": Kind(0.46, _scenario),
-    "campaign": Kind(0.10, _campaign),
-    "vehicle": Kind(0.10, _vehicle),
-    "table": Kind(0.06, _table),
-    "mapping": Kind(0.08, _mapping),
-    "log": Kind(0.08, _log),
-    "result": Kind(0.02, _result),
-    "command": Kind(0.05, _command),
-    "plug_in": Kind(0.02, _plug_in),
-    "store": Kind(0.01, _store),
+KINDS: dict[str, InputKind] = {
+    "scenario": InputKind(0.46, _scenario),
+    "campaign": InputKind(0.10, _campaign),
+    "vehicle": InputKind(0.10, _vehicle),
+    "table": InputKind(0.06, _table),
+    "mapping": InputKind(0.08, _mapping),
+    "log": InputKind(0.08, _log),
+    "result": InputKind(0.02, _result),
+    "command": InputKind(0.05, _command),
+    "plug_in": InputKind(0.02, _plug_in),
+    "store": InputKind(0.01, _store),
 }

@@ -12,7 +12,7 @@ import numpy as np
 from soak.watching import Counts, Watch
 from undertow.control.supervision.conditions import state_of
 from undertow.control.supervision.supervised_controller import state_in
-from undertow.control.supervision.transition_log import Transition, transitions
+from undertow.control.supervision.transition_log import SupervisorTransition, transitions
 from undertow.core.arrays import as_array
 from undertow.core.authority import limits_of
 from undertow.core.status import Status
@@ -45,7 +45,7 @@ class Judged(NamedTuple):
 
     status: Status
     state: str
-    transitions: tuple[Transition, ...]
+    transitions: tuple[SupervisorTransition, ...]
     alarms: int
     ended: float
     counts: Counts

@@ -34,7 +34,7 @@ _LATEST = 900.0  # s without a run, after which a process is given up
 Runner = Callable[[Plan], LinkRun]
 
 
-class Links(NamedTuple):
+class LinksSoakResult(NamedTuple):
     """Result of many runs.
 
     Attributes:
@@ -63,7 +63,7 @@ def attack_links(
     links: Sequence[str] = LINKS,
     until: float = float("inf"),
     watch: Callable[[Mapping[str, int], Sequence[Failure]], None] = lambda done, failures: None,
-) -> Links:
+) -> LinksSoakResult:
     """Run every link command so many times, each time attacked in another way.
 
     Args:
@@ -114,7 +114,7 @@ def attack_links(
         if len(each) < number and time.monotonic() < until:
             failures.append(Failure("N3", f"links/{link}/{seed}/{len(each)}", "the process that attacks it ended"))
     rows = [_row(link, each) for link, each in runs.items() if each]
-    return Links(len(every), left_out, rows, _worst(every), failures, time.monotonic() - began)
+    return LinksSoakResult(len(every), left_out, rows, _worst(every), failures, time.monotonic() - began)
 
 
 def replay(run: Run, identity: str, folder: Path) -> LinkRun:

@@ -47,7 +47,7 @@ class PlainFuzzySystem(eqx.Module):
         return (weights * basis).sum(-1)
 
 
-class Glitch(AbstractNavigation):
+class VelocityGlitch(AbstractNavigation):
     """Exact measurements, but for a time all velocities are wrong by the same amount."""
 
     size: Float[Param, ""] = param("m/s, rad/s", "error of the velocities")
@@ -79,7 +79,7 @@ def plain_basis(model: Model, fuzzy_input: str = "state", reach: tuple[float, ..
     return dataclasses.replace(law, fuzzy=plain)
 
 
-def glitch(size: float = 5.0, start: float = 5.0, duration: float = 0.01) -> Glitch:
+def glitch(size: float = 5.0, start: float = 5.0, duration: float = 0.01) -> VelocityGlitch:
     """Velocities that are wrong for a moment.
 
     Args:
@@ -87,4 +87,4 @@ def glitch(size: float = 5.0, start: float = 5.0, duration: float = 0.01) -> Gli
         start: when it begins, s.
         duration: how long it lasts, s.
     """
-    return Glitch(size=jnp.asarray(size), start=jnp.asarray(start), duration=jnp.asarray(duration))
+    return VelocityGlitch(size=jnp.asarray(size), start=jnp.asarray(start), duration=jnp.asarray(duration))

@@ -28,7 +28,7 @@ from undertow.core.errors import BadInput, within
 from undertow.core.status import Status
 from undertow.logs.log import Log
 from undertow.logs.run_log import log_of_run
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault
 from undertow.report import figures
@@ -42,7 +42,7 @@ from undertow.scenario.reading import from_data, read
 from undertow.scenario.results.result_files import save
 from undertow.scenario.results.run_result import MetricsSettings, Origin, RunResult, make_result
 from undertow.scenario.results.run_scenario import run_loop, run_scenario
-from undertow.scenario.schema import Fault, Initial, Loop, Window, complaint
+from undertow.scenario.schema import ClosedLoopSettings, Fault, Initial, Window, complaint
 from undertow.scenario.step_size import step_failure
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.outcome import Outcome
@@ -188,7 +188,7 @@ def simulate(
         BadInput: something given cannot be used, or does not fit the rest.
     """
     if isinstance(disturbance, list | tuple):
-        disturbance = Together(tuple(disturbance))
+        disturbance = SumOfDisturbances(tuple(disturbance))
     acting: Any = none() if disturbance is None else disturbance
     navigation = perfect() if navigation is None else navigation
     named = isinstance(controller, str | Mapping)
@@ -244,7 +244,7 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     nowhere = from_data({})
     try:
         plain = dict(zip(("duration", "dt", "record"), map(_plain, times), strict=True))
-        settings = Loop.model_validate({"kind": kind, **plain})
+        settings = ClosedLoopSettings.model_validate({"kind": kind, **plain})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
     except ValidationError as errors:

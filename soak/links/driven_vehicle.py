@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from soak.links.scenario import SUPPLY
-from undertow.outside.autopilot.measured_motion import Motion
+from undertow.outside.autopilot.measured_motion import MeasuredMotion
 from undertow.outside.autopilot.vehicle import Vehicle
 
 FULL = 0.95 * SUPPLY  # V
@@ -42,7 +42,7 @@ class DrivenVehicle:
         self.volt_seconds = self.full = self.longest_full = self.furthest = 0.0
         self._full = np.zeros(self.vehicle.thrusters)
 
-    def hold(self, volts: np.ndarray, dt: float) -> Motion:
+    def hold(self, volts: np.ndarray, dt: float) -> MeasuredMotion:
         """Apply volts for a time, s; the true motion after it."""
         applied = np.clip(volts, -SUPPLY, SUPPLY)
         if dt > 0:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.outside.autopilot.measured_motion import Motion
+from undertow.outside.autopilot.measured_motion import MeasuredMotion
 
 
 class Measured(NamedTuple):
@@ -59,7 +59,7 @@ class AbstractPeer(abc.ABC):
         """Leave the link."""
 
 
-def measured_of(motion: Motion) -> Measured:
+def measured_of(motion: MeasuredMotion) -> Measured:
     """What an ideal navigation measures."""
     return Measured(motion.position, motion.attitude, motion.velocity)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from soak.links.peer import AbstractPeer, Measured, damaged
-from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Datagram, Received, Sender
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Datagram, DatagramFilter, Sender
 
 _THRUSTERS = 8
 _LONGEST = 2048  # bytes
@@ -25,7 +25,7 @@ class UdpPeer(AbstractPeer):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._received = Received(COMMAND, _THRUSTERS)
+        self._received = DatagramFilter(COMMAND, _THRUSTERS)
         place = f"127.0.0.1:{self._socket.getsockname()[1]}"
         self.arguments = ["run", "SCENARIO", "--link", f"udp:{place}", "--patience", "60", "--out", out, "--overwrite"]
 
@@ -34,7 +34,7 @@ class UdpPeer(AbstractPeer):
         before = self._received.newest
         self._session_before = b"" if before is None else before.session.to_bytes(4, "little")
         self._sender = Sender(MEASUREMENT, _THRUSTERS, chance.getrandbits(32))
-        self._received = Received(COMMAND, _THRUSTERS)
+        self._received = DatagramFilter(COMMAND, _THRUSTERS)
         while self._receive(0.0) is not None:
             pass
 

@@ -21,7 +21,7 @@ from undertow.studies.arena.leader_board import (
     ratio_rows,
     task_rows,
 )
-from undertow.studies.arena.robustness import PARAMETERS, Curve
+from undertow.studies.arena.robustness import PARAMETERS, RobustnessCurve
 from undertow.studies.arena.scores import CellResult, scored
 from undertow.studies.arena.tasks import CELLS as EVERY
 from undertow.studies.arena.tasks import TASKS
@@ -41,7 +41,7 @@ def standing(name: str, errors: tuple[float, ...], levels: int, each=CELLS) -> S
     curves = {}
     for key, one in PARAMETERS.items():
         high = np.where(np.arange(len(one.levels)) < levels, 0.5, 10.0)
-        curves[key] = Curve(one.levels, high, high, high)
+        curves[key] = RobustnessCurve(one.levels, high, high, high)
     entry = Entry(name, 1, {"kind": name}, each, {}, {"odin": "tuned <by hand>"})
     return Standing(entry, scored(name, cells), curves, StepTime(2e-6, "xla"))
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from undertow.studies.arena.leader_board import as_markdown
-from undertow.studies.arena.robustness import Curve
+from undertow.studies.arena.robustness import RobustnessCurve
 from undertow.studies.arena.scores import CellResult, geometric_mean, scored, trial_errors
-from undertow.studies.comparison.tables import Rows
+from undertow.studies.comparison.tables import TextTable
 
 STATION, MOTION = ("station_keeping", "odin"), ("delay", "odin")  # tolerances: 0.05 m, 5 degrees
 
@@ -50,11 +50,11 @@ def test_geometric_mean():
 
 def test_last_level_within_the_tolerance():
     """The level before the first at which any trial is beyond; what comes after does not count."""
-    of = lambda high: Curve((1.0, 2.0, 3.0), np.array(high), np.array(high), np.array(high))
+    of = lambda high: RobustnessCurve((1.0, 2.0, 3.0), np.array(high), np.array(high), np.array(high))
     assert of([0.5, 0.9, 0.9]).last == 3.0
     assert of([0.5, 1.1, 0.9]).last == 1.0
     assert math.isnan(of([1.1, 0.5, 0.5]).last)
 
 
 def test_markdown_table():
-    assert as_markdown(Rows(("law", "error"), [("pid", "1")])) == "| law | error |\n| --- | --- |\n| pid | 1 |\n"
+    assert as_markdown(TextTable(("law", "error"), [("pid", "1")])) == "| law | error |\n| --- | --- |\n| pid | 1 |\n"

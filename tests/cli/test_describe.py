@@ -11,7 +11,7 @@ from undertow.core.errors import BadInput
 from undertow.scenario import describing
 from undertow.scenario.schema import keys
 from undertow.simulation.loop.recorded_signals import RECORDED
-from undertow.studies.campaign.campaign_schema import Campaign, Distribution, Requirement, Series
+from undertow.studies.campaign.campaign_schema import Campaign, CampaignRequirement, Distribution, RecordedSignals
 
 PARTS = [(kind, name) for kind in catalogue.KINDS for name in catalogue.names(kind)]
 
@@ -101,7 +101,7 @@ def test_scenario_keys(undertow):
 
 def test_campaign_keys(undertow):
     out = undertow("describe", "campaign").out
-    models = (Campaign, Distribution, Requirement, Series)
+    models = (Campaign, Distribution, CampaignRequirement, RecordedSignals)
     assert all(key.path in out and key.meaning for model in models for key in keys(model))
     schema = json.loads(undertow("describe", "campaign", "--json-schema").out)
     assert set(schema["properties"]) == set(Campaign.model_fields)

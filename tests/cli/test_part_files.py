@@ -50,7 +50,7 @@ def test_part_from_a_file_runs(undertow, tmp_path):
         (
             "./my_rov.py:my_rov",
             "def my_rov():\n    return 7",
-            "`plant.vehicle.kind` must name a function that returns a Vehicle, but is ./my_rov.py:my_rov, which returns 7",
+            "`plant.vehicle.kind` must name a function that returns a VehicleModel, but is ./my_rov.py:my_rov, which returns 7",
         ),
     ],
 )

@@ -16,7 +16,7 @@ import pytest
 import undertow as ut
 from undertow.cli.main import run
 from undertow.logs.read import read_log
-from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, DatagramFilter, Sender
 
 pytestmark = pytest.mark.full
 
@@ -107,7 +107,7 @@ class Peer:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.place = f"127.0.0.1:{self.socket.getsockname()[1]}"
-        self.received, self.sender = Received(COMMAND, 8), Sender(MEASUREMENT, 8, 1)
+        self.received, self.sender = DatagramFilter(COMMAND, 8), Sender(MEASUREMENT, 8, 1)
         self.commands = []
 
     def answer(self, seconds, until=lambda: False):

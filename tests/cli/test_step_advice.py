@@ -13,7 +13,7 @@ from undertow.physics.vehicles import bluerov2, bluerov2_heavy
 from undertow.scenario.build import build
 from undertow.scenario.consistency import rounded_times
 from undertow.scenario.results.run_scenario import run_scenario
-from undertow.scenario.schema import Loop
+from undertow.scenario.schema import ClosedLoopSettings
 from undertow.scenario.step_size import fastest_decay, step_advice
 
 SCENARIO = """
@@ -37,12 +37,12 @@ def test_decay_of_the_winding_is_that_of_its_time_constant():
 def test_advice_says_how_many_substeps_are_enough():
     plant = lambda **options: hybrid_vehicle(bluerov2_heavy(), t200(**options))
     winding = plant(fidelity="electromechanical")
-    said = step_advice(winding, Loop(dt=0.01))
+    said = step_advice(winding, ClosedLoopSettings(dt=0.01))
     assert len(said) == 1 and "Use loop.substeps: 9 or more" in said[0].hint
-    assert not step_advice(winding, Loop(dt=0.01, substeps=9))
-    assert not step_advice(plant(), Loop(dt=0.01))
-    assert not step_advice(winding, Loop(kind="continuous", dt=0.01, method="adaptive"))
-    assert "a loop.dt of at most" in step_advice(winding, Loop(kind="continuous", dt=0.01))[0].hint
+    assert not step_advice(winding, ClosedLoopSettings(dt=0.01, substeps=9))
+    assert not step_advice(plant(), ClosedLoopSettings(dt=0.01))
+    assert not step_advice(winding, ClosedLoopSettings(kind="continuous", dt=0.01, method="adaptive"))
+    assert "a loop.dt of at most" in step_advice(winding, ClosedLoopSettings(kind="continuous", dt=0.01))[0].hint
 
 
 def test_advice_where_the_damping_of_the_hull_is_too_fast():
@@ -51,9 +51,9 @@ def test_advice_where_the_damping_of_the_hull_is_too_fast():
     damping, mass = plant.body.linear_damping[3, 3], plant.body.mass_matrix[3, 3]
     enough = int(np.ceil(0.05 * float(damping / mass) / 2.785))
     assert enough > 1
-    (said,) = step_advice(plant, Loop(dt=0.05))
+    (said,) = step_advice(plant, ClosedLoopSettings(dt=0.05))
     assert "the hull has, by its damping," in said.says and f"loop.substeps: {enough} or more" in said.hint
-    assert not step_advice(plant, Loop(dt=0.05, substeps=enough))
+    assert not step_advice(plant, ClosedLoopSettings(dt=0.05, substeps=enough))
 
 
 @pytest.mark.slow
@@ -145,7 +145,7 @@ def test_a_law_too_stiff_for_one_ode():
 )
 def test_times_that_are_no_multiples_are_told(loop, said):
     """And what is said of them is what a run does."""
-    given = rounded_times(Loop(**loop))
+    given = rounded_times(ClosedLoopSettings(**loop))
     assert len(given) == len(said) and all(one.says.startswith(words) for one, words in zip(given, said, strict=True))
     if loop.get("kind") != "continuous":
         built = build(BASE | {"plant": plant_of(1.0), "loop": loop})

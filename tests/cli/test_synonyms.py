@@ -3,11 +3,11 @@
 from undertow.scenario import vehicle_schema
 from undertow.scenario.schema import keys
 from undertow.scenario.synonyms import WORDS, hint_for
-from undertow.studies.campaign.campaign_schema import Campaign, Distribution, Requirement
+from undertow.studies.campaign.campaign_schema import Campaign, CampaignRequirement, Distribution
 
 _CAMPAIGN = {*Campaign.model_fields}
 _CAMPAIGN |= {f"vary.*.{name}" for name in Distribution.model_fields}
-_CAMPAIGN |= {f"requirements.*.{name}" for name in Requirement.model_fields}
+_CAMPAIGN |= {f"requirements.*.{name}" for name in CampaignRequirement.model_fields}
 _OPTIONS = {"plant.vehicle", "plant.thruster", "controller.gains", "navigation.sensors"}  # of parts
 KEYS = {"scenario": {key.path for key in keys()}, "campaign": _CAMPAIGN, "vehicle file": {*vehicle_schema.KEYS}}
 

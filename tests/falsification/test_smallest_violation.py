@@ -11,7 +11,7 @@ from undertow.scenario.schema import Bounds
 from undertow.studies.falsification.box import Box, box_of
 from undertow.studies.falsification.falsify import as_data, falsify, judged_alone
 from undertow.studies.falsification.gradient import Gradient
-from undertow.studies.falsification.objective import Objective, Violation
+from undertow.studies.falsification.objective import RobustnessObjective, Violation
 from undertow.studies.falsification.shrink import shrink
 
 pytestmark = pytest.mark.full
@@ -198,7 +198,7 @@ def test_a_curved_boundary_in_five_dimensions():
     axes = np.array([0.9, 0.8, 0.5, 0.7, 0.95])
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(5, 5)))[0]
     inside = lambda points: 1 - (((points @ turn) / axes) ** 2).sum(-1)
-    objective = Objective(
+    objective = RobustnessObjective(
         lambda points, seeds: inside(points), unit_box(5), [0], 6000, lambda runs, least, smallest: None
     )
     start = np.full(5, 0.9)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from undertow.analysis.temporal.formula import NUMPY, smooth
-from undertow.analysis.temporal.parsing import Entries, Known, parse_formula
+from undertow.analysis.temporal.parsing import Entries, FormulaNames, parse_formula
 from undertow.analysis.temporal.requirements import Requirement, judged
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 
 PERIOD, SIZE = 0.1, 201  # s, to 20 s
 TIME = PERIOD * np.arange(SIZE)
-KNOWN = Known(
+KNOWN = FormulaNames(
     {
         "error": Entries(("north", "yaw")),
         "input": Entries(("0", "1")),

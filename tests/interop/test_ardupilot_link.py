@@ -15,7 +15,7 @@ from fake_autopilot import FakeAutopilot, vector
 from undertow.cli.main import run
 from undertow.outside.ardupilot.server import listen, serve, status_line
 from undertow.outside.ardupilot.session import Session
-from undertow.outside.realtime.statistics import Durations
+from undertow.outside.realtime.loop_statistics import Durations
 from undertow.outside.thruster_channels import channels_of_vehicle
 
 pytestmark = pytest.mark.interop

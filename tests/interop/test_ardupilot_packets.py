@@ -7,7 +7,7 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.outside.ardupilot.packets import ServoPacket, reply
-from undertow.outside.stepped_vehicle import State
+from undertow.outside.stepped_vehicle import VehicleOutputs
 from undertow.outside.thruster_channels import channels_from_text
 
 pytestmark = pytest.mark.interop
@@ -18,7 +18,7 @@ SIXTEEN = bytes.fromhex("1a48900102010000dc056c074c04ffff" + 12 * "0000")
 # 29569 = 0x7381, 1200 Hz = 0x04b0, frame 2^32 - 1, 32 pulses of 1000 = 0x03e8.
 THIRTY_TWO = bytes.fromhex("8173b004ffffffff" + 32 * "e803")
 
-STATE = State(
+STATE = VehicleOutputs(
     position=np.array([1.0, -2.0, 0.25]),
     attitude=np.array([0.5, -0.5, 0.5, 0.5]),
     velocity=np.array([0.125, 0.0, -1e-5]),

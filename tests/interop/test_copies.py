@@ -10,7 +10,7 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.outside.gymnasium.env import make
 from undertow.outside.gymnasium.vector_env import make_vec
-from undertow.simulation.loop.stepped import Step
+from undertow.simulation.loop.stepped import CompiledStep
 
 PENDULUM = {
     "plant": "inverted_pendulum",
@@ -31,5 +31,5 @@ def test_copying_is_refused_with_the_remedy(compiled, how):
 
 
 def test_no_part_of_it_is_copied_either():
-    with pytest.raises(BadInput, match="`Step` must not be copied"):
-        copy.deepcopy({"inside": Step(lambda numbers, state, inputs: ((), inputs + numbers), 1.0, (), 2.0)})
+    with pytest.raises(BadInput, match="`CompiledStep` must not be copied"):
+        copy.deepcopy({"inside": CompiledStep(lambda numbers, state, inputs: ((), inputs + numbers), 1.0, (), 2.0)})

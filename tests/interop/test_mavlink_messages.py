@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from undertow.core.errors import BadInput
 from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
-from undertow.outside.mavlink.actuator_commands import Pulses, Target, commands_of
+from undertow.outside.mavlink.actuator_commands import MavlinkTarget, Pulses, commands_of
 from undertow.outside.mavlink.message_codec import parsed
 from undertow.outside.mavlink.odometry import OdometryReader, in_body_axes, of_local_position, of_odometry
 
@@ -107,14 +107,14 @@ PULSES = Pulses({1: 1900.0, 2: 1300.0, 8: 1500.4}, neutral=1500.0, span=400.0)
 
 
 def test_rc_override():
-    (found,) = map(through_the_wire, commands_of("rc_override", 8)(Target(7), PULSES, 0))
+    (found,) = map(through_the_wire, commands_of("rc_override", 8)(MavlinkTarget(7), PULSES, 0))
     assert found.get_type() == "RC_CHANNELS_OVERRIDE" and (found.target_system, found.target_component) == (7, 1)
     values = [getattr(found, f"chan{n}_raw") for n in range(1, 19)]
     assert values == [1900, 1300, 65535, 65535, 65535, 65535, 65535, 1500, *10 * [65535]]
 
 
 def test_servo():
-    found = list(map(through_the_wire, commands_of("servo", 8)(Target(7), PULSES, 0)))
+    found = list(map(through_the_wire, commands_of("servo", 8)(MavlinkTarget(7), PULSES, 0)))
     assert [(one.get_type(), one.command, one.param1, one.param2) for one in found] == [
         ("COMMAND_LONG", 183, 1, 1900),
         ("COMMAND_LONG", 183, 2, 1300),
@@ -124,7 +124,7 @@ def test_servo():
 
 def test_actuator():
     """Outputs 1 to 6 and 7 to 12; those that are no thrusters are left alone."""
-    first, second = map(through_the_wire, commands_of("actuator", 8)(Target(7), PULSES, 0))
+    first, second = map(through_the_wire, commands_of("actuator", 8)(MavlinkTarget(7), PULSES, 0))
     values = [[one.param1, one.param2, one.param3, one.param4, one.param5, one.param6] for one in (first, second)]
     np.testing.assert_array_equal(values[0], [1, -0.5, np.nan, np.nan, np.nan, np.nan])
     np.testing.assert_allclose(values[1], [np.nan, 0.001, np.nan, np.nan, np.nan, np.nan], rtol=1e-4)
@@ -132,7 +132,7 @@ def test_actuator():
 
 
 def test_control_target():
-    (found,) = map(through_the_wire, commands_of("control_target", 8)(Target(7), PULSES, 123))
+    (found,) = map(through_the_wire, commands_of("control_target", 8)(MavlinkTarget(7), PULSES, 123))
     assert found.get_type() == "SET_ACTUATOR_CONTROL_TARGET" and found.group_mlx == 0 and found.time_usec == 123
     np.testing.assert_allclose(found.controls, [1, -0.5, 0, 0, 0, 0, 0, 0.001], rtol=1e-4)
 

@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from undertow.outside.mavlink.actuator_commands import Target
+from undertow.outside.mavlink.actuator_commands import MavlinkTarget
 from undertow.outside.mavlink.message_requests import MessageRequests
 
 pytestmark = pytest.mark.interop
@@ -18,7 +18,7 @@ ACCEPTED, DENIED, LATER = (
 
 @pytest.fixture
 def requests():
-    return MessageRequests("local_position", Target(7, 1), 0.02)
+    return MessageRequests("local_position", MavlinkTarget(7, 1), 0.02)
 
 
 def asked(requests, now):

@@ -256,11 +256,11 @@ def test_missing_topics_and_columns(tmp_path):
 @pytest.mark.full
 def test_pulses_become_volts_as_the_speed_controllers_have_it():
     from undertow.logs.mapped_log import volts
-    from undertow.logs.mapping import Entry
+    from undertow.logs.mapping import SignalMapping
     from undertow.physics.power.esc import esc
 
     pulses = np.arange(1050.0, 1950.0, 7.0)
-    entry = Entry(("x",), unit="us", supply=16.0)
+    entry = SignalMapping(("x",), unit="us", supply=16.0)
     np.testing.assert_allclose(
         volts(pulses, entry, 16.0), np.asarray(esc().voltage(pulses, np.asarray(16.0))), atol=1e-14
     )

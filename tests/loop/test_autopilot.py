@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
-from undertow.outside.autopilot.clock import Clock
-from undertow.outside.autopilot.measured_motion import Format, Motion
+from undertow.outside.autopilot.clock import StepClock
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 
 NOISY = {"kind": "white_noise", "position": 0.001, "velocity": 0.01}
 HEAVY = {
@@ -116,7 +116,7 @@ def test_a_quaternion_that_was_integrated_is_taken_as_it_is():
     unit = np.asarray(jax.jit(quaternion_from_euler)(np.array([0.3, -0.4, 1.2])))
     measured = jax.jit(lambda motion: Format("quaternion", "body").measurement(motion, None))
     for longer, same in ((1 + 1e-11, True), (1 + 1e-6, False)):
-        body = measured(Motion(np.zeros(3), longer * unit, np.zeros(6))).body
+        body = measured(MeasuredMotion(np.zeros(3), longer * unit, np.zeros(6))).body
         assert body is not None
         found = np.asarray(body.attitude)
         assert (found == longer * unit).all() == same
@@ -243,7 +243,7 @@ def test_a_law_that_is_no_number_any_more_starts_again(heavy):
 
 
 def test_late_missed_and_repeated_steps():
-    clock = Clock(0.01)
+    clock = StepClock(0.01)
     assert [clock.passed(dt) for dt in (None, 0.01, 0.012, 0.015, 0.05, 10.0)] == [0.01, 0.01, 0.012, 0.015, 0.05, 0.05]
     assert [clock.passed(dt) for dt in (0.0, -1.0, np.nan, np.inf)] == [0.0] * 4
     assert clock.counts == {"steps": 10, "late": 1, "missed": 2, "repeated": 4}

@@ -34,7 +34,7 @@ def without_simd(monkeypatch):
 def test_one_run(monkeypatch, backend):
     if backend == "xla":
         without_simd(monkeypatch)
-    step = stepped.Step(oscillators, NUMBERS, STATE, np.zeros(2))
+    step = stepped.CompiledStep(oscillators, NUMBERS, STATE, np.zeros(2))
     assert step.backend == backend
     state, numbers = STATE, NUMBERS
     for force in ([1.0, 0.0], [0.0, -2.0], [0.5, 0.5]):
@@ -57,7 +57,7 @@ def test_many_runs(monkeypatch, backend):
     if backend == "xla":
         without_simd(monkeypatch)
     runs, own = 3, np.array([0.0, 0.5, 1.0])
-    steps = stepped_batch.BatchStep(oscillators, NUMBERS, STATE, np.zeros(2), runs, [False, True])
+    steps = stepped_batch.CompiledBatchStep(oscillators, NUMBERS, STATE, np.zeros(2), runs, [False, True])
     assert steps.backend == backend
     steps.put("numbers", [own])
     states = [STATE] * runs

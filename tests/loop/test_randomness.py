@@ -16,7 +16,7 @@ from undertow.core import catalogue, runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.numerics.random_keys import keys_for, numbered
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.sensors import compass, depth, dvl, imu, position_fix, propeller_speed
@@ -52,7 +52,7 @@ def realized(loop, key):
 @pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
 def test_no_two_parts_share_a_key(seed):
     """Disturbances by nine, three of them in a group of their own, all sensors, and each of their samples."""
-    disturbance = Together((*(Keyed() for _ in range(6)), Together((Keyed(), Keyed(), Keyed()))))
+    disturbance = SumOfDisturbances((*(Keyed() for _ in range(6)), SumOfDisturbances((Keyed(), Keyed(), Keyed()))))
     sensors = [imu(), dvl(), depth(), position_fix(), compass(), propeller_speed()]
     plant = double_integrator()
     loop = ClosedLoop(plant, pid(plant.model()), setpoint([0.0]), disturbance, observer(sensors))
@@ -182,7 +182,7 @@ def test_no_key_is_used_twice(used, seed):
     """Every random part of the catalogue in one loop: each draws from keys of its own, and from no key twice."""
     plant = double_integrator()
     law = pid(plant.model())
-    disturbance = Together(tuple(every("disturbances", AbstractDisturbance)))
+    disturbance = SumOfDisturbances(tuple(every("disturbances", AbstractDisturbance)))
     for several in every("navigation", AbstractNavigation):
         used["drawing"].clear()
         used["branching"].clear()

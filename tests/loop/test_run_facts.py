@@ -10,7 +10,7 @@ import undertow
 from undertow.analysis.success import Success
 from undertow.analysis.temporal.requirements import Verdict
 from undertow.control.supervision.conditions import State
-from undertow.control.supervision.transition_log import Transition
+from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core.metric import Metric
 from undertow.core.status import Status
 from undertow.scenario.reading import from_data
@@ -30,7 +30,7 @@ FACTS = RunFacts(
     requirements={"settles": Verdict(-0.2, False)},
     certificate={"function": "V", "start": 1.0},
     navigation={"sensors": [], "nees": 9.0, "findings": []},
-    transitions=[Transition(0.5, State.SAFE, "saturated", 2.0, 1.0)],
+    transitions=[SupervisorTransition(0.5, State.SAFE, "saturated", 2.0, 1.0)],
     code="{}",
     left_to_xla="a reason",
     versions={"version_undertow": "0.1.0", "machine": "Linux"},

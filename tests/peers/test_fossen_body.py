@@ -14,13 +14,13 @@ from textbook import rotation_from_euler
 from undertow.core.contracts import Load
 from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.thrusters import paper_table3
-from undertow.physics.vehicles import Vehicle, bluerov2_heavy, odin, rexrov
+from undertow.physics.vehicles import VehicleModel, bluerov2_heavy, odin, rexrov
 
 
 class Peer(NamedTuple):
     """A vehicle as undertow has it, and the file's numbers for all states at once."""
 
-    vehicle: Vehicle
+    vehicle: VehicleModel
     file: dict
     cases: dict
 

@@ -13,7 +13,7 @@ from textbook import rotation_from_euler
 
 from undertow.core.errors import BadInput
 from undertow.core.numerics.rotations import Kinematics
-from undertow.outside.mujoco_engine import Submerged, Water, mjcf
+from undertow.outside.mujoco_engine import Submerged, UniformFlow, mjcf
 from undertow.outside.mujoco_engine.mjcf import as_rigid_body
 from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.thrusters import paper_table3
@@ -90,7 +90,7 @@ def test_accelerations_agree(vehicle, acceleration, moving):
     for eta, nu in zip(etas, nus, strict=True):
         thrust = chance.uniform(-40, 40, vehicle.thrusters)
         velocity, rising = chance.uniform(-1, 1, (2, 3)) * moving
-        body = Submerged(vehicle, water=Water(velocity, rising))
+        body = Submerged(vehicle, water=UniformFlow(velocity, rising))
         body.place(eta, nu)
         expected = np.asarray(acceleration(eta, nu, thrust, velocity, rising))
         np.testing.assert_allclose(body.acceleration(thrust), expected, atol=1e-12 * np.abs(expected).max())
@@ -100,7 +100,7 @@ def test_added_mass_of_a_sphere_can_be_a_body():
     """ODIN's is; as a weightless body inside the engine it does what it does as a force, moving water included."""
     etas, nus, chance = poses(20, seed=3)
     for eta, nu in zip(etas, nus, strict=True):
-        thrust, water = chance.uniform(-40, 40, 8), Water(*chance.uniform(-1, 1, (2, 3)))
+        thrust, water = chance.uniform(-40, 40, 8), UniformFlow(*chance.uniform(-1, 1, (2, 3)))
         inside, applied = (Submerged(odin(), added_mass=how, water=water) for how in ("body", "force"))
         inside.place(eta, nu)
         applied.place(eta, nu)

@@ -9,7 +9,7 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
 from undertow.core.status import Status
-from undertow.outside.mujoco_engine import Submerged, Water, run_in_mujoco
+from undertow.outside.mujoco_engine import Submerged, UniformFlow, run_in_mujoco
 from undertow.outside.mujoco_engine.mujoco_run import Propellers
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -44,7 +44,7 @@ def test_closed_loops_agree(parts):
     current = ut.disturbances.current(FLOW)
     loop = ClosedLoop(plant, law, reference, current, ut.navigation.perfect())
     run = sampled.simulate(loop, duration=5.0, dt=0.01, record_every=1)
-    body = Submerged(plant.vehicle, water=Water(FLOW))
+    body = Submerged(plant.vehicle, water=UniformFlow(FLOW))
     mujoco_run = run_in_mujoco(body, thruster, law, reference, duration=5.0, dt=0.01)
     assert mujoco_run.status == Status.OK
     np.testing.assert_allclose(mujoco_run.time, run.time, atol=1e-12)
@@ -102,4 +102,4 @@ def test_what_does_not_fit_is_refused(parts):
     with pytest.raises(BadInput, match="`added_mass` must be one of force, body, but is ghost"):
         Submerged(plant.vehicle, added_mass="ghost")
     with pytest.raises(BadInput, match=r"`velocity` must have 3 entries \(north, east, down\), but is 2 long"):
-        Submerged(plant.vehicle, water=Water([0.1, 0.2]))
+        Submerged(plant.vehicle, water=UniformFlow([0.1, 0.2]))

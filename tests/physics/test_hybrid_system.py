@@ -12,17 +12,17 @@ from undertow.core.status import Status
 from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.thrusters import paper_table3
 from undertow.physics.thrusters.thruster import PropellerReport
-from undertow.physics.vehicles import Vehicle, odin
+from undertow.physics.vehicles import VehicleModel, odin
 
 RNG = np.random.default_rng(2)
 COUNT = 300
 NOMINAL = hybrid_vehicle(odin(), paper_table3("electromechanical"))
 
 
-def heavier(vehicle: Vehicle) -> Vehicle:
+def heavier(vehicle: VehicleModel) -> VehicleModel:
     """The true vehicle: everything differs from what the controller was told."""
     tilt = RNG.normal(size=(6, 6))
-    return Vehicle(
+    return VehicleModel(
         name="true",
         mass=140.0,
         weight=1300.0,

@@ -11,7 +11,7 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose
 from undertow.core.errors import BadInput
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.parameter_error import parameter_error
 from undertow.physics.disturbances.payload import payload
 from undertow.physics.disturbances.sheared_current import sheared_current
@@ -21,7 +21,7 @@ from undertow.physics.disturbances.waves import waves
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.paper_table3 import paper_table3
 from undertow.physics.vehicles.odin import odin
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 THRUSTER = paper_table3("static")
 PLANT = hybrid_vehicle(odin(), THRUSTER)
@@ -46,8 +46,8 @@ def _body_rate(plant, load, t):
 
 def changed(**changes):
     """ODIN with other numbers."""
-    fields = {field.name: getattr(odin(), field.name) for field in dataclasses.fields(Vehicle)}
-    return hybrid_vehicle(Vehicle(**(fields | changes)), THRUSTER)
+    fields = {field.name: getattr(odin(), field.name) for field in dataclasses.fields(VehicleModel)}
+    return hybrid_vehicle(VehicleModel(**(fields | changes)), THRUSTER)
 
 
 def test_payload_is_a_vehicle_with_that_point_mass_built_in():
@@ -73,7 +73,7 @@ def test_payload_is_a_vehicle_with_that_point_mass_built_in():
 
 @pytest.mark.full
 def test_two_payloads_are_one_after_the_other():
-    halves = Together((payload(1.0, 5.0, (0.1, 0, 0)), payload(1.0, 5.0, (0.1, 0, 0))))
+    halves = SumOfDisturbances((payload(1.0, 5.0, (0.1, 0, 0)), payload(1.0, 5.0, (0.1, 0, 0))))
     np.testing.assert_allclose(body_rate(PLANT, halves), body_rate(PLANT, payload(2.0, 10.0, (0.1, 0, 0))), atol=1e-12)
 
 
@@ -158,7 +158,7 @@ def test_bad_input(make, said):
 
 
 def test_jumps_of_several_disturbances_are_those_of_each():
-    both = Together((payload(start=1.0, stop=4.0), payload(start=4.0, stop=6.0), waves(), tether()))
+    both = SumOfDisturbances((payload(start=1.0, stop=4.0), payload(start=4.0, stop=6.0), waves(), tether()))
     assert both.jumps(10.0) == (1.0, 4.0, 6.0) and both.jumps(5.0) == (1.0, 4.0) and both.jumps(4.0) == (1.0,)
     assert parameter_error().jumps(10.0) == ()
     assert thruster_loss(start=0.5).jumps(10.0) == (0.5,)

@@ -10,7 +10,7 @@ from textbook import rotation_from_euler
 from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.current import current
 from undertow.physics.disturbances.gauss_markov_current import gauss_markov_current
 from undertow.physics.disturbances.sheared_current import sheared_current
@@ -59,7 +59,7 @@ def test_galileo():
 
 @pytest.mark.full
 def test_still_water_is_no_water():
-    np.testing.assert_allclose(fly(current(np.zeros(3)), RATES), fly(Together(()), RATES), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(fly(current(np.zeros(3)), RATES), fly(SumOfDisturbances(()), RATES), rtol=0, atol=1e-12)
 
 
 def accelerating(acceleration):
@@ -206,7 +206,7 @@ def test_sheared_current(down, north):
 
 def test_currents_add_and_each_member_has_its_own_randomness():
     wandering = gauss_markov_current(span=10.0)
-    two = Together((wandering, wandering, current((0.0, 0.2, 0.0))))
+    two = SumOfDisturbances((wandering, wandering, current((0.0, 0.2, 0.0))))
 
     @jax.jit
     def draw(key):

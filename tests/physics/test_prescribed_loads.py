@@ -10,7 +10,7 @@ import pytest
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.physics.disturbances import random_suite, sinusoid, table, thruster_loss, wrench
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 
 TIMES = np.array([-1.0, 0.0, 0.7, 1.5, 2.0, 3.9, 4.0, 5.3, 100.0])
 CALM = Load(jnp.zeros(2), jnp.zeros(2))
@@ -21,7 +21,7 @@ SUITE = random_suite(amplitude=(2.0, 0.5), slowest=0.3, fastest=10.0, step=1.5, 
 
 def test_sinusoid_table_and_wrench_are_their_formulas_and_add_up():
     wave = sinusoid((2.0, 0.5), 3.0, offset=(0.1, -0.2), phase=0.4)
-    together = Together((wave, table(ROWS), wrench((5.0, -3.0))))
+    together = SumOfDisturbances((wave, table(ROWS), wrench((5.0, -3.0))))
     found = jax.jit(jax.vmap(lambda t: together.at(((), (), ()), t, None, CALM)))(TIMES)
     waves = [0.1, -0.2] + np.array([2.0, 0.5]) * np.sin(3.0 * TIMES[:, None] + 0.4)
     rows = np.stack([np.interp(TIMES, ROWS[:, 0], ROWS[:, axis]) for axis in (1, 2)], axis=1)

@@ -11,7 +11,7 @@ from undertow.core.contracts import FreeSurface, Pose, Water
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.rotations import rotation_from_quaternion
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.surface import UnderSurface, stated_depths, surface
 from undertow.physics.disturbances.waves import waves
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
@@ -190,11 +190,11 @@ def test_it_rides_on_long_waves():
 def test_depths_that_are_stated():
     """The first counts, elevations add, and a disturbance under a surface stays what it is."""
     sea = waves(depth=3.0)
-    assert stated_depths(Together((sea, surface(2.0)))) == [3.0, 2.0]
-    assert stated_depths(UnderSurface(Together(()), surface(1.0))) == [1.0]
-    assert stated_depths(Together(())) == []
+    assert stated_depths(SumOfDisturbances((sea, surface(2.0)))) == [3.0, 2.0]
+    assert stated_depths(UnderSurface(SumOfDisturbances(()), surface(1.0))) == [1.0]
+    assert stated_depths(SumOfDisturbances(())) == []
     key, pose = jax.random.PRNGKey(1), Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3))
-    both = Together((surface(2.0), sea, sea))
+    both = SumOfDisturbances((surface(2.0), sea, sea))
     found = both.at(both.realize(key), ZERO, pose, PLANT.no_load()).surface
     alone = [sea.at(one, ZERO, pose, PLANT.no_load()).surface.elevation for one in both.realize(key)[1:]]
     assert float(found.depth) == 2.0 and float(found.elevation) == pytest.approx(float(sum(alone)))

@@ -12,7 +12,7 @@ from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.rotations import Kinematics, rotation_from_quaternion
 from undertow.core.status import Status
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.physics.plants.link import Link, Place
+from undertow.physics.plants.link import Place, SpringDamper
 from undertow.physics.plants.two_vehicles import two_vehicles
 from undertow.physics.thrusters.first_order import first_order
 from undertow.physics.thrusters.linear_voltage import linear_voltage
@@ -52,7 +52,7 @@ def forces(link, first, second):
 def test_internal_forces_cancel(kind, seed):
     """Forces are equal and opposite, and so are moments about any fixed point of the world."""
     first, second = random_places(seed)
-    found = forces(Link(**POINTS, length=0.2, stiffness=70.0, damping=5.0, kind=kind), first, second)
+    found = forces(SpringDamper(**POINTS, length=0.2, stiffness=70.0, damping=5.0, kind=kind), first, second)
     assert abs(float(found.tension)) > 1.0
     about = np.asarray([0.4, -2.0, 3.0])
     force, moment = np.zeros(3), np.zeros(3)
@@ -66,7 +66,7 @@ def test_internal_forces_cancel(kind, seed):
 @pytest.mark.parametrize("kind", ["tether", "bar", "none"])
 def test_power_of_the_link_is_loss_and_stored_energy(kind):
     """nu . wrench of both bodies = -(d energy / dt + loss), and the loss is never negative, whatever the motion."""
-    link = Link(**POINTS, length=1.5, stiffness=70.0, damping=15.0, kind=kind)
+    link = SpringDamper(**POINTS, length=1.5, stiffness=70.0, damping=15.0, kind=kind)
 
     @jax.jit
     def evaluate(first, second):
@@ -92,7 +92,9 @@ def test_tension_of_a_tether_and_a_bar():
         Place(np.array([distance, 0.0, 0.0]), np.eye(3), np.array([speed, 0, 0, 0, 0, 0])),
     )
     still = {"first_point": (0, 0, 0), "second_point": (0, 0, 0), "length": 2.0, "stiffness": 100.0, "damping": 8.0}
-    tension = lambda kind, distance, speed: float(forces(Link(**still, kind=kind), *at(distance, speed)).tension)
+    tension = lambda kind, distance, speed: float(
+        forces(SpringDamper(**still, kind=kind), *at(distance, speed)).tension
+    )
     assert tension("tether", 2.3, 0.5) == pytest.approx(34.0)
     assert tension("tether", 2.1, -2.0) == 0.0
     assert tension("tether", 1.9, 3.0) == 0.0

@@ -16,7 +16,7 @@ from undertow.core.errors import BadInput
 from undertow.core.param import parameters
 from undertow.physics import vehicles
 from undertow.physics.vehicles.thruster_labels import number_of
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 # Mass (kg), smallest and largest eigenvalue of M, (B - W) / W (%), righting moment (N m/rad), smallest eigenvalue of
 # the symmetric part of D at unit speed; to the digits given. From the printed numbers, by other code than undertow's.
@@ -274,7 +274,7 @@ def test_no_body_is_like_that(name, change, says):
     rov = vehicles.bluerov2_heavy("wu2018")
     given = {field: getattr(rov, field) for field in rov.__dataclass_fields__}
     with pytest.raises(BadInput) as caught:
-        Vehicle(**(given | {name: change(np.asarray(given[name]))}))
+        VehicleModel(**(given | {name: change(np.asarray(given[name]))}))
     assert str(caught.value).startswith(f"`{name}") and says in str(caught.value)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender, address_of, size_of
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, DatagramFilter, Sender, address_of, size_of
 
 N = 8
 UPRIGHT = np.concatenate([[1.0, -2.0, 3.0], [1, 0, 0, 0], np.linspace(-0.3, 0.3, 6), np.linspace(-5, 5, N)])
@@ -26,7 +26,7 @@ def test_the_layout_is_the_documented_one():
 
 
 def test_numbers_survive_bit_for_bit():
-    chance, received, of = np.random.default_rng(0), Received(COMMAND, N), sender(COMMAND)
+    chance, received, of = np.random.default_rng(0), DatagramFilter(COMMAND, N), sender(COMMAND)
     for k in range(200):
         values = chance.normal(size=N) * 10.0 ** chance.integers(-300, 5, N)
         found = received.take(of.pack(values, k, 0))
@@ -58,14 +58,14 @@ def sealed(body):
     ],
 )
 def test_what_cannot_be_used_is_counted(reason, change):
-    received, of = Received(MEASUREMENT, N), sender()
+    received, of = DatagramFilter(MEASUREMENT, N), sender()
     assert received.take(change(of.pack(UPRIGHT, 0, 0))) is None
     assert received.counts[reason] == 1 == sum(received.counts.values())
     assert received.take(of.pack(UPRIGHT, 0, 0)) is not None
 
 
 def test_old_and_foreign_sessions_and_numbers_are_refused():
-    received, of, other = Received(MEASUREMENT, N), sender(), sender(session=78)
+    received, of, other = DatagramFilter(MEASUREMENT, N), sender(), sender(session=78)
     packets = [of.pack(UPRIGHT, k, 0) for k in range(4)]
     taken = [received.take(packets[k]) is not None for k in (1, 1, 0, 3, 2, 3)]
     assert taken == [True, False, False, True, False, False]
@@ -74,7 +74,7 @@ def test_old_and_foreign_sessions_and_numbers_are_refused():
 
 
 def test_a_sequence_begins_again_after_its_largest_number():
-    of, received = sender(), Received(MEASUREMENT, N)
+    of, received = sender(), DatagramFilter(MEASUREMENT, N)
     of._sequence = 2**32 - 3
     taken = [received.take(of.pack(UPRIGHT, 0, 0)) for _ in range(5)]
     assert [one and one.sequence for one in taken] == [2**32 - 2, 2**32 - 1, 1, 2, 3]
@@ -82,7 +82,7 @@ def test_a_sequence_begins_again_after_its_largest_number():
 
 @pytest.mark.parametrize("wrong", [0, 2**32 - 1, 2**31 - 1, 50_000])
 def test_one_wrong_number_does_not_end_a_connection(wrong):
-    of, received = sender(), Received(MEASUREMENT, N)
+    of, received = sender(), DatagramFilter(MEASUREMENT, N)
     assert received.take(of.pack(UPRIGHT, 0, 0)) is not None
     at, of._sequence = of._sequence, wrong - 1
     forged = of._packed(wrong, UPRIGHT, 0, 0, False)
@@ -94,7 +94,7 @@ def test_one_wrong_number_does_not_end_a_connection(wrong):
 
 def test_a_sender_of_whom_much_was_lost_is_accepted_again():
     """More datagrams were lost than the window holds: the second one counts."""
-    of, received = sender(), Received(MEASUREMENT, N)
+    of, received = sender(), DatagramFilter(MEASUREMENT, N)
     assert received.take(of.pack(UPRIGHT, 0, 0)) is not None
     of._sequence += 50_000
     assert [received.take(of.pack(UPRIGHT, 0, 0)) is not None for _ in range(3)] == [False, True, True]
@@ -103,7 +103,7 @@ def test_a_sender_of_whom_much_was_lost_is_accepted_again():
 
 @pytest.mark.parametrize(("entry", "value"), [(0, 1.1e4), (2, -1e5), (7, 21.0), (9, -9e5), (10, 25.0)])
 def test_motions_of_no_vehicle_are_refused(entry, value):
-    received, values = Received(MEASUREMENT, N), UPRIGHT.copy()
+    received, values = DatagramFilter(MEASUREMENT, N), UPRIGHT.copy()
     values[entry] = value
     assert received.take(sender().pack(values, 0, 0)) is None and received.counts["implausible"] == 1
 
@@ -112,7 +112,7 @@ def test_motions_of_no_vehicle_are_refused(entry, value):
 def test_20000_mutated_datagrams_are_refused_or_sound():
     """Bytes changed, cut, joined, with and without a right checksum: no exception, and only sound numbers pass."""
     chance, passed = np.random.default_rng(2), 0
-    received, of = Received(MEASUREMENT, N), sender()
+    received, of = DatagramFilter(MEASUREMENT, N), sender()
     for k in range(20_000):
         data = bytearray(of.pack(UPRIGHT, k, 0))
         for _ in range(chance.integers(1, 6)):

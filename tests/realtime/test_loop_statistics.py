@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from undertow.outside.realtime.statistics import Durations
+from undertow.outside.realtime.loop_statistics import Durations
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.5, 2.0])

@@ -13,7 +13,7 @@ import pytest
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.outside.realtime.control_loop import LoopSettings, RealTimeLoop, Reason
-from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, Received, Sender
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, DatagramFilter, Sender
 from undertow.outside.realtime.loop_clock import SimulatedClock
 from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.scenario.build import build
@@ -85,7 +85,7 @@ class Peer:
         host, port = place.split(":")
         self.socket.bind((host, int(port)))
         self.socket.settimeout(60.0)  # a step that is compiled on a busy machine takes long
-        self.received, self.sender = Received(COMMAND, 8), Sender(MEASUREMENT, 8, 5)
+        self.received, self.sender = DatagramFilter(COMMAND, 8), Sender(MEASUREMENT, 8, 5)
 
     def take(self):
         data, self.at = self.socket.recvfrom(2048)

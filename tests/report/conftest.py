@@ -5,7 +5,7 @@ import xarray as xr
 from undertow.paper.figures.fidelity import fidelity_figure
 from undertow.paper.pages.report import write_report
 from undertow.report.figures import run_figures
-from undertow.report.replay.replay_data import Replay, Thrusters
+from undertow.report.replay.replay_data import ReplayData, Thrusters
 
 
 def run_of(controller="rcafc", axes=6, inputs=8, status="completed", ended=20.0, samples=201):
@@ -143,4 +143,4 @@ def two_minutes():
     positions = np.concatenate([corners, corners]) * 0.2
     names = tuple(f"T{number}" for number in range(1, 9))
     thrusters = Thrusters(names, positions, np.tile([0.0, 0.0, 1.0], (8, 1)), np.tile([-40.0, 50.0], (8, 1)))
-    return Replay("one", "completed", time, np.array([0.5, 0.4, 0.3]), thrusters, True, True, series)
+    return ReplayData("one", "completed", time, np.array([0.5, 0.4, 0.3]), thrusters, True, True, series)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from undertow.control.supervision.conditions import State
-from undertow.control.supervision.transition_log import Transition
+from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.run import run_plots
 from undertow.report.run_tables import fault_rows, navigation_rows, transition_rows
@@ -24,7 +24,10 @@ def test_rows_of_faults():
 
 def test_rows_of_transitions():
     rows = transition_rows(
-        [Transition(10.05, State.DEGRADED, "saturated", 2.0, 0.0), Transition(11, State.ACTIVE, "", 0, 0)]
+        [
+            SupervisorTransition(10.05, State.DEGRADED, "saturated", 2.0, 0.0),
+            SupervisorTransition(11, State.ACTIVE, "", 0, 0),
+        ]
     )
     assert rows.rows == [("10.05 s", "DEGRADED", "saturated: 2, limit 0"), ("11 s", "ACTIVE", "")]
 
@@ -41,14 +44,14 @@ def test_rows_of_a_navigation_filter():
 
 
 def test_a_thruster_that_was_taken_out_of_use_is_named_with_its_time():
-    found = Transition(16.3, State.DEGRADED, "thruster_lost", 1.0, 0.0)
+    found = SupervisorTransition(16.3, State.DEGRADED, "thruster_lost", 1.0, 0.0)
     rows = transition_rows([found], [("T2 bow port", 16.3)])
     assert rows.sentences == ("The supervisor took T2 bow port out of use at 16.3 s.",)
     assert transition_rows([found]).sentences == ()
 
 
 def test_a_tracking_error_without_a_lost_thruster_does_not_exclude_one():
-    away = Transition(16.3, State.DEGRADED, "attitude_error", 1.2, 1.0)
+    away = SupervisorTransition(16.3, State.DEGRADED, "attitude_error", 1.2, 1.0)
     (sentence,) = transition_rows([away], []).sentences
     assert "no thruster was found to have failed" in sentence and "cannot exclude it" in sentence
     assert transition_rows([away]).sentences == ()  # nothing watched the thrusters

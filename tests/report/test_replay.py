@@ -12,7 +12,7 @@ from test_page import parsed
 import undertow as ut
 from undertow.analysis.metrics import meanings
 from undertow.control.navigation.perfect import perfect
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.thrusters.first_order import first_order
 from undertow.report import run_page
 from undertow.report.figures.run_files import LARGE
@@ -21,7 +21,7 @@ from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
 from undertow.report.replay.trials_again import replays_of_trials
-from undertow.report.run_page import Shown, write_run_page
+from undertow.report.run_page import RunPageContents, write_run_page
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.scenario.results.run_facts import facts_from
@@ -40,7 +40,7 @@ def loop():
     plant = ut.HybridVehicle(
         ut.vehicles.bluerov2_heavy(), first_order(thrust_per_volt=2.0, time_constant=0.5, supply=16)
     )
-    load = Together((ut.disturbances.current(WATER), ut.disturbances.thruster_loss(failing=[3], start=10.0)))
+    load = SumOfDisturbances((ut.disturbances.current(WATER), ut.disturbances.thruster_loss(failing=[3], start=10.0)))
     return ClosedLoop(
         plant, ut.controllers.pid(plant.model(), frequency=1.0), ut.references.setpoint([0.0] * 6), load, perfect()
     )
@@ -157,7 +157,9 @@ def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):
 
 def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_path):
     pictures = {f"figure{number}": "x" * LARGE for number in range(6)}
-    write_run_page(tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), Shown(pictures, two_minutes, []))
+    write_run_page(
+        tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), RunPageContents(pictures, two_minutes, [])
+    )
     page = (tmp_path / "run.html").read_text()
     assert len(page) < 2_000_000
     words = [re.sub(r"<script.*?</script>", "", page, flags=re.S)]
@@ -173,7 +175,7 @@ def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_pa
 
 def test_page_without_three_js_says_what_to_install(run, two_minutes, tmp_path, monkeypatch):
     monkeypatch.setattr(replay_section, "_THREE_JS", ("no_such_package", "three.min.js"))
-    write_run_page(tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), Shown({}, two_minutes, []))
+    write_run_page(tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), RunPageContents({}, two_minutes, []))
     page = (tmp_path / "run.html").read_text()
     assert "pip install jupyter-threejs-sage==130" in page and "<script" not in page
 

@@ -102,7 +102,7 @@ def test_a_topic_in_another_frame_is_left_out(tmp_path):
 def test_a_message_that_cannot_be_used_costs_no_other(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         for x in (1.0, np.nan, 3.0):
-            bag.write(("/t", ros.PoseStamped(ros.Header(ros.Time(), "map"), ros.Pose(ros.Point(x))), 10**9))
+            bag.write(("/t", ros.PoseStamped(ros.Header(ros.Time(), "map"), ros.PoseMessage(ros.Point(x))), 10**9))
     with pytest.warns(UserWarning, match="Left out: 1 messages of /t"):
         assert read_rosbag2(tmp_path / "bag")["/t/pose"][1][:, 1].tolist() == [1.0, 3.0]
 

@@ -83,7 +83,7 @@ def test_numbers_that_are_not_finite_were_not_measured():
     np.testing.assert_array_equal(found.position, [1, np.nan, -np.inf])
     found = from_messages.motion_of(odometry(pose__pose__orientation=ros.Quaternion(np.nan, 0, 0, 1)), FRAMES, "/odom")
     assert np.isnan(found.quaternion).all() and np.isfinite(found.velocity).all()
-    target = ros.PoseStamped(ros.Header(STAMP, "map"), ros.Pose(ros.Point(np.nan, 0, 0)))
+    target = ros.PoseStamped(ros.Header(STAMP, "map"), ros.PoseMessage(ros.Point(np.nan, 0, 0)))
     with pytest.raises(BadInput, match="`/t pose` must be finite numbers"):
         from_messages.target_of(target, FRAMES, "/t")
 

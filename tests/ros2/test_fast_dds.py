@@ -37,7 +37,7 @@ def test_round_trips_keep_every_number(program, domain):
         until(lambda: out.subscribers() and back.publishers(), 30)
         for count in range(500):
             numbers = chance.normal(size=7)
-            pose = ros.Pose(ros.Point(*numbers[:3].tolist()), ros.Quaternion(*numbers[3:].tolist()))
+            pose = ros.PoseMessage(ros.Point(*numbers[:3].tolist()), ros.Quaternion(*numbers[3:].tolist()))
             header = ros.Header(ros.Time(count, 250_000_000), "odom")
             out.publish(ros.Odometry(header, "base_link", ros.PoseWithCovariance(pose)))
             link.wait(5.0)

@@ -15,11 +15,11 @@ from soak.links.peer import AbstractPeer, Measured, altered
 from soak.links.plan import ENDINGS, LINKS, STREAMS, WILD, Event, Plan, plan, signals_of
 from soak.links.scenario import PERIOD
 from soak.links_soak import attack_links
-from undertow.outside.autopilot.measured_motion import Motion
+from undertow.outside.autopilot.measured_motion import MeasuredMotion
 
 pytestmark = pytest.mark.soak
 
-STILL = Motion(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(6))
+STILL = MeasuredMotion(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(6))
 
 
 def test_plans_are_sampled_from_their_identity():

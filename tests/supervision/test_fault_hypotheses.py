@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from undertow.control.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
+from undertow.control.supervision.fault_hypotheses import FaultThresholds, missing_effect, one_thruster, two_thrusters
 from undertow.control.supervision.fault_onset import ONSETS, Wide, cleared, examine, onset_state, transients, weighed
 
 CHANCE = np.random.default_rng(5)
@@ -16,7 +16,7 @@ ROOT = CHANCE.normal(size=(6, 6))
 COVARIANCE = (ROOT @ ROOT.T / 6 + np.eye(6)) * 1e-3
 FORCES = np.array([3.0, -4.0, 5.0, 2.5, -3.5])
 USED = np.ones(5)
-BOUNDS = Bounds(np.asarray(25.0), np.asarray(12.0), 0.8 * np.ones(5))
+BOUNDS = FaultThresholds(np.asarray(25.0), np.asarray(12.0), 0.8 * np.ones(5))
 BANDWIDTH, DECAY, ELAPSED = 15.0, 0.06, 0.05  # rad/s, s, s
 
 remaining = jax.jit(transients)

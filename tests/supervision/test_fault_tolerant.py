@@ -10,7 +10,7 @@ import undertow as ut
 from undertow.control.supervision.fault_tolerant_law import fault_tolerant
 from undertow.core.contracts import Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
@@ -30,7 +30,7 @@ def losses():
 def loops(law, disturbances):
     reference = ut.references.lissajous((1.0, 1.0, 0.5, 0.5), (0.3, 0.35, 0.25, 0.3))
     noise, current = ut.navigation.white_noise(0.005, 0.005), ut.disturbances.current([0.5, 0.2, 0.2])
-    return [ClosedLoop(PLANT, law, reference, Together((current, one)), noise) for one in disturbances]
+    return [ClosedLoop(PLANT, law, reference, SumOfDisturbances((current, one)), noise) for one in disturbances]
 
 
 def batch(several, signals, every=1):

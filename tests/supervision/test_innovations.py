@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from undertow.control.supervision.innovations import InnovationMonitor, JumpLimits
-from undertow.control.supervision.motion import Motion
+from undertow.control.supervision.motion import MonitoredMotion
 from undertow.core.errors import BadInput
 
 DT, LIMITS = 0.02, JumpLimits(1.0, 0.5, 1.0, 1.0)
 LEVEL, REST = np.array([1.0, 0, 0, 0]), np.zeros(6)
-EXPECTED = Motion(np.zeros(3), LEVEL, REST)
+EXPECTED = MonitoredMotion(np.zeros(3), LEVEL, REST)
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from undertow.control import controllers
 from undertow.control.controllers.adaptive_backstepping import backstepping_rate
 from undertow.control.controllers.bandwidths import (
     Axis,
-    Law,
+    LoopTransfer,
     axes_of,
     bandwidth_grid,
     best_frequency,
@@ -127,7 +127,7 @@ S = 1j * np.array([0.3, 2.0, 11.0])
 
 
 def as_pid(k_p, k_i, k_d):
-    return Law(k_p + k_i / S, k_d + 0 * S)
+    return LoopTransfer(k_p + k_i / S, k_d + 0 * S)
 
 
 def documented(name, law):
@@ -168,11 +168,11 @@ def test_rule_chooses_by_the_law_that_small_errors_see(name):
 
 def test_backstepping_is_chosen_by_its_own_linear_law():
     """Without lag a PID; with it the three steps, whose estimate and actuators are solved for at each frequency."""
-    pid_like = lambda c, s: Law(2 * c**2 + 0.3 * c**2 + 0.3 * c**3 / s, 2 * c + 0 * s)
+    pid_like = lambda c, s: LoopTransfer(2 * c**2 + 0.3 * c**2 + 0.3 * c**3 / s, 2 * c + 0 * s)
     assert backstepping_rate(AXIS, None) == best_frequency(AXIS, pid_like)
     assert float(np.ravel(made("adaptive_backstepping").rate)[0]) == backstepping_rate(AXIS, None)
 
-    rule = lambda c, s: Law(three_steps(c, s, 1.0, 0.0), three_steps(c, s, 0.0, 1.0))
+    rule = lambda c, s: LoopTransfer(three_steps(c, s, 1.0, 0.0), three_steps(c, s, 0.0, 1.0))
     assert backstepping_rate(LAGGED, LAGGED.lag) == best_frequency(LAGGED, rule)
 
 
@@ -209,7 +209,7 @@ def test_lqi_is_chosen_by_its_own_linear_law():
         q, e, v, a = np.array([regulator_of_scipy(one) for one in w[:, 0]]).T[:, :, None]
         behind = (1 - np.exp(-DT / 0.3)) / (np.exp(s * DT) - np.exp(-DT / 0.3))
         inner = 1 + a * behind
-        return Law((e + q / s) / inner, v / inner)
+        return LoopTransfer((e + q / s) / inner, v / inner)
 
     assert lqi_frequency(LAGGED, 0.1, 1.0, 0.3) == best_frequency(LAGGED, loop)
 

@@ -16,7 +16,7 @@ from undertow.control.navigation import perfect, white_noise
 from undertow.control.references import setpoint
 from undertow.core.contracts import AbstractNavigation
 from undertow.physics.disturbances import current, sinusoid, waves
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.plants import double_integrator, hybrid_vehicle
 from undertow.physics.thrusters import first_order, t200
 from undertow.physics.vehicles import bluerov2_heavy
@@ -26,7 +26,7 @@ from undertow.simulation.loop.closed_loop import ClosedLoop
 pytestmark = pytest.mark.full
 
 DT, GOAL = 0.01, [2.0, 1.0, 1.0, 0.0, 0.0, 0.5]  # s; m, rad
-SEA = Together((current([0.3, 0.2, 0.0]), waves(height=0.5, period=5.0)))
+SEA = SumOfDisturbances((current([0.3, 0.2, 0.0]), waves(height=0.5, period=5.0)))
 
 
 class Late(AbstractNavigation):

@@ -12,17 +12,17 @@ import pytest
 from two_axes import DT, V, X
 
 from undertow.control import controllers
-from undertow.control.controllers.actuation import Given, actuation_for
+from undertow.control.controllers.actuation import ActuationResult, actuation_for
 from undertow.control.controllers.adaptive_backstepping import BacksteppingState
-from undertow.control.controllers.adrc import ObserverState
+from undertow.control.controllers.adrc import ExtendedStateObserverState
 from undertow.control.controllers.cascade_law import CascadeState
-from undertow.control.controllers.disturbance_observer import ObserverState as Predicted
-from undertow.control.controllers.indi import FilterState
+from undertow.control.controllers.disturbance_observer import DisturbanceObserverState as Predicted
+from undertow.control.controllers.indi import INDIState
 from undertow.control.controllers.integral_sliding_mode import SlidingState
 from undertow.control.controllers.l1_adaptive import PredictorState
 from undertow.control.controllers.lqi import LQI, LQIState
 from undertow.control.controllers.mrac import AdaptiveState
-from undertow.control.controllers.neural import Weights
+from undertow.control.controllers.neural import NetworkWeights
 from undertow.core.contracts import Measurement, Target, TrackingError
 from undertow.physics.plants import double_integrator
 
@@ -56,7 +56,7 @@ def pid(own, share):
     lambda: controllers.adrc(
         MODEL, bandwidth=[3.0, 5.0], damping=[0.8, 1.2], feedback=[[2.0, 3.0], [4.0, 1.0]], **SAME
     ),
-    ObserverState(np.array([0.6, -0.3]), np.array([1.2, -0.4])),
+    ExtendedStateObserverState(np.array([0.6, -0.3]), np.array([1.2, -0.4])),
 )
 def adrc(own, share):
     w, zeta, eps = np.array([3.0, 5.0]), np.array([0.8, 1.2]), own.rates - V
@@ -69,7 +69,7 @@ def adrc(own, share):
     lambda: controllers.indi(
         MODEL, bandwidth=[3.0, 5.0], damping=[0.8, 1.2], feedback=[[2.0, 3.0], [4.0, 1.0]], **SAME
     ),
-    FilterState(*np.array([[0.6, -0.3], [0.2, 0.5], [-0.4, 0.9], [1.1, -0.7]])),
+    INDIState(*np.array([[0.6, -0.3], [0.2, 0.5], [-0.4, 0.9], [1.1, -0.7]])),
 )
 def indi(own, share):
     w, zeta = np.array([3.0, 5.0]), np.array([0.8, 1.2])
@@ -302,7 +302,7 @@ def slotine_li(own, share):
         weights_bound=8.0,
         **SAME,
     ),
-    Weights(np.random.default_rng(5).normal(size=(4, 2)), np.random.default_rng(6).normal(size=(9, 3))),
+    NetworkWeights(np.random.default_rng(5).normal(size=(4, 2)), np.random.default_rng(6).normal(size=(9, 3))),
 )
 def neural(own, share):
     """Lewis, Yesildirek and Liu (1996), with the network's derivatives by its own sigmoids."""
@@ -379,7 +379,7 @@ def steps():
     @jax.jit
     @jax.vmap
     def taken(own, share):
-        given = Given(jnp.asarray(KNOWN), jnp.asarray(MISSING), share)
+        given = ActuationResult(jnp.asarray(KNOWN), jnp.asarray(MISSING), share)
         return {
             name: (*law.demand(own[name], y, off), law.adapt(own[name], y, off, given, jnp.asarray(DT)))
             for name, law in made.items()

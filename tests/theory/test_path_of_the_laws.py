@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from two_axes import DRIFT, DT, F, G, H, V, X, Y
 
 from undertow.control.controllers import nmpc, pid, policy, rcaf, replay
-from undertow.control.controllers.actuation import ActuatedState, Given
+from undertow.control.controllers.actuation import ActuatedState, ActuationResult
 from undertow.control.controllers.bandwidths import axes_of
 from undertow.control.controllers.decentralised import decentralised
 from undertow.control.controllers.law_signals import share_given
@@ -160,7 +160,7 @@ def test_one_step_of_nmpc():
     beyond = held._replace(plan=plan._replace(forces=plan.forces + [[50.0, 0.0]]))
     broken = held._replace(plan=plan._replace(forces=np.full((4, 2), np.nan)))
     off, known = TrackingError(E, R, A), np.array([0.7, -1.1])
-    given = Given(jnp.asarray(known), jnp.zeros(2), jnp.ones(()))
+    given = ActuationResult(jnp.asarray(known), jnp.zeros(2), jnp.ones(()))
 
     def step(z):
         return law.demand(z, Y, off)[0], law.adapt(z, Y, off, given, jnp.asarray(DT))

@@ -14,7 +14,7 @@ from undertow.control.references import setpoint
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.physics.disturbances import current, sinusoid, wrench
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.sensors import depth, dvl, imu
 from undertow.physics.thrusters import t200
@@ -215,7 +215,7 @@ def test_one_ode_is_not_what_a_vehicle_runs():
 
 
 def test_disturbance_of_another_size():
-    inner = Together((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
+    inner = SumOfDisturbances((sinusoid(2.0, 1.0), wrench([1.0] * 6), current([0.3, 0.1, 0.0])))
     place, calm = Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)), Load(jnp.ones(6), jnp.zeros(6))
     half = Scaled(inner, 0.5)
     one, two = (each.at(each.realize(jax.random.PRNGKey(0)), 0.7, place, calm) for each in (inner, half))

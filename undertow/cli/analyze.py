@@ -14,12 +14,12 @@ from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import titled, wide_console
 from undertow.core.json_text import to_json
-from undertow.report.prediction_page import Rows, tables, write_prediction
+from undertow.report.prediction_page import PredictionTable, tables, write_prediction
 from undertow.scenario.build import build
 from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.reading import read
 from undertow.studies.prediction.predict import predict, summary
-from undertow.studies.prediction.warnings import advice
+from undertow.studies.prediction.scenario_warnings import advice
 
 _WRITTEN = ("prediction.html", "prediction.json", "figures")
 
@@ -51,7 +51,7 @@ def analyze(command: AnalyzeCommand) -> int:
     return DONE
 
 
-def _table(rows: Rows) -> Table:
+def _table(rows: PredictionTable) -> Table:
     table = titled(rows.title, *rows.head)
     table.caption, table.caption_justify = rows.sentence, "left"
     for row in rows.rows:

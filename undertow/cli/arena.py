@@ -27,7 +27,7 @@ from undertow.studies.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_e
 from undertow.studies.arena.leader_board import STEP, as_csv, as_markdown, board_of, leader_rows
 from undertow.studies.arena.robustness import FOLDER, prepare_robustness
 from undertow.studies.arena.tasks import CELLS, TASKS
-from undertow.studies.arena.tuned_gains import Gains, tuned_gains
+from undertow.studies.arena.tuned_gains import TunedGains, tuned_gains
 from undertow.studies.arena.vehicles import VEHICLES
 from undertow.studies.campaign.prepare import Prepared
 from undertow.studies.campaign.run_campaign import STORE
@@ -154,7 +154,7 @@ def _run(console: Console, law: Candidate, folder: Path, asked: _Asked) -> None:
         _trials(console, harder, folder / FOLDER, asked.workers)
 
 
-def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> Gains:
+def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> TunedGains:
     """Gains for every vehicle, tuned on a task of its own."""
     vehicles, say = list(dict.fromkeys(vehicle for _, vehicle in cells)), new_lines(console)
     return interruptible(lambda: tuned_gains(law, vehicles, budget, folder / _TUNING, say))
@@ -166,7 +166,7 @@ def _trials(console: Console, prepared: Prepared, folder: Path, workers: int) ->
     run_trials(console, prepared, folder, None if (folder / STORE).exists() else (), None, workers)
 
 
-def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains: Gains | None) -> None:
+def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains: TunedGains | None) -> None:
     """Write the scenario of every task, which `undertow simulate` runs."""
     folder.mkdir(exist_ok=True)
     for cell in cells:

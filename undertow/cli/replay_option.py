@@ -8,7 +8,7 @@ from rich.console import Console
 from undertow.cli.interruptible import interruptible
 from undertow.cli.stages import stage
 from undertow.core.errors import BadInput
-from undertow.report.replay.replay_data import Replay, can_be_shown
+from undertow.report.replay.replay_data import ReplayData, can_be_shown
 from undertow.report.replay.trials_again import MOST, replays_of_trials
 from undertow.scenario.build import Built
 
@@ -23,7 +23,7 @@ def check_replay(trials: Sequence[Built]) -> None:
         raise BadInput("--replay", "be left out for a plant that is no vehicle with thrusters", "given")
 
 
-def run_again(console: Console, trials: Mapping[str, Built]) -> tuple[list[Replay], list[str]]:
+def run_again(console: Console, trials: Mapping[str, Built]) -> tuple[list[ReplayData], list[str]]:
     """Replays of trials, label -> trial, of which the first four are run again; and a sentence for each failure."""
     shown = dict(islice(trials.items(), MOST))
     if not shown:

@@ -21,7 +21,7 @@ from undertow.cli.stages import stage
 from undertow.cli.step_logs import logging_to
 from undertow.cli.tables import numbers, terminal_table, titled, wide_console
 from undertow.control.supervision.conditions import State
-from undertow.control.supervision.transition_log import Transition
+from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core import checks
 from undertow.core.atomic_io import sync, write_whole
 from undertow.core.errors import BadInput
@@ -32,8 +32,8 @@ from undertow.outside.realtime.link import AbstractLink
 from undertow.outside.realtime.log_link import LogLink
 from undertow.outside.realtime.loop_clock import MonotonicClock, SimulatedClock
 from undertow.outside.realtime.loop_settings import LoopSettings, Reason
+from undertow.outside.realtime.loop_statistics import LoopStatistics
 from undertow.outside.realtime.process_priority import scheduled
-from undertow.outside.realtime.statistics import LoopStatistics
 from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.report.run_tables import transition_rows
@@ -195,7 +195,7 @@ def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
         table.add_row("not recorded: the disk was too slow", str(found["autopilot_counts"]["not recorded"]))
     console.print(table)
     if "transitions" in found:
-        several = [Transition(**one | {"state": State[one["state"]]}) for one in found["transitions"]]
+        several = [SupervisorTransition(**one | {"state": State[one["state"]]}) for one in found["transitions"]]
         console.print(terminal_table(transition_rows(several)))
     console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 

@@ -21,8 +21,8 @@ from undertow.logs.run_log import log_of_run
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.plotted import Plotted
 from undertow.report.plotting import PlottingProcess
-from undertow.report.replay.replay_data import Replay, hull_size
-from undertow.report.run_page import Shown, shown, write_run_page
+from undertow.report.replay.replay_data import ReplayData, hull_size
+from undertow.report.run_page import RunPageContents, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.results.result_files import write_metrics
@@ -57,7 +57,7 @@ def present(
     draft: Draft,
     folder: Path,
     console: Console,
-) -> Replay | None:
+) -> ReplayData | None:
     """Write log, figures, page and prediction of a run.
 
     Args:
@@ -89,7 +89,7 @@ def _add_prediction(
     predicting: Future[PredictedMetrics],
     asked: bool,
     draft: Draft,
-    looks: Shown,
+    looks: RunPageContents,
     console: Console,
 ) -> None:
     """Add the prediction to the results and print it; nothing is printed where there can be none, unless asked for."""

@@ -22,7 +22,7 @@ from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.reading import read
 from undertow.studies.tuning.cost import times_other
-from undertow.studies.tuning.objective import Step
+from undertow.studies.tuning.objective import Improvement
 from undertow.studies.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
 _WRITTEN = ("tuned.yaml", "tuning.json", "figures")
@@ -60,7 +60,9 @@ def tune_scenario(command: TuneCommand) -> int:
 
 
 @contextlib.contextmanager
-def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], None], Callable[[Step, int], None]]]:
+def _live(
+    console: Console, budget: float
+) -> Iterator[tuple[Callable[[str], None], Callable[[Improvement, int], None]]]:
     """Show the current stage, the best cost so far and the remaining budget."""
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[left]}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
@@ -71,7 +73,7 @@ def _live(console: Console, budget: float) -> Iterator[tuple[Callable[[str], Non
             if not console.is_terminal:
                 console.print(stage, highlight=False)
 
-        def watch(best: Step, evaluations: int) -> None:
+        def watch(best: Improvement, evaluations: int) -> None:
             left = max(0.0, budget - best.elapsed)
             line = f"{evaluations} evaluations, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
             live.update(task, description=line, completed=best.elapsed, left=f"{left:.0f} s left at most")

@@ -38,17 +38,17 @@ _REFUSED: tuple[tuple[str, str, str], ...] = (
 )
 
 
-class Fault(NamedTuple):
+class UserCodeFailure(NamedTuple):
     """What failed and why, with its location in the user's file; and the remedy, "" where none is known."""
 
     says: str
     hint: str
 
 
-def fault_of(error: BaseException) -> Fault:
+def fault_of(error: BaseException) -> UserCodeFailure:
     """The cause of an exception in a part: `cannot run `Mine.command`: NumPy needs ... (mine.py, line 7)`."""
     if isinstance(error, SyntaxError):
-        return Fault(
+        return UserCodeFailure(
             f"{type(error).__name__}: {error.msg} ({Path(error.filename or '').name}, line {error.lineno})", ""
         )
     text = said_by(error)
@@ -57,10 +57,10 @@ def fault_of(error: BaseException) -> Fault:
         return _abstract(abstract, frames)
     why, hint = _reason(error, text)
     if not frames:
-        return Fault(why, hint)
+        return UserCodeFailure(why, hint)
     (frame, line), method = frames[-1], frames[-1][0].f_code.co_qualname.partition(".<locals>")[0]
     doing = "" if method == "<module>" else f"cannot run `{method}`: "
-    return Fault(f"{doing}{why} ({Path(frame.f_code.co_filename).name}, line {line})", hint)
+    return UserCodeFailure(f"{doing}{why} ({Path(frame.f_code.co_filename).name}, line {line})", hint)
 
 
 def python_says(error: BaseException) -> str:
@@ -131,7 +131,7 @@ def _meant(error: BaseException, text: str) -> str:
     return ""
 
 
-def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Fault:
+def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> UserCodeFailure:
     """A class that lacks methods or attributes of its contract."""
     name, what, lacking = found.groups()
     names = re.findall(r"\w+", lacking)
@@ -141,4 +141,4 @@ def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> Faul
     kind = next((f.f_globals[name] for f, _ in reversed(frames) if isinstance(f.f_globals.get(name), type)), None)
     place = place_of(kind) if kind is not None else ""
     at = f" ({place})" if place else ""
-    return Fault(f"cannot instantiate `{name}`: {what}{many} {listed} {verb} not {missing}{at}", "")
+    return UserCodeFailure(f"cannot instantiate `{name}`: {what}{many} {listed} {verb} not {missing}{at}", "")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.core.errors import BadInput
-from undertow.logs.recording import Recording, Table
+from undertow.logs.recording import Recording, TopicMessages
 
 _HEAD, _FMT = b"\xa3\x95", 0x80
 
@@ -159,17 +159,17 @@ def _number(data: bytes, at: int, kind: _Kind, kinds: dict[int, _Kind], numbered
         numbered[about.name] = about.fields.names[place]
 
 
-def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, Table]:
+def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, TopicMessages]:
     """The table of a kind, or one per sensor or core."""
     columns = zip(kind.fields.names or (), kind.divisors, strict=True)
     with np.errstate(invalid="ignore"):  # signalling NaNs
         fields = {name: rows[name] / divisor for name, divisor in columns if divisor}
     time = rows["TimeUS"] * 1e-6
     if instance not in fields:
-        return {kind.name: Table(time, fields, kind.name)}
+        return {kind.name: TopicMessages(time, fields, kind.name)}
     found = {}
     for number in np.unique(fields[instance]):
         own = fields[instance] == number
         part = {name: values[own] for name, values in fields.items()}
-        found[f"{kind.name}[{number:g}]"] = Table(time[own], part, kind.name)
+        found[f"{kind.name}[{number:g}]"] = TopicMessages(time[own], part, kind.name)
     return found

@@ -16,7 +16,7 @@ from undertow.core.number_text import number_in
 from undertow.logs.csv_writer import TIME
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
-from undertow.logs.recording import Recording, Table
+from undertow.logs.recording import Recording, TopicMessages
 
 _WORDS = {"true": 1.0, "false": 0.0, "": np.nan}
 _OURS = re.compile(r"(?P<signal>[a-z_0-9]+)(?:\.(?P<column>[^\[\]]+))? \[(?P<unit>[^\[\]]*)\]")
@@ -34,7 +34,7 @@ def read_csv(path: Path) -> Log | Recording:
             raise BadInput("log", "hold numbers", next(iter(texts.values())))
         return _our_log(path, header, numbers, empty, notes)
     fields = {name: numbers[:, i] for i, name in enumerate(header) if name not in texts}
-    table = Table(np.arange(len(numbers), dtype=float), fields, texts=texts)
+    table = TopicMessages(np.arange(len(numbers), dtype=float), fields, texts=texts)
     left_out = (f"columns of text are left out: {', '.join(texts)}",) if texts else ()
     return Recording({"": table}, path.name, "CSV", left_out)
 

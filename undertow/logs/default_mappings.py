@@ -5,7 +5,7 @@ msg_docs. ROS 2: REP 103 (units, axes) and nav_msgs/Odometry, whose twist is in 
 """
 
 from undertow.logs.ardupilot_parameters import barometers, motor_channels, primary_barometer, pulse_columns
-from undertow.logs.mapping import Entry, LogMapping
+from undertow.logs.mapping import LogMapping, SignalMapping
 from undertow.logs.recording import Recording
 
 _ENU = ("ENU", "FLU")
@@ -23,7 +23,11 @@ def _indexed(name: str, number: int) -> tuple[str, ...]:
 # accelerometer in m/s^2 along FRD; BARO.Alt, and CTUN.BAlt of the primary barometer, are heights, m, so that their
 # depth points up.
 _EKF = tuple(
-    (Entry(("PN", "PE", "PD"), kind), Entry(("VN", "VE", "VD"), kind), Entry(("Roll", "Pitch", "Yaw"), kind, "deg"))
+    (
+        SignalMapping(("PN", "PE", "PD"), kind),
+        SignalMapping(("VN", "VE", "VD"), kind),
+        SignalMapping(("Roll", "Pitch", "Yaw"), kind, "deg"),
+    )
     for kind in ("XKF1", "NKF1")
 )
 _HEIGHTS = (("BAlt", "CTUN"), ("Alt", "BARO"), ("Alt", "CTUN"))
@@ -31,11 +35,11 @@ ARDUPILOT = LogMapping(
     {
         "position": tuple(position for position, _, _ in _EKF),
         "velocity": tuple(velocity for _, velocity, _ in _EKF),
-        "attitude": (Entry(("Roll", "Pitch", "Yaw"), "ATT", "deg"), *(attitude for _, _, attitude in _EKF)),
-        "angular_velocity": (Entry(("GyrX", "GyrY", "GyrZ"), "IMU", "rad/s"),),
-        "specific_force": (Entry(("AccX", "AccY", "AccZ"), "IMU"),),
-        "depth": tuple(Entry((column,), kind, frame=_ENU) for column, kind in _HEIGHTS),
-        "pulses": tuple(Entry(tuple(f"C{i}" for i in range(1, most + 1)), "RCOU") for most in (14, 12, 8)),
+        "attitude": (SignalMapping(("Roll", "Pitch", "Yaw"), "ATT", "deg"), *(attitude for _, _, attitude in _EKF)),
+        "angular_velocity": (SignalMapping(("GyrX", "GyrY", "GyrZ"), "IMU", "rad/s"),),
+        "specific_force": (SignalMapping(("AccX", "AccY", "AccZ"), "IMU"),),
+        "depth": tuple(SignalMapping((column,), kind, frame=_ENU) for column, kind in _HEIGHTS),
+        "pulses": tuple(SignalMapping(tuple(f"C{i}" for i in range(1, most + 1)), "RCOU") for most in (14, 12, 8)),
     }
 )
 
@@ -46,29 +50,29 @@ _SPEEDS = ("rollspeed", "pitchspeed", "yawspeed")
 PX4 = LogMapping(
     {
         "position": (
-            Entry(("x", "y", "z"), "vehicle_local_position"),
-            Entry(_indexed("position", 3), "vehicle_odometry", must=(("pose_frame", 1.0),)),
-            Entry(("x", "y", "z"), "vehicle_odometry", must=(("local_frame", 0.0),)),
+            SignalMapping(("x", "y", "z"), "vehicle_local_position"),
+            SignalMapping(_indexed("position", 3), "vehicle_odometry", must=(("pose_frame", 1.0),)),
+            SignalMapping(("x", "y", "z"), "vehicle_odometry", must=(("local_frame", 0.0),)),
         ),
         "velocity": (
-            Entry(("vx", "vy", "vz"), "vehicle_local_position"),
-            Entry(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 1.0),)),
+            SignalMapping(("vx", "vy", "vz"), "vehicle_local_position"),
+            SignalMapping(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 1.0),)),
         ),
-        "body_velocity": (Entry(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 3.0),)),),
+        "body_velocity": (SignalMapping(_indexed("velocity", 3), "vehicle_odometry", must=(("velocity_frame", 3.0),)),),
         "quaternion": (
-            Entry(_indexed("q", 4), "vehicle_attitude"),
-            Entry(_indexed("q", 4), "vehicle_odometry", must=(("pose_frame", 1.0),)),
+            SignalMapping(_indexed("q", 4), "vehicle_attitude"),
+            SignalMapping(_indexed("q", 4), "vehicle_odometry", must=(("pose_frame", 1.0),)),
         ),
         "angular_velocity": (
-            Entry(_indexed("xyz", 3), "vehicle_angular_velocity"),
-            Entry(_indexed("angular_velocity", 3), "vehicle_odometry"),
-            Entry(_SPEEDS, "vehicle_odometry"),
-            Entry(_SPEEDS, "vehicle_attitude"),
-            Entry(_indexed("gyro_rad", 3), "sensor_combined"),
+            SignalMapping(_indexed("xyz", 3), "vehicle_angular_velocity"),
+            SignalMapping(_indexed("angular_velocity", 3), "vehicle_odometry"),
+            SignalMapping(_SPEEDS, "vehicle_odometry"),
+            SignalMapping(_SPEEDS, "vehicle_attitude"),
+            SignalMapping(_indexed("gyro_rad", 3), "sensor_combined"),
         ),
-        "specific_force": (Entry(_indexed("accelerometer_m_s2", 3), "sensor_combined"),),
-        "duty": (Entry(_indexed("control", 12), "actuator_motors"),),
-        "pulses": (Entry(_indexed("output", 16), "actuator_outputs"),),
+        "specific_force": (SignalMapping(_indexed("accelerometer_m_s2", 3), "sensor_combined"),),
+        "duty": (SignalMapping(_indexed("control", 12), "actuator_motors"),),
+        "pulses": (SignalMapping(_indexed("output", 16), "actuator_outputs"),),
     }
 )
 
@@ -76,17 +80,17 @@ _ODOMETRY, _IMU = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 _TWIST = "twist.twist"
 ROS2 = LogMapping(
     {
-        "position": (Entry(_xyz("pose.pose.position"), _ODOMETRY, frame=_ENU),),
+        "position": (SignalMapping(_xyz("pose.pose.position"), _ODOMETRY, frame=_ENU),),
         "quaternion": (
-            Entry(tuple(f"pose.pose.orientation.{axis}" for axis in "wxyz"), _ODOMETRY, frame=_ENU),
-            Entry(tuple(f"orientation.{axis}" for axis in "wxyz"), _IMU, frame=_ENU),
+            SignalMapping(tuple(f"pose.pose.orientation.{axis}" for axis in "wxyz"), _ODOMETRY, frame=_ENU),
+            SignalMapping(tuple(f"orientation.{axis}" for axis in "wxyz"), _IMU, frame=_ENU),
         ),
-        "body_velocity": (Entry(_xyz(f"{_TWIST}.linear"), _ODOMETRY, frame=_ENU),),
+        "body_velocity": (SignalMapping(_xyz(f"{_TWIST}.linear"), _ODOMETRY, frame=_ENU),),
         "angular_velocity": (
-            Entry(_xyz(f"{_TWIST}.angular"), _ODOMETRY, frame=_ENU),
-            Entry(_xyz("angular_velocity"), _IMU, frame=_ENU),
+            SignalMapping(_xyz(f"{_TWIST}.angular"), _ODOMETRY, frame=_ENU),
+            SignalMapping(_xyz("angular_velocity"), _IMU, frame=_ENU),
         ),
-        "specific_force": (Entry(_xyz("linear_acceleration"), _IMU, frame=_ENU),),
+        "specific_force": (SignalMapping(_xyz("linear_acceleration"), _IMU, frame=_ENU),),
     }
 )
 
@@ -101,18 +105,18 @@ def _servos(most: int) -> tuple[str, ...]:
 # as ArduPilot sends them); relative_alt in mm above home, so that its depth points up; pulses in us.
 MAVLINK = LogMapping(
     {
-        "position": (Entry(("x", "y", "z"), "LOCAL_POSITION_NED"),),
-        "velocity": (Entry(("vx", "vy", "vz"), "LOCAL_POSITION_NED"),),
-        "attitude": (Entry(("roll", "pitch", "yaw"), "ATTITUDE"),),
-        "angular_velocity": (Entry(_SPEEDS, "ATTITUDE"),),
+        "position": (SignalMapping(("x", "y", "z"), "LOCAL_POSITION_NED"),),
+        "velocity": (SignalMapping(("vx", "vy", "vz"), "LOCAL_POSITION_NED"),),
+        "attitude": (SignalMapping(("roll", "pitch", "yaw"), "ATTITUDE"),),
+        "angular_velocity": (SignalMapping(_SPEEDS, "ATTITUDE"),),
         "specific_force": (
-            Entry(_ACCELERATIONS, "HIGHRES_IMU"),
-            Entry(_ACCELERATIONS, "RAW_IMU", "mg"),
-            Entry(_ACCELERATIONS, "SCALED_IMU", "mg"),
+            SignalMapping(_ACCELERATIONS, "HIGHRES_IMU"),
+            SignalMapping(_ACCELERATIONS, "RAW_IMU", "mg"),
+            SignalMapping(_ACCELERATIONS, "SCALED_IMU", "mg"),
         ),
-        "depth": (Entry(("relative_alt",), "GLOBAL_POSITION_INT", "mm", frame=_ENU),),
+        "depth": (SignalMapping(("relative_alt",), "GLOBAL_POSITION_INT", "mm", frame=_ENU),),
         "pulses": tuple(
-            Entry(tuple(f"servo{i}_raw" for i in range(1, most + 1)), "SERVO_OUTPUT_RAW") for most in (16, 8)
+            SignalMapping(tuple(f"servo{i}_raw" for i in range(1, most + 1)), "SERVO_OUTPUT_RAW") for most in (16, 8)
         ),
     }
 )
@@ -137,19 +141,19 @@ def usual_mapping(recording: Recording) -> tuple[LogMapping, tuple[str, ...]]:
     return mapping._replace(signals=signals), tuple(notes + [note] if note else notes)
 
 
-def _depth(recording: Recording) -> tuple[tuple[Entry, ...], str]:
+def _depth(recording: Recording) -> tuple[tuple[SignalMapping, ...], str]:
     """Where the depth of an ArduPilot log stands, before CTUN, and a note where that is a guess."""
     present, primary = barometers(recording), primary_barometer(recording)
     height = recording.find("CTUN")
     if primary or (primary is None and len(present) == 1):
-        return (Entry(("Alt",), primary or present[0], frame=_ENU),), ""
+        return (SignalMapping(("Alt",), primary or present[0], frame=_ENU),), ""
     if (height is not None and "BAlt" in height[1].fields) or len(present) < 2:
         return (), ""
     others = f"{present[0]} is read as depth, the first of {', '.join(present)}"
     return (), f"{others}: no parameter BARO_PRIMARY of the file says which of them is in the water"
 
 
-def _pulses(recording: Recording) -> tuple[tuple[Entry, ...], str]:
+def _pulses(recording: Recording) -> tuple[tuple[SignalMapping, ...], str]:
     """The pulses of the motors in their order, where the parameters tell motors from lights and cameras."""
     topic, columns = pulse_columns(recording)
     channels = [channel for channel in motor_channels(recording.parameters).values() if channel in columns]
@@ -157,4 +161,4 @@ def _pulses(recording: Recording) -> tuple[tuple[Entry, ...], str]:
         return (), ""
     others = [column for channel, column in columns.items() if channel not in channels]
     note = f"{topic} {', '.join(others)} are no pulses of motors (SERVOn_FUNCTION) and are left out" if others else ""
-    return (Entry(tuple(columns[channel] for channel in channels), topic),), note
+    return (SignalMapping(tuple(columns[channel] for channel in channels), topic),), note

@@ -6,7 +6,7 @@ from typing import NamedTuple
 WORLD, BODY = ("NED", "ENU"), ("FRD", "FLU")
 
 
-class Known(NamedTuple):
+class KnownSignal(NamedTuple):
     """What a signal is.
 
     Attributes:
@@ -24,20 +24,20 @@ class Known(NamedTuple):
 
 
 SIGNALS = {
-    "position": Known(("north", "east", "down"), "m", "world", "position of the body's origin"),
-    "attitude": Known(("roll", "pitch", "yaw"), "rad", "attitude", "Euler angles of the body in the world"),
-    "quaternion": Known(("w", "x", "y", "z"), "1", "quaternion", "attitude as a quaternion, body to world"),
-    "velocity": Known(("north", "east", "down"), "m/s", "world", "velocity in world axes"),
-    "body_velocity": Known(("surge", "sway", "heave"), "m/s", "body", "velocity in body axes"),
-    "angular_velocity": Known(("p", "q", "r"), "rad/s", "body", "angular velocity in body axes"),
-    "specific_force": Known(("forward", "starboard", "down"), "m/s^2", "body", "reading of the accelerometer"),
-    "depth": Known((), "m", "down", "depth, from the pressure"),
-    "input": Known(("thruster",), "V", "", "input applied to each thruster"),
-    "commanded_input": Known(("thruster",), "V", "", "input commanded to each thruster"),
-    "thrust": Known(("thruster",), "N", "", "thrust of each thruster"),
-    "pulses": Known(("thruster",), "us", "", "pulses to the speed controllers"),
-    "duty": Known(("thruster",), "1", "", "command to the speed controllers, from -1 to 1"),
-    "propeller_speed": Known(("thruster",), "rad/s", "", "speed of each propeller"),
+    "position": KnownSignal(("north", "east", "down"), "m", "world", "position of the body's origin"),
+    "attitude": KnownSignal(("roll", "pitch", "yaw"), "rad", "attitude", "Euler angles of the body in the world"),
+    "quaternion": KnownSignal(("w", "x", "y", "z"), "1", "quaternion", "attitude as a quaternion, body to world"),
+    "velocity": KnownSignal(("north", "east", "down"), "m/s", "world", "velocity in world axes"),
+    "body_velocity": KnownSignal(("surge", "sway", "heave"), "m/s", "body", "velocity in body axes"),
+    "angular_velocity": KnownSignal(("p", "q", "r"), "rad/s", "body", "angular velocity in body axes"),
+    "specific_force": KnownSignal(("forward", "starboard", "down"), "m/s^2", "body", "reading of the accelerometer"),
+    "depth": KnownSignal((), "m", "down", "depth, from the pressure"),
+    "input": KnownSignal(("thruster",), "V", "", "input applied to each thruster"),
+    "commanded_input": KnownSignal(("thruster",), "V", "", "input commanded to each thruster"),
+    "thrust": KnownSignal(("thruster",), "N", "", "thrust of each thruster"),
+    "pulses": KnownSignal(("thruster",), "us", "", "pulses to the speed controllers"),
+    "duty": KnownSignal(("thruster",), "1", "", "command to the speed controllers, from -1 to 1"),
+    "propeller_speed": KnownSignal(("thruster",), "rad/s", "", "speed of each propeller"),
 }
 
 

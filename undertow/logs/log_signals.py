@@ -46,7 +46,7 @@ class Series(NamedTuple):
         return self.values.reshape(len(self.time), -1)
 
 
-class Sampling(NamedTuple):
+class SamplingStatistics(NamedTuple):
     """How a signal was sampled.
 
     Attributes:
@@ -98,14 +98,14 @@ class LogSignals:
     def __contains__(self, name: object) -> bool:
         return name in self.signals
 
-    def sampling(self, name: str) -> Sampling:
+    def sampling(self, name: str) -> SamplingStatistics:
         """How a signal was sampled."""
         series = self[name]
         time, steps = series.time, np.diff(series.time)
         median = float(np.median(steps)) if steps.size else np.nan
         gaps = steps[steps > _GAP * median]
         numbers = np.asarray(series.values, dtype=float)
-        return Sampling(
+        return SamplingStatistics(
             samples=len(time),
             start=float(time[0]) if len(time) else np.nan,
             end=float(time[-1]) if len(time) else np.nan,

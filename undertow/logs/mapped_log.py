@@ -6,11 +6,11 @@ from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.logs import frames, units
 from undertow.logs.ardupilot_parameters import motor_channels, motor_direction, pulse_columns
 from undertow.logs.ardusub_frames import FRAMES, motor_columns
-from undertow.logs.known_signals import SIGNALS, Known, thruster_columns
+from undertow.logs.known_signals import SIGNALS, KnownSignal, thruster_columns
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
-from undertow.logs.mapping import INPUTS, Entry, LogMapping, factor_of
-from undertow.logs.recording import Recording, Table, cleaned
+from undertow.logs.mapping import INPUTS, LogMapping, SignalMapping, factor_of
+from undertow.logs.recording import Recording, TopicMessages, cleaned
 
 
 def log_of(recording: Recording, mapping: LogMapping) -> Log:
@@ -34,7 +34,7 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
 
 
-def _with_motors(entry: Entry, recording: Recording) -> Entry:
+def _with_motors(entry: SignalMapping, recording: Recording) -> SignalMapping:
     """An entry of motors with their columns in the file and with the directions that its parameters give them.
 
     Raises:
@@ -73,12 +73,12 @@ def suited(recording: Recording, mapping: LogMapping) -> tuple[LogMapping, tuple
     return mapping._replace(signals=kept), tuple(notes)
 
 
-def _has(recording: Recording, entry: Entry) -> bool:
+def _has(recording: Recording, entry: SignalMapping) -> bool:
     found = recording.find(entry.topic) if entry.topic else None
     return found is not None and all(column in found[1].fields for column in entry.columns)
 
 
-def _other_frame(recording: Recording, entry: Entry) -> str:
+def _other_frame(recording: Recording, entry: SignalMapping) -> str:
     """Where a column has not the number that it must have: which one, and what it is. "" where all have."""
     _, table = recording.table(entry.topic)
     for column, number in entry.must:
@@ -88,7 +88,7 @@ def _other_frame(recording: Recording, entry: Entry) -> str:
     return ""
 
 
-def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
+def _timed(table: TopicMessages, time: tuple[str, str], source: str) -> TopicMessages:
     """The table with the time of one of its columns."""
     column, unit = time
     with within("time"):
@@ -96,7 +96,7 @@ def _timed(table: Table, time: tuple[str, str], source: str) -> Table:
     return table._replace(time=np.asarray(values, dtype=float) * units.seconds(unit))
 
 
-def _column(table: Table, name: str, source: str, key: str = "columns") -> np.ndarray:
+def _column(table: TopicMessages, name: str, source: str, key: str = "columns") -> np.ndarray:
     if name in table.texts:
         raise BadInput(key, "hold numbers", table.texts[name])
     if name not in table.fields:
@@ -104,7 +104,9 @@ def _column(table: Table, name: str, source: str, key: str = "columns") -> np.nd
     return table.fields[name]
 
 
-def _series(name: str, entry: Entry, topic: str, table: Table, recording: Recording) -> tuple[str, Series]:
+def _series(
+    name: str, entry: SignalMapping, topic: str, table: TopicMessages, recording: Recording
+) -> tuple[str, Series]:
     """A signal in our unit and frame, and its name: quaternions become an attitude."""
     known, source = SIGNALS[name], recording.source
     columns = [np.asarray(_column(table, column, source), dtype=float) for column in entry.columns]
@@ -128,7 +130,7 @@ def _series(name: str, entry: Entry, topic: str, table: Table, recording: Record
     return ours, Series(table.time, values[:, 0] if not titles else values, titles, unit, SIGNALS[ours].meaning, origin)
 
 
-def _signed(values: np.ndarray, entry: Entry, known: Known) -> np.ndarray:
+def _signed(values: np.ndarray, entry: SignalMapping, known: KnownSignal) -> np.ndarray:
     """Values, with the negative of those columns whose sign is -1. The negative of a pulse is as far from neutral."""
     if not entry.signs:
         return values
@@ -138,7 +140,7 @@ def _signed(values: np.ndarray, entry: Entry, known: Known) -> np.ndarray:
     return np.where(sent, middle + np.array(entry.signs) * (values - middle), 0.0)
 
 
-def _in_our_frame(values: np.ndarray, known: Known, frame: tuple[str, str]) -> np.ndarray:
+def _in_our_frame(values: np.ndarray, known: KnownSignal, frame: tuple[str, str]) -> np.ndarray:
     world, body = frame
     if known.kind == "world":
         return frames.world_vectors(values, world)
@@ -149,13 +151,13 @@ def _in_our_frame(values: np.ndarray, known: Known, frame: tuple[str, str]) -> n
     return -values if known.kind == "down" and world == "ENU" else values
 
 
-def _frame_note(known: Known, frame: tuple[str, str]) -> str:
+def _frame_note(known: KnownSignal, frame: tuple[str, str]) -> str:
     shown = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
     note = shown.get(known.kind, f"{frame[1]} in {frame[0]}")
     return f", {note}" if note else ""
 
 
-def volts(commands: np.ndarray, entry: Entry, supply: float) -> np.ndarray:
+def volts(commands: np.ndarray, entry: SignalMapping, supply: float) -> np.ndarray:
     """Volts of pulses in us, as `ESC.voltage` has them: the share of the supply beyond the dead band; or of a duty.
 
     A pulse of 0 us is none, at which the speed controller stops the motor.

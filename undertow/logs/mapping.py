@@ -32,7 +32,7 @@ _NUMBERED = re.compile(r"(?P<head>.*?)(?P<number>\d{1,4})(?P<tail>\D*)")
 _MOST = 64  # columns of a signal
 
 
-class Entry(NamedTuple):
+class SignalMapping(NamedTuple):
     """Where a signal stands in a file.
 
     Attributes:
@@ -67,7 +67,7 @@ class LogMapping(NamedTuple):
         time: column and unit of the time; "" for the time of the messages.
     """
 
-    signals: Mapping[str, tuple[Entry, ...]]
+    signals: Mapping[str, tuple[SignalMapping, ...]]
     time: tuple[str, str] = ("", "s")
 
 
@@ -121,13 +121,13 @@ def _time(given: Any) -> tuple[str, str]:
         return str(given["column"]), unit
 
 
-def _entry(name: str, given: Any, frame: tuple[str, str]) -> Entry:
+def _entry(name: str, given: Any, frame: tuple[str, str]) -> SignalMapping:
     motors = isinstance(given, Mapping) and "frame" in given and name in INPUTS
     known_keys = ("columns", *(["frame"] if name in INPUTS else []), "topic", "unit", "world", "body", "supply", *_ESC)
     _keys(given, name, known_keys, "frame" if motors else "columns")
     signed = _columns(given["columns"]) if not motors or "columns" in given else []
     settings = {"world": frame[0], "body": frame[1]} | dict(given)
-    entry = Entry(
+    entry = SignalMapping(
         columns=tuple(column for _, column in signed),
         topic=str(given.get("topic", "")),
         unit=str(given.get("unit", "")),
@@ -190,7 +190,7 @@ def _spread(name: str) -> list[str]:
     return [f"{begin['head']}{number}{begin['tail']}" for number in numbers]
 
 
-def factor_of(name: str, entry: Entry) -> float:
+def factor_of(name: str, entry: SignalMapping) -> float:
     """Factor of the unit; that of pulses and duties, which become volts, is 1 or that of the duty."""
     known = SIGNALS[name]
     shares = name in INPUTS and entry.unit in SHARES

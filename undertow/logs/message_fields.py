@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from undertow.logs.recording import Table
+from undertow.logs.recording import TopicMessages
 
 MOST_FIELDS = 2**16 - 1  # of a topic; a file could name another one in each message
 
@@ -77,8 +77,8 @@ class MessageFields:
         self.stamps.append(stamp)
         self._recorded.append(recorded)
 
-    def table(self, start: int = 0) -> Table:
+    def table(self, start: int = 0) -> TopicMessages:
         """The table of the messages in the order in which they were recorded, with times since the start, ns."""
         order = np.argsort(np.frombuffer(self._recorded, dtype=np.int64), kind="stable")
         stamps = np.frombuffer(self.stamps, dtype=np.int64)[order]
-        return Table((stamps - start) * 1e-9, SparseColumns(len(order), self._numbers, order), self.kind)
+        return TopicMessages((stamps - start) * 1e-9, SparseColumns(len(order), self._numbers, order), self.kind)

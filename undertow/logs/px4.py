@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.logs.extra import check_installed, quiet
-from undertow.logs.recording import Recording, Table
+from undertow.logs.recording import Recording, TopicMessages
 
 # Reads at the end of a file from which on pyulog goes round in circles, as it does where the definitions are cut off.
 _MOST_AT_END = 1000
@@ -95,9 +95,9 @@ def _fields(name: str, formats: Any, sizes: dict[str, int]) -> int:
     return sizes[name]
 
 
-def _table(data) -> Table:
+def _table(data) -> TopicMessages:
     with np.errstate(invalid="ignore"):  # signalling NaNs
         fields = {name: np.asarray(values, dtype=float) for name, values in data.data.items()}
     sampled = data.data.get("timestamp_sample")
     stamps = data.data["timestamp"] if sampled is None or not sampled.any() else sampled
-    return Table(np.asarray(stamps, dtype=float) * 1e-6, fields, data.name)
+    return TopicMessages(np.asarray(stamps, dtype=float) * 1e-6, fields, data.name)

@@ -16,7 +16,7 @@ from undertow.logs.mapping import LogMapping
 from undertow.logs.mavlink_log import read_mavlink
 from undertow.logs.mcap_reader import has_ros_messages, read_mcap
 from undertow.logs.px4 import read_px4
-from undertow.logs.recording import Recording, Table
+from undertow.logs.recording import Recording, TopicMessages
 from undertow.logs.ros2_bag import read_ros2_bag
 from undertow.logs.run_log import read_run
 from undertow.logs.unfinished_bag import STORAGE_FILES
@@ -94,7 +94,7 @@ def _listed(found: Recording) -> str:
     return "; ".join(names[:_SHOWN_TOPICS]) + ("; ..." if len(names) > _SHOWN_TOPICS else "")
 
 
-def _columns(table: Table) -> str:
+def _columns(table: TopicMessages) -> str:
     """Names of the columns of a table, or of the first of them."""
     names = list(itertools.islice(table.fields, _SHOWN_COLUMNS))
     more = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []

@@ -9,7 +9,7 @@ import numpy as np
 from undertow.core.errors import BadInput, did_you_mean
 
 
-class Table(NamedTuple):
+class TopicMessages(NamedTuple):
     """Messages of one topic.
 
     Attributes:
@@ -37,21 +37,21 @@ class Recording(NamedTuple):
         left_out: reason why a topic of the file is no table, by name.
     """
 
-    tables: Mapping[str, Table]
+    tables: Mapping[str, TopicMessages]
     source: str
     format: str
     notes: tuple[str, ...] = ()
     parameters: Mapping[str, float] = MappingProxyType({})
     left_out: Mapping[str, str] = MappingProxyType({})
 
-    def find(self, topic: str) -> tuple[str, Table] | None:
+    def find(self, topic: str) -> tuple[str, TopicMessages] | None:
         """The table of a topic, or the first whose messages are of a type; None without one."""
         if topic in self.tables:
             return topic, self.tables[topic]
         same = [(name, table) for name, table in self.tables.items() if table.kind == topic]
         return same[0] if same else None
 
-    def table(self, topic: str) -> tuple[str, Table]:
+    def table(self, topic: str) -> tuple[str, TopicMessages]:
         """As `find`; the only table where no topic is named.
 
         Raises:
@@ -94,7 +94,7 @@ class _Rows(Mapping[str, np.ndarray]):
         return len(self._fields)
 
 
-def cleaned(table: Table) -> tuple[Table, int]:
+def cleaned(table: TopicMessages) -> tuple[TopicMessages, int]:
     """The table without samples of the same time as the one before, and how many these were."""
     again = np.concatenate([[False], np.diff(table.time) == 0])
     if not again.any():
@@ -102,6 +102,6 @@ def cleaned(table: Table) -> tuple[Table, int]:
     return rows_of(table, ~again), int(again.sum())
 
 
-def rows_of(table: Table, rows: np.ndarray) -> Table:
+def rows_of(table: TopicMessages, rows: np.ndarray) -> TopicMessages:
     """The table of some rows, by their numbers or by whether each is taken."""
     return table._replace(time=table.time[rows], fields=_Rows(table.fields, rows))

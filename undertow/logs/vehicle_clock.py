@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from undertow.logs.recording import Table, rows_of
+from undertow.logs.recording import TopicMessages, rows_of
 
 _MILLISECONDS, _MICROSECONDS = "time_boot_ms", "time_usec"
 _WRAP = 2**32 * 1e-6  # s after which microseconds of 32 bits begin again, as those of SERVO_OUTPUT_RAW
@@ -16,7 +16,7 @@ _RESTART = 5.0  # s by which the clock goes back where the vehicle started again
 _LATE = 10.0  # s; a message that differs by more has another time than that since the start
 
 
-def on_vehicle_clock(tables: Mapping[str, Table]) -> tuple[dict[str, Table], int]:
+def on_vehicle_clock(tables: Mapping[str, TopicMessages]) -> tuple[dict[str, TopicMessages], int]:
     """The tables of a vehicle with the times of its own clock, and how often it started again.
 
     Args:
@@ -37,7 +37,7 @@ def on_vehicle_clock(tables: Mapping[str, Table]) -> tuple[dict[str, Table], int
     return {name: _timed(table, clocks.get(name), begins, zeros) for name, table in tables.items()}, len(begins) - 1
 
 
-def _timed(table: Table, clock: np.ndarray | None, begins: np.ndarray, zeros: np.ndarray) -> Table:
+def _timed(table: TopicMessages, clock: np.ndarray | None, begins: np.ndarray, zeros: np.ndarray) -> TopicMessages:
     """A table on the clock of the vehicle, in the order of its times."""
     zero = zeros[np.searchsorted(begins, table.time, side="right") - 1]
     if clock is None and _MICROSECONDS in table.fields:

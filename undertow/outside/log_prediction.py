@@ -27,7 +27,7 @@ RUN_IN = 2.0  # s; rotors forget within tenths of a second
 _EARLY = 1e-2  # share of the median interval by which a command counts early, as in controllers/replay.py
 
 
-class Prediction(NamedTuple):
+class PredictedMotion(NamedTuple):
     """Motion at some times after each start.
 
     Attributes:
@@ -58,7 +58,7 @@ def predict(
     stride: int,
     limited: bool,
     factors: np.ndarray,
-) -> Prediction:
+) -> PredictedMotion:
     """The motion that the model of a scenario's vehicle predicts from starts in a log, in its disturbance.
 
     Args:
@@ -85,7 +85,7 @@ def predict(
         settings = (before, stride, loop.method if loop.method in METHODS else "rk4", loop.substeps)
         dt = jnp.asarray(loop.dt, dtype=float)
         predicted = jax.device_get(_predicted(realization, windows, jnp.asarray(factors), dt, limited, settings))
-    return Prediction(np.asarray(predicted), loop.dt * stride * np.arange(1, steps // stride + 1))
+    return PredictedMotion(np.asarray(predicted), loop.dt * stride * np.arange(1, steps // stride + 1))
 
 
 def vehicle_of(built: Built) -> HybridVehicle:

@@ -32,7 +32,7 @@ _ROUNDING = 1e-9  # share of a horizon
 _ENDLESS = 1e15  # m, rad, m/s or rad/s; a prediction beyond it has diverged
 
 
-class Score(NamedTuple):
+class PredictionScore(NamedTuple):
     """Errors of prediction.
 
     Attributes:
@@ -65,7 +65,7 @@ class Score(NamedTuple):
 
 
 @in_its_precision
-def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: float = EVERY) -> Score:
+def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: float = EVERY) -> PredictionScore:
     """Errors of the model of a scenario's vehicle, over horizons.
 
     The scenario gives vehicle, thrusters, disturbance, step and seed; its controller, reference and navigation do not
@@ -112,7 +112,7 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
     growth = np.sqrt((errors**2).mean(axis=0))
     rms = np.stack([np.interp(horizons, after, column) for column in growth.T], axis=1)
     warnings = warnings_of_signs(built, motion, inputs, limited)
-    return Score(tuple(map(float, horizons)), rms, starts, after, growth, warnings)
+    return PredictionScore(tuple(map(float, horizons)), rms, starts, after, growth, warnings)
 
 
 def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:

@@ -28,7 +28,7 @@ from undertow.simulation.loop.stepped import put, step_of
 STANDARD_GRAVITY = 9.80665
 
 
-class State(NamedTuple):
+class VehicleOutputs(NamedTuple):
     """Motion of a vehicle and its electrical side at an instant; NumPy arrays."""
 
     position: Any  # m, north, east, down
@@ -111,7 +111,7 @@ class SteppedVehicle:
         """Status of the last step."""
         return self.vehicle.output.status
 
-    def state(self) -> State:
+    def state(self) -> VehicleOutputs:
         """Motion and electrical side now, with the last input still applied."""
         applied = self.vehicle.output.applied
         still = np.zeros(self.plant.inputs())
@@ -132,7 +132,7 @@ def _under_surface(loop: ClosedLoop, depth: float | None, otherwise: float | Non
     return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(chosen)))
 
 
-def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> State:
+def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> VehicleOutputs:
     plant = of.loop.plant
     assert isinstance(plant, HybridVehicle)
     pose = plant.pose(x)
@@ -145,4 +145,4 @@ def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> State:
         charge = x.power.charge
         electrical = jnp.stack([battery.bus_voltage(charge, taken), battery.current(charge, taken)])
     propellers = () if report is None else report.speed
-    return State(x.position, x.attitude, pose.velocity, x.nu, force, propellers, electrical)
+    return VehicleOutputs(x.position, x.attitude, pose.velocity, x.nu, force, propellers, electrical)

@@ -33,7 +33,7 @@ class Period(NamedTuple):
     current: Series  # A
 
 
-class Law(NamedTuple):
+class MemorylessFit(NamedTuple):
     """A memoryless law, fitted to the long period by least squares."""
 
     text: str  # as the paper writes it
@@ -48,7 +48,7 @@ class ThrusterResponse(NamedTuple):
 
     long: Period
     short: Period
-    laws: tuple[Law, Law, Law]
+    laws: tuple[MemorylessFit, MemorylessFit, MemorylessFit]
 
 
 @functools.cache  # used by a figure and a claim
@@ -89,7 +89,7 @@ def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
     return jax.lax.scan(step, thruster.initial_state(1), times)[1]
 
 
-def _law(text: str, unit: str, pick, long: Period, short: Period) -> Law:
+def _law(text: str, unit: str, pick, long: Period, short: Period) -> MemorylessFit:
     """Least squares through the origin on the long period: output = coefficient * input."""
     given, measured = pick(long)
     coefficient = float(given @ measured / (given @ given))
@@ -98,4 +98,4 @@ def _law(text: str, unit: str, pick, long: Period, short: Period) -> Law:
         given, measured = pick(period)
         return float(100 * np.sqrt(np.mean((measured - coefficient * given) ** 2) / np.mean(measured**2)))
 
-    return Law(text, coefficient, unit, error(long), error(short))
+    return MemorylessFit(text, coefficient, unit, error(long), error(short))

@@ -22,7 +22,7 @@ from undertow.studies.arena.leader_board import (
 from undertow.studies.arena.robustness import VEHICLE
 from undertow.studies.arena.tasks import TASKS, VERSION, tolerances
 from undertow.studies.comparison.step_time import HOW_LONG
-from undertow.studies.comparison.tables import Rows
+from undertow.studies.comparison.tables import TextTable
 
 PAGE = "leaderboard.html"
 
@@ -92,12 +92,12 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
     return path, saved.failures
 
 
-def _ratios(ratios: Rows) -> Html:
+def _ratios(ratios: TextTable) -> Html:
     said = f"Error / that of preset `{BASELINE}`: the geometric mean over the vehicles; below 1 the law is better."
     return section("ratios", f"Errors against {BASELINE}", _rows(ratios), tag("p", prose(said), class_="small"))
 
 
-def _robustness(pictures: dict[str, Html], margins: Rows) -> Html:
+def _robustness(pictures: dict[str, Html], margins: TextTable) -> Html:
     explained = tag("p", prose(_MARGINS), class_="small")
     return section("robustness", "Robustness", *_shown(pictures, "robustness"), _rows(margins), explained)
 
@@ -106,7 +106,7 @@ def _shown(pictures: dict[str, Html], name: str) -> list[Html]:
     return [pictures[name]] if name in pictures else []
 
 
-def _rows(rows: Rows, words: int = 1) -> Html:
+def _rows(rows: TextTable, words: int = 1) -> Html:
     """A table; its first columns hold words, the others numbers."""
     cells = [tuple(prose(cell) for cell in row) for row in rows.rows]
     head = [prose(re.sub(r"\(us\)", "(\u00b5s)", title)) for title in rows.head]

@@ -14,7 +14,7 @@ from undertow.report.figures.campaign import SHOWN, distributions_figure, sensit
 from undertow.report.figures.writing import Plots, Saved, save_all
 from undertow.report.formats import chip, ending, number, prose, quantity, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
-from undertow.report.replay.replay_data import Replay
+from undertow.report.replay.replay_data import ReplayData
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.studies.campaign.campaign_schema import Distribution
 from undertow.studies.campaign.columns import ENDINGS
@@ -46,7 +46,7 @@ def write_campaign(
     found: Mapping[str, Any],
     folder: Path,
     pdf: str | None = None,
-    replays: Sequence[Replay] = (),
+    replays: Sequence[ReplayData] = (),
 ) -> tuple[Path, list[str]]:
     """Write `campaign.html`, and every figure into `figures/`; return a sentence for each failed figure.
 

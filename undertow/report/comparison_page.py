@@ -12,7 +12,7 @@ from undertow.report.figures.comparison import alike, comparison_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
-from undertow.report.replay.replay_data import Replay
+from undertow.report.replay.replay_data import ReplayData
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.studies.campaign.store_results import Results
 from undertow.studies.comparison.budget_tables import budget_rows, budget_sentences
@@ -21,7 +21,7 @@ from undertow.studies.comparison.equal_budgets import EqualBudgets
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.sentences import HOW, sentences
 from undertow.studies.comparison.step_time import HOW_LONG, StepTime
-from undertow.studies.comparison.tables import NOTE, Rows, medians, paired, titled, value_in
+from undertow.studies.comparison.tables import NOTE, TextTable, medians, paired, titled, value_in
 
 _CAPTIONS = {
     "differences": "Each point is one trial: the metric of a {one} less that of the first {one}, with the same sample "
@@ -54,7 +54,7 @@ def write_comparison(
     subject: str,
     folder: Path,
     pdf: str | None = None,
-    replays: Sequence[Replay] = (),
+    replays: Sequence[ReplayData] = (),
     times: Mapping[str, StepTime] | None = None,
     budgets: EqualBudgets | None = None,
 ) -> tuple[Path, list[str]]:
@@ -121,12 +121,12 @@ def _alike(dataset: xr.Dataset, found: Findings) -> str:
     return f"The same in all completed trials, and therefore not shown in figures: {each}." if same else ""
 
 
-def _replayed(replays: Sequence[Replay], found: Findings) -> str:
+def _replayed(replays: Sequence[ReplayData], found: Findings) -> str:
     shown = ", ".join(replay.label for replay in replays)
     return _REPLAY if len(replays) == len(found.names) else f"{_REPLAY} Shown: {shown}."
 
 
-def _rows(rows: Rows, words: int = 1) -> Html:
+def _rows(rows: TextTable, words: int = 1) -> Html:
     """A table; its first columns hold words, the others numbers."""
     cells = [tuple(map(_cell, row)) for row in rows.rows]
     return table(rows.head, cells, numeric=range(words, len(rows.head)))

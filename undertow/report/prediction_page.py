@@ -15,7 +15,7 @@ from undertow.simulation.loop.dataset import input_names
 from undertow.studies.prediction.predict import Prediction
 
 
-class Rows(NamedTuple):
+class PredictionTable(NamedTuple):
     """One table: title, column titles, rows, and a sentence that explains it."""
 
     title: str
@@ -67,19 +67,19 @@ LEFT_OUT = (
 )
 
 
-def _section(number: int, rows: Rows):
+def _section(number: int, rows: PredictionTable):
     cells = [[prose(cell) for cell in row] for row in rows.rows]
     whole = table([prose(cell) for cell in rows.head], cells, wide=len(rows.head) > 3)
     return section(f"table-{number}", rows.title, tag("p", prose(rows.sentence)), whole)
 
 
-def tables(prediction: Prediction) -> list[Rows]:
+def tables(prediction: Prediction) -> list[PredictionTable]:
     """All tables, the most important first, without empty ones."""
     made = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
     return [table for make in made if (table := make(prediction)).rows]
 
 
-def _points(prediction: Prediction) -> Rows:
+def _points(prediction: Prediction) -> PredictionTable:
     rows = [
         (
             point.where,
@@ -91,7 +91,7 @@ def _points(prediction: Prediction) -> Rows:
         )
         for point in prediction.points
     ]
-    return Rows(
+    return PredictionTable(
         "Controllable closed-loop poles over the operating range",
         ("operating point", "flow, m/s", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
         rows,
@@ -100,7 +100,7 @@ def _points(prediction: Prediction) -> Rows:
     )
 
 
-def _margins(prediction: Prediction) -> Rows:
+def _margins(prediction: Prediction) -> PredictionTable:
     known, dt = prediction.margins, prediction.operating_point.linear.dt
     rows = [
         ("sampling limit at these gains", _time(known["sampling_time"]), f"sampling time {_time(dt)}"),
@@ -109,17 +109,17 @@ def _margins(prediction: Prediction) -> Rows:
         ("gain margin, decreasing", _number(known["gain_low"]), "of the nominal effect of the input"),
         ("gain margin, increasing", _number(known["gain_high"]), "of the nominal effect of the input"),
     ]
-    return Rows(
+    return PredictionTable(
         "Robustness margins", ("margin", "limit", "remark"), rows, "At the operating point closest to instability."
     )
 
 
-def _estimators(prediction: Prediction) -> Rows:
+def _estimators(prediction: Prediction) -> PredictionTable:
     rows = [
         (axis, _number(frequency), _number(damping), "-" if ramp is None else _number(ramp))
         for axis, frequency, damping, ramp in _together(prediction.estimators)
     ]
-    return Rows(
+    return PredictionTable(
         "Estimator",
         ("axis", "bandwidth, rad/s", "damping", "|d_hat - d| per |d_dot|, s"),
         rows,
@@ -130,7 +130,7 @@ def _estimators(prediction: Prediction) -> Rows:
 _SHOWN = (0.1, 1.0, 10.0)  # rad/s
 
 
-def _errors(prediction: Prediction) -> Rows:
+def _errors(prediction: Prediction) -> PredictionTable:
     frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
@@ -145,7 +145,7 @@ def _errors(prediction: Prediction) -> Rows:
                 f"{_number(worse[0])} rad/s" if worse.size else "none",
             )
         )
-    return Rows(
+    return PredictionTable(
         "Error per unit of disturbance",
         ("axis", *(f"at {w:g} rad/s, s^2" for w in _SHOWN), "maximum, s^2", "estimate increases the error above"),
         rows,
@@ -153,14 +153,14 @@ def _errors(prediction: Prediction) -> Rows:
     )
 
 
-def _noise(prediction: Prediction) -> Rows:
+def _noise(prediction: Prediction) -> PredictionTable:
     noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [
         (f"input, {unit}, for 1 cm/s or 0.01 rad/s of noise", _number(0.01 * noise.of_input.max())),
         ("estimate, m/s^2 or rad/s^2, for the same noise", _number(0.01 * noise.of_estimate.max())),
         ("velocity noise at which 3 sigma of the input reach its limit, m/s or rad/s", _number(noise.largest)),
     ]
-    return Rows(
+    return PredictionTable(
         "White noise on measured velocities",
         ("quantity", "standard deviation"),
         rows,
@@ -168,11 +168,11 @@ def _noise(prediction: Prediction) -> Rows:
     )
 
 
-def _closed_forms(prediction: Prediction) -> Rows:
+def _closed_forms(prediction: Prediction) -> PredictionTable:
     rows = [
         (form.meaning, _pole(form.expected), _pole(form.nearest), f"{form.departure:.2g}") for form in prediction.forms
     ]
-    return Rows(
+    return PredictionTable(
         "Closed forms compared with the whole loop",
         ("pole", "closed form, 1/s", "nearest pole of the whole loop, 1/s", "relative difference"),
         rows,
@@ -180,7 +180,7 @@ def _closed_forms(prediction: Prediction) -> Rows:
     )
 
 
-def _authority(prediction: Prediction) -> Rows:
+def _authority(prediction: Prediction) -> PredictionTable:
     authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
     force, most = force_label(plant).replace("force", "", 1), int(authority.demand.argmax())
     finite = np.isfinite(authority.high).any()
@@ -193,7 +193,7 @@ def _authority(prediction: Prediction) -> Rows:
             f"{_number(authority.high.min())} / {_number(-authority.low.max())}" if finite else "-",
         ),
     ]
-    return Rows(
+    return PredictionTable(
         "Actuator authority",
         ("quantity", "value"),
         rows,
@@ -201,13 +201,13 @@ def _authority(prediction: Prediction) -> Rows:
     )
 
 
-def _metrics(prediction: Prediction) -> Rows:
+def _metrics(prediction: Prediction) -> PredictionTable:
     known = prediction.operating_point.built.known_metrics()
     rows = []
     for name, value in (prediction.metrics or {}).items():
         shown, unit = for_people(value, known[name].unit)
         rows.append((name, _number(shown), unit))
-    return Rows(
+    return PredictionTable(
         "Predicted metrics of the steady window",
         ("metric", "predicted", "unit"),
         rows,

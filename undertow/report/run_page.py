@@ -8,7 +8,7 @@ from undertow.core.atomic_io import write_whole
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
 from undertow.report.plotted import Plotted
-from undertow.report.replay.replay_data import Replay, replay_of
+from undertow.report.replay.replay_data import ReplayData, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import (
     RunTable,
@@ -36,15 +36,15 @@ _CAPTIONS = {
 }
 
 
-class Shown(NamedTuple):
+class RunPageContents(NamedTuple):
     """What a run looks like: figures by name, the replay (None for a plant that is no vehicle), and failures."""
 
     figures: Mapping[str, str | bytes]
-    replay: Replay | None
+    replay: ReplayData | None
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(result: RunResult, plotted: Callable[[], Plotted]) -> Shown:
+def shown(result: RunResult, plotted: Callable[[], Plotted]) -> RunPageContents:
     """What the page of a run shows. A failed part affects neither the others nor the results.
 
     Args:
@@ -58,10 +58,12 @@ def shown(result: RunResult, plotted: Callable[[], Plotted]) -> Shown:
         replay = None
         failures.append(not_made(error))
     figures = plotted()
-    return Shown(figures.pictures, replay, [*figures.failures, *failures])
+    return RunPageContents(figures.pictures, replay, [*figures.failures, *failures])
 
 
-def write_run_page(path: Path, run: RunRecord, shown: Shown, predicted: Mapping[str, float] | None = None) -> None:
+def write_run_page(
+    path: Path, run: RunRecord, shown: RunPageContents, predicted: Mapping[str, float] | None = None
+) -> None:
     """Write the page of a run.
 
     Args:

@@ -6,11 +6,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite
-from undertow.control.supervision.transition_log import Transition
+from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core.metric import Metric
 
 if TYPE_CHECKING:  # it loads SciPy, which a run does not need
-    from undertow.analysis.linearization.response import Comparison
+    from undertow.analysis.linearization.response import MetricComparison
 
 
 # Reasons of the supervisor that a failed thruster explains as well, and what is said where none was found.
@@ -51,7 +51,7 @@ def metrics_rows(
 
 
 def prediction_rows(
-    compared: "Sequence[Comparison]", window: tuple[float, float] | None, known: Mapping[str, Metric]
+    compared: "Sequence[MetricComparison]", window: tuple[float, float] | None, known: Mapping[str, Metric]
 ) -> RunTable:
     """Predicted and measured metrics of the steady window, and by how much they differ."""
     rows = []
@@ -144,7 +144,9 @@ def navigation_rows(navigated: Mapping[str, Any]) -> RunTable:
     return RunTable("Navigation filter", head, rows, sentences)
 
 
-def transition_rows(transitions: Sequence[Transition], losses: Sequence[tuple[str, float]] | None = None) -> RunTable:
+def transition_rows(
+    transitions: Sequence[SupervisorTransition], losses: Sequence[tuple[str, float]] | None = None
+) -> RunTable:
     """Transitions of the supervisor: when, to which state, and why; below it the thrusters that it took out of use.
 
     Args:

@@ -33,7 +33,7 @@ from undertow.core.contracts import (
 from undertow.core.errors import Advice, BadInput, advice, within
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rounding import three_digits
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import (
@@ -206,7 +206,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
             return make("disturbance")
         pairs = [one("disturbance", f"disturbance[{i}]", part) for i, part in enumerate(scenario.disturbance)]
         resolved["disturbance"] = [description for _, description in pairs]
-        return Together(tuple(member for member, _ in pairs))
+        return SumOfDisturbances(tuple(member for member, _ in pairs))
 
     def supervised(part: Part, law: AbstractController) -> AbstractController:
         """The law under supervision, with the fallback that takes its place."""

@@ -17,7 +17,7 @@ from undertow.core.errors import Advice, BadInput, advice, joined, within
 from undertow.core.returned import check_state, form
 from undertow.core.signals import check_declared
 from undertow.core.user_code import RAISED, fault_of
-from undertow.scenario.schema import Initial, Loop, Window
+from undertow.scenario.schema import ClosedLoopSettings, Initial, Window
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 # A record takes about a kilobyte, a control step some microseconds.
@@ -30,7 +30,7 @@ _LONG = 0.5  # s; few vehicles are stable with a controller that is sampled more
 _ROUNDING = 1e-9
 
 
-def check_times(loop: Loop) -> None:
+def check_times(loop: ClosedLoopSettings) -> None:
     """Check that duration, records and sampling time are consistent.
 
     Raises:
@@ -58,7 +58,7 @@ def check_times(loop: Loop) -> None:
         raise BadInput("record", must, f"{loop.record:g} s", hint=f"Take {near} s")
 
 
-def check_window(window: Window, loop: Loop) -> None:
+def check_window(window: Window, loop: ClosedLoopSettings) -> None:
     """Check that the steady window has a length, and that the loop has what it asks for.
 
     Raises:
@@ -72,7 +72,7 @@ def check_window(window: Window, loop: Loop) -> None:
         raise BadInput("stop", f"be later than steady.start ({start:g} s)", f"{stop:g} s")
 
 
-def rounded_times(loop: Loop) -> tuple[Advice, ...]:
+def rounded_times(loop: ClosedLoopSettings) -> tuple[Advice, ...]:
     """Advice where a run does not end at its duration, or its last record is not at its end."""
     stepped, found = loop.method != "adaptive", []
     dt = loop.dt if loop.kind == "sampled" else loop.record / round(loop.record / loop.dt) if stepped else 0.0
@@ -204,6 +204,6 @@ def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
         yield traced
 
 
-def record_period(loop: Loop) -> float:
+def record_period(loop: ClosedLoopSettings) -> float:
     """Time between records of a sampled loop, a whole number of control steps, s."""
     return round(loop.record / loop.dt) * loop.dt

@@ -21,7 +21,7 @@ from undertow.physics.faults.mode import AbstractFault
 from undertow.physics.power import ESC, Battery
 from undertow.physics.sensors.sensor import AbstractSensor
 from undertow.physics.thrusters.thruster import AbstractThruster
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.csv_table import csv_of, read_csv, samples_of
 from undertow.scenario.log_file import read_log
 from undertow.scenario.values import checked
@@ -48,7 +48,7 @@ _TABLES = ("samples", "commands")
 _ADJUSTABLE = ("vehicles", "thrusters")
 
 _CONTRACTS = {
-    "vehicles": Vehicle,
+    "vehicles": VehicleModel,
     "thrusters": AbstractThruster,
     "power": Battery | ESC,
     "plants": contracts.AbstractPlant,

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.current import Current
 from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurrent
 from undertow.physics.disturbances.surface import stated_depths
@@ -40,7 +40,7 @@ _LEANS = 1.0  # rad; less is the way of such a vehicle
 _BALANCED = 0.01  # of the force: what may be left of it
 
 
-class Motion(NamedTuple):
+class ReferenceSamples(NamedTuple):
     """A reference at instants, and where the plant starts."""
 
     time: Float[np.ndarray, " k"]  # s
@@ -148,7 +148,7 @@ def _size(vector: Float[np.ndarray, " k"]) -> float:
     return float(np.hypot.reduce(vector))
 
 
-def _angles(loop: ClosedLoop, desired: Motion):
+def _angles(loop: ClosedLoop, desired: ReferenceSamples):
     """Degrees where radians are due: whole numbers beyond a turn. A pitch beyond 90 degrees."""
     plant = loop.plant
     places = {"reference": [desired.position[-1], desired.position[0]], "initial.position": [desired.start]}
@@ -169,7 +169,7 @@ def _angles(loop: ClosedLoop, desired: Motion):
             )
 
 
-def _unfinished(reference: AbstractReference, desired: Motion):
+def _unfinished(reference: AbstractReference, desired: ReferenceSamples):
     """A reference that comes to rest after the end of the run."""
     duration = float(desired.time[-1])
     late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
@@ -186,7 +186,7 @@ def _unfinished(reference: AbstractReference, desired: Motion):
     yield advice("loop.duration", says, f"Give `loop.duration` at least {ends:.3g} s, unless a part is enough")
 
 
-def _above(loop: ClosedLoop, desired: Motion):
+def _above(loop: ClosedLoop, desired: ReferenceSamples):
     """Positions above the surface, or above the start where a depth was meant."""
     down, start = desired.position[:, 2], float(desired.start[2])
     highest = float(down.min())
@@ -227,7 +227,7 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
         yield advice("initial.position", says, _SURFACE)
 
 
-def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: Motion):
+def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples):
     """Speeds and distances beyond the thrusters."""
     top = top_speed(plant)
     if not np.isfinite(top):
@@ -282,7 +282,7 @@ def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow
         yield advice("reference", says, "Make it slower")
 
 
-def _leans(plant: HybridVehicle, desired: Motion, flow: np.ndarray):
+def _leans(plant: HybridVehicle, desired: ReferenceSamples, flow: np.ndarray):
     """A vehicle that the water turns over about an axis that its thrusters cannot turn it about."""
     through = desired.velocity[:, :3] - flow
     if not through.any():
@@ -298,7 +298,7 @@ def _leans(plant: HybridVehicle, desired: Motion, flow: np.ndarray):
     yield advice("reference", says, "Make it slower, or lower the centre of gravity")
 
 
-def _begins_elsewhere(desired: Motion):
+def _begins_elsewhere(desired: ReferenceSamples):
     """A path whose first point is not where the vehicle starts. A constant position is a step that is meant."""
     first, start = desired.position[0], desired.start
     distance = _size(first[:3] - start[:3])
@@ -315,18 +315,18 @@ def _begins_elsewhere(desired: Motion):
 
 def _members(loop: ClosedLoop, kind: type) -> list:
     """The disturbances of a kind."""
-    every = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
+    every = loop.disturbance.members if isinstance(loop.disturbance, SumOfDisturbances) else (loop.disturbance,)
     return [one for one in every if isinstance(one, kind)]
 
 
-def _desired(loop: ClosedLoop, duration: float, start: list[float] | None) -> Motion:
+def _desired(loop: ClosedLoop, duration: float, start: list[float] | None) -> ReferenceSamples:
     at_start, _ = loop.outputs_at_start(start, None)
     return _sampled(loop.reference, np.linspace(0.0, duration, _SAMPLES), np.asarray(at_start, dtype=float))
 
 
-def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> Motion:
+def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> ReferenceSamples:
     at = _targets(reference, jnp.asarray(time))
-    return Motion(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
+    return ReferenceSamples(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
 
 
 @eqx.filter_jit

@@ -73,7 +73,7 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class Loop(Strict):
+class ClosedLoopSettings(Strict, title="Loop"):
     """Settings of the closed-loop simulation."""
 
     kind: Literal["sampled", "continuous"] = Field(
@@ -300,7 +300,7 @@ class Scenario(Strict):
         "that takes over when the law fails",
     )
     faults: list[Fault] = Field(default_factory=list, description="faults that are injected into the run")
-    loop: Loop = Field(default_factory=Loop, description="settings of the simulation")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
+    loop: ClosedLoopSettings = Field(default_factory=ClosedLoopSettings, description="settings of the simulation")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     initial: Initial = Field(default_factory=Initial, description="state at t = 0")  # pyright: ignore[reportArgumentType] - pydantic knows the defaults
     steady: Window = Field(default_factory=Window, description="window of the steady metrics")
     metrics: list[NamedPart] = Field(

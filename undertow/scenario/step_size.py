@@ -13,7 +13,7 @@ from undertow.core.status import Status
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.thrusters.thruster import AbstractThruster
 from undertow.physics.vehicles.body import Body
-from undertow.scenario.schema import Loop
+from undertow.scenario.schema import ClosedLoopSettings
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.continuous import flow
 from undertow.simulation.loop.outcome import Outcome
@@ -25,7 +25,7 @@ _LIMITS = {"rk4": 2.785, "euler": 2.0}
 _LOOKS = 9
 
 
-def step_advice(plant: HybridVehicle, loop: Loop) -> tuple[Advice, ...]:
+def step_advice(plant: HybridVehicle, loop: ClosedLoopSettings) -> tuple[Advice, ...]:
     """Advice when steps are too long for the linearised thrusters at rest, or for the linear damping of the hull."""
     if loop.method not in _LIMITS:
         return ()
@@ -49,7 +49,7 @@ def _hull_decay(body: Body) -> float:
     return float(np.abs(decays).max())
 
 
-def _remedy(loop: Loop, longest: float) -> str:
+def _remedy(loop: ClosedLoopSettings, longest: float) -> str:
     """A setting with steps of at most `longest` seconds."""
     if loop.kind == "continuous":
         return f"a loop.dt of at most {longest:.2g} s"
@@ -65,7 +65,7 @@ def fastest_decay(thruster: AbstractThruster) -> float:
     return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(rest)))).max())
 
 
-def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
+def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome) -> str:
     """The reason of a failed run if its integration steps were too long; empty if that is not the cause.
 
     A sampled run integrates the plant, a continuous run the controller with it. The loop is linearised at the start and
@@ -88,7 +88,7 @@ def step_failure(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> str:
     )
 
 
-def _decays(closed_loop: ClosedLoop, loop: Loop, outcome: Outcome) -> list[float]:
+def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome) -> list[float]:
     """Fastest decay rates at some records, 1/s, without those where the fastest mode grows."""
     plant, samples = closed_loop.plant, outcome.signals
     ordinary = np.abs(np.asarray(samples["velocity"])).max(axis=1) <= _ordinary(closed_loop, outcome)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, within
 from undertow.core.runtime import double_outside_runs
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
 from undertow.scenario.schema import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
@@ -27,7 +27,7 @@ class VehicleFile(NamedTuple):
         return _location(self.text, frozenset())(name)
 
     @double_outside_runs
-    def vehicle(self) -> Vehicle:
+    def vehicle(self) -> VehicleModel:
         """The vehicle.
 
         Raises:

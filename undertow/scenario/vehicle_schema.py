@@ -11,9 +11,9 @@ from undertow.core.errors import BadInput, did_you_mean, joined, known_key
 from undertow.core.measurement import BODY_AXES
 from undertow.physics.faults.targets import is_target
 from undertow.physics.vehicles.facts import Facts
-from undertow.physics.vehicles.published import Hull, Layout, assemble, inertia_about_origin
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, inertia_about_origin
 from undertow.physics.vehicles.thruster_labels import check_own
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import checked
 
@@ -231,13 +231,13 @@ class VehicleData(NamedTuple):
 
     name: str
     hull: Hull
-    layout: Layout  # directions with the length they were given
+    layout: ThrusterLayout  # directions with the length they were given
     size: NDArray | None  # m
     printed_matrix: NDArray | None  # 6 x N
     water_density: float | None  # kg/m^3
     angles: dict[str, float]  # degrees, as given, by key
 
-    def vehicle(self) -> Vehicle:
+    def vehicle(self) -> VehicleModel:
         """The vehicle.
 
         Raises:
@@ -307,7 +307,7 @@ def parse(contents: Mapping[str, Any]) -> VehicleData:
     return VehicleData(
         name=text_at(contents, "name", "vehicle"),
         hull=hull,
-        layout=Layout(source, positions, directions, names_of(contents["thrusters"])),
+        layout=ThrusterLayout(source, positions, directions, names_of(contents["thrusters"])),
         size=vectors.get("size"),
         printed_matrix=printed_matrix(contents, len(positions)),
         water_density=numbers.get("water_density"),

@@ -17,7 +17,7 @@ _ENTRIES = ("load", "noise")
 _START = "start"  # a column: where the states are at first
 
 
-class Comparison(NamedTuple):
+class MetricComparison(NamedTuple):
     """One metric, predicted and found."""
 
     name: str
@@ -83,9 +83,9 @@ def from_start(loop: LinearLoop, at: Equilibrium, plant: np.ndarray, law: np.nda
     return loop._replace(entries=loop.entries | {_START: away[:, None]})
 
 
-def compare_metrics(predicted: Mapping[str, float], measured: Mapping[str, Any]) -> list[Comparison]:
+def compare_metrics(predicted: Mapping[str, float], measured: Mapping[str, Any]) -> list[MetricComparison]:
     """Predicted metrics beside the measured ones of the same names."""
-    return [Comparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
+    return [MetricComparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
 
 
 @jax.jit

@@ -46,7 +46,7 @@ class Entries(NamedTuple):
     names: tuple[str, ...]
 
 
-class Known(NamedTuple):
+class FormulaNames(NamedTuple):
     """What a formula may name.
 
     Attributes:
@@ -62,7 +62,7 @@ class Known(NamedTuple):
         return (*(name for name, unit in _GROUPS.items() if unit in self.units), *self.signals)
 
 
-def parse_formula(text: str, known: Known) -> Formula:
+def parse_formula(text: str, known: FormulaNames) -> Formula:
     """A formula from its text.
 
     Raises:
@@ -78,7 +78,7 @@ def parse_formula(text: str, known: Known) -> Formula:
 class _Reader:
     """Reads a text from the left."""
 
-    def __init__(self, text: str, known: Known):
+    def __init__(self, text: str, known: FormulaNames):
         self._known, self._text, self._at, self._depth = known, text, 0, 0
         self._tokens: list[tuple[str, int]] = []
         at = 0

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.analysis.temporal.formula import Arithmetic, Formula
-from undertow.analysis.temporal.parsing import Entries, Known, parse_formula
+from undertow.analysis.temporal.parsing import Entries, FormulaNames, parse_formula
 from undertow.core.errors import BadInput, did_you_mean, within
 from undertow.core.metric import Metric
 from undertow.core.status import Status
@@ -43,7 +43,7 @@ class Verdict(NamedTuple):
     holds: bool
 
 
-def known_of(loop: ClosedLoop) -> Known:
+def known_of(loop: ClosedLoop) -> FormulaNames:
     """Signals that a formula on a loop may name: numbers, and lists over outputs or inputs."""
     plant = loop.plant
     names = {"axis": tuple(plant.outputs), "actuator": tuple(map(str, range(plant.inputs())))}
@@ -53,7 +53,7 @@ def known_of(loop: ClosedLoop) -> Known:
             found[name] = Entries(())
         elif len(signal.dimensions) == 1 and signal.dimensions[0] in names:
             found[name] = Entries(names[signal.dimensions[0]])
-    return Known(found, plant.output_units)
+    return FormulaNames(found, plant.output_units)
 
 
 def requirements_of(

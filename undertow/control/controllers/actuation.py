@@ -2,7 +2,7 @@
 
 A law decides an acceleration; everything after it is common: the modelled forces are compensated, as they are at the
 velocity of the target, the model is inverted, forces are allocated within the limits of the actuators, and the
-actuators are commanded. What limits took away comes back to the law as `Given`, so that it need not wind up.
+actuators are commanded. What limits took away comes back to the law as `ActuationResult`, so that it need not wind up.
 """
 
 import abc
@@ -53,7 +53,7 @@ class ActuatedState(NamedTuple):
     filter: FilterState | None
 
 
-class Given(NamedTuple):
+class ActuationResult(NamedTuple):
     """What the applied input gives."""
 
     known: PerAxis  # modelled acceleration F + G f, m/s^2, rad/s^2
@@ -62,7 +62,7 @@ class Given(NamedTuple):
     share: Float[Array, ""]  # of the demanded acceleration, along its direction, 0 to 1
 
 
-class Plan(NamedTuple):
+class ActuationDecisions(NamedTuple):
     """Decisions of one instant."""
 
     actuators: Any
@@ -92,7 +92,9 @@ class AbstractAccelerationLaw(AbstractController):
         """
 
     @abc.abstractmethod
-    def adapt(self, own: PyTree, y: Measurement, off: TrackingError, given: Given, dt: Float[Array, ""]) -> PyTree:
+    def adapt(
+        self, own: PyTree, y: Measurement, off: TrackingError, given: ActuationResult, dt: Float[Array, ""]
+    ) -> PyTree:
         """State of the law one sampling time later."""
 
     def init(self, y: Measurement, r: Target) -> ActuatedState:
@@ -114,7 +116,7 @@ class AbstractAccelerationLaw(AbstractController):
         missing = matvec(effect, going - asked + plan.forces) - plan.desired
         coordinates = self.model.coordinates
         return ActuatedState(
-            law=self.adapt(z.law, y, plan.off, Given(known, missing, share), dt),
+            law=self.adapt(z.law, y, plan.off, ActuationResult(known, missing, share), dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=None if path.filter is None else path.filter.advance(z.filter, r, coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
@@ -143,7 +145,7 @@ class AbstractAccelerationLaw(AbstractController):
             return jnp.zeros_like(y.position)
         return self.model.drift_at_target_velocity(y, off.rate)
 
-    def _plan(self, z: ActuatedState, y: Measurement, r: Target) -> Plan:
+    def _plan(self, z: ActuatedState, y: Measurement, r: Target) -> ActuationDecisions:
         dynamics, coordinates, _ = self.model
         smoothing = self.actuation.filter
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
@@ -151,7 +153,7 @@ class AbstractAccelerationLaw(AbstractController):
         acceleration, signals = self.demand(z.law, y, off)
         desired = acceleration - self._compensated(y, off)
         estimated = self._actuators().update_from_report(z.actuators, y.actuator)
-        return Plan(estimated, off, desired, dynamics.invert(y, desired), signals)
+        return ActuationDecisions(estimated, off, desired, dynamics.invert(y, desired), signals)
 
 
 def actuation_for(sampling_time: float, frequency, options: ActuationOptions = ActuationOptions()) -> Actuation:

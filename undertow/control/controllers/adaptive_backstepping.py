@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Axis, Law, alike, axes_of, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import Axis, LoopTransfer, alike, axes_of, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -80,7 +80,9 @@ class AdaptiveBackstepping(AbstractAccelerationLaw):
     def demand(self, own: BacksteppingState, y: Measurement, off: TrackingError):
         return self._steps(own, off).demand, {"estimate": own.load}
 
-    def adapt(self, own: BacksteppingState, y: Measurement, off: TrackingError, given: Given, dt) -> BacksteppingState:
+    def adapt(
+        self, own: BacksteppingState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> BacksteppingState:
         at = self._steps(own, off)
         learning = jnp.where(given.share < _WHOLE, 0.0, self._within_reach(y, at.learning))
         going = -jnp.expm1(-dt / self.lag) if self.lagged else 1.0
@@ -190,6 +192,6 @@ def backstepping_rate(axis: Axis, lag: float | None) -> float:
             return at(free / (s - (at(1.0).learning - free))).demand
 
         inner = 1 - demand(0.0, 0.0, 1.0) * (1 - kept) / (np.exp(s * axis.sampling_time) - kept) if lag else 1.0
-        return Law(demand(1.0, 0.0, 0.0) / inner, demand(0.0, 1.0, 0.0) / inner)
+        return LoopTransfer(demand(1.0, 0.0, 0.0) / inner, demand(0.0, 1.0, 0.0) / inner)
 
     return best_frequency(axis, law)

@@ -5,12 +5,11 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.control.controllers.observer_gains import gains_with_feedback
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
-from undertow.control.controllers.tracking_error import check_gains
-from undertow.core import checks
+from undertow.control.controllers.tracking_error import check_second_order_gains
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
@@ -18,7 +17,7 @@ from undertow.core.param import Param, param
 PerAxis = Float[Array, " n"]
 
 
-class ObserverState(NamedTuple):
+class ExtendedStateObserverState(NamedTuple):
     """State of the law: the estimates of the observer."""
 
     rates: PerAxis  # m/s, rad/s
@@ -42,24 +41,23 @@ class ADRC(AbstractAccelerationLaw):
     feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
-        checks.positive("bandwidth", self.bandwidth, "rad/s")
-        checks.positive("damping", self.damping)
-        per_axis = {"bandwidth": self.bandwidth, "damping": self.damping}
-        check_gains(self.feedback, jnp.eye(2), per_axis, len(self.model.coordinates.angles))
+        check_second_order_gains(self.bandwidth, self.damping, self.feedback, len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> ObserverState:
+    def begin(self, y: Measurement, r: Target) -> ExtendedStateObserverState:
         rates = self.model.coordinates.velocity(y)
-        return ObserverState(rates, jnp.zeros_like(rates))
+        return ExtendedStateObserverState(rates, jnp.zeros_like(rates))
 
-    def demand(self, own: ObserverState, y: Measurement, off: TrackingError):
+    def demand(self, own: ExtendedStateObserverState, y: Measurement, off: TrackingError):
         error, rate, acceleration = off
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
         signals = {"estimate": own.estimate, "modelling_error": own.rates - self.model.coordinates.velocity(y)}
         return feedback - own.estimate, signals
 
-    def adapt(self, own: ObserverState, y: Measurement, off: TrackingError, given: Given, dt) -> ObserverState:
+    def adapt(
+        self, own: ExtendedStateObserverState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> ExtendedStateObserverState:
         eps = own.rates - self.model.coordinates.velocity(y)
-        return ObserverState(
+        return ExtendedStateObserverState(
             own.rates + dt * (given.known + own.estimate - 2 * self.damping * self.bandwidth * eps),
             own.estimate - dt * self.bandwidth**2 * eps,
         )

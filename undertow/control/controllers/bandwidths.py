@@ -98,7 +98,7 @@ class Bandwidths(NamedTuple):
     tracking: float
 
 
-class Law(NamedTuple):
+class LoopTransfer(NamedTuple):
     """Transfer functions from position and velocity to the input: arrays (candidates, frequencies)."""
 
     of_position: np.ndarray
@@ -203,10 +203,10 @@ def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: i
 @functools.lru_cache(maxsize=4096)
 def pid_frequency(axis: Axis) -> float:
     """Natural frequency w of a PID with k_p = w^2, k_d = 2 w and k_i = w^3 / 10, rad/s: Fossen (2021), ch. 15."""
-    return best_frequency(axis, lambda w, s: Law(w**2 + 0.1 * w**3 / s, 2 * w + 0 * s))
+    return best_frequency(axis, lambda w, s: LoopTransfer(w**2 + 0.1 * w**3 / s, 2 * w + 0 * s))
 
 
-def best_frequency(axis: Axis, law: Callable[[np.ndarray, np.ndarray], Law]) -> float:
+def best_frequency(axis: Axis, law: Callable[[np.ndarray, np.ndarray], LoopTransfer]) -> float:
     """Frequency of least cost with all margins of a law with one free number, rad/s.
 
     Args:
@@ -226,7 +226,7 @@ def _robust_grid(axis: Axis) -> tuple[np.ndarray, ...]:
     return bandwidth_grid(axis), np.array(_TRACKING_SHARES), np.array(_ACTUATOR_SHARES if axis.lag else (3.0,))
 
 
-def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: int = 2) -> Law:
+def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: int = 2) -> LoopTransfer:
     """The law of `controllers/robust` from y to u: sampled estimator, actuators as in `LaggedActuator`."""
     dt, z = axis.sampling_time, np.exp(s * axis.sampling_time)
     decay = np.exp(-bandwidth * dt)
@@ -243,10 +243,10 @@ def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: in
     else:
         force = given = np.ones_like(z)
     asked = given / (1 + by_force * force)
-    return Law(tracking**2 * asked, (2 * tracking + by_velocity) * asked)
+    return LoopTransfer(tracking**2 * asked, (2 * tracking + by_velocity) * asked)
 
 
-def _best(axis: Axis, law: Callable[[np.ndarray], Law], rates: np.ndarray) -> int:
+def _best(axis: Axis, law: Callable[[np.ndarray], LoopTransfer], rates: np.ndarray) -> int:
     """Index of the candidate of least cost among those with all margins; the slowest where none has them."""
     dt = axis.sampling_time
     frequency = np.geomspace(1e-4, np.pi, _FREQUENCIES) / dt
@@ -268,7 +268,9 @@ def _best(axis: Axis, law: Callable[[np.ndarray], Law], rates: np.ndarray) -> in
     return int(rates.argmin())
 
 
-def _cost(axis: Axis, frequency: np.ndarray, from_y: Law, held: np.ndarray, open_loop: np.ndarray) -> np.ndarray:
+def _cost(
+    axis: Axis, frequency: np.ndarray, from_y: LoopTransfer, held: np.ndarray, open_loop: np.ndarray
+) -> np.ndarray:
     """Predicted cost of each candidate, with the nominal actuators of the law."""
     s, dt = 1j * frequency, axis.sampling_time
     actuator = 1 / (1 + s * (axis.lag or 0.0))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
@@ -67,7 +67,7 @@ class Cascade(AbstractAccelerationLaw):
         demanded = off.acceleration + self.inner * error + own.integral + self.derivative * slope
         return jnp.clip(demanded, -self.limit, self.limit), {"estimate": -own.integral}
 
-    def adapt(self, own: CascadeState, y: Measurement, off: TrackingError, given: Given, dt) -> CascadeState:
+    def adapt(self, own: CascadeState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> CascadeState:
         """Anti-windup of the integral by back-calculation, with the time constant of `pid`."""
         error = self._rate_error(off)
         squared = self.integral * self.outer / self.inner

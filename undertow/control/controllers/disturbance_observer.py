@@ -5,11 +5,12 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.observer_gains import gains_and_path
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.tracking_error import pole_placement
+from undertow.control.estimation.sampled_observer import corrected_disturbance
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.option_groups import flat_options
@@ -18,7 +19,7 @@ from undertow.core.param import Param, param
 PerAxis = Float[Array, " n"]
 
 
-class ObserverState(NamedTuple):
+class DisturbanceObserverState(NamedTuple):
     """State of the law: the prediction that the next measured velocity corrects."""
 
     predicted: PerAxis  # m/s, rad/s
@@ -49,26 +50,28 @@ class DisturbanceObserver(AbstractAccelerationLaw):
             checks.positive(name, getattr(self, name))
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> ObserverState:
+    def begin(self, y: Measurement, r: Target) -> DisturbanceObserverState:
         velocity = self.model.coordinates.velocity(y)
-        return ObserverState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
+        return DisturbanceObserverState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
-    def demand(self, own: ObserverState, y: Measurement, off: TrackingError):
+    def demand(self, own: DisturbanceObserverState, y: Measurement, off: TrackingError):
         estimate = self._estimate(own, y)
         return pole_placement(off, self.tracking, self.damping) - estimate, {"estimate": estimate}
 
-    def adapt(self, own: ObserverState, y: Measurement, off: TrackingError, given: Given, dt) -> ObserverState:
+    def adapt(
+        self, own: DisturbanceObserverState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> DisturbanceObserverState:
         estimate = self._estimate(own, y)
-        return ObserverState(self.model.coordinates.velocity(y) + dt * (given.known + estimate), estimate, dt)
+        return DisturbanceObserverState(
+            self.model.coordinates.velocity(y) + dt * (given.known + estimate), estimate, dt
+        )
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
 
-    def _estimate(self, own: ObserverState, y: Measurement) -> PerAxis:
-        """The estimate, corrected by the part of the measured velocity that was not predicted."""
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
-        gain = -jnp.expm1(-self.bandwidth * step) / step
-        return own.estimate + gain * (self.model.coordinates.velocity(y) - own.predicted)
+    def _estimate(self, own: DisturbanceObserverState, y: Measurement) -> PerAxis:
+        velocity = self.model.coordinates.velocity(y)
+        return corrected_disturbance(own.estimate, own.predicted, velocity, self.bandwidth, own.elapsed)
 
 
 @flat_options()

@@ -5,12 +5,11 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.control.controllers.observer_gains import gains_with_feedback
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
-from undertow.control.controllers.tracking_error import check_gains
-from undertow.core import checks
+from undertow.control.controllers.tracking_error import check_second_order_gains
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
@@ -18,7 +17,7 @@ from undertow.core.param import Param, param
 PerAxis = Float[Array, " n"]
 
 
-class FilterState(NamedTuple):
+class INDIState(NamedTuple):
     """State of the law: the filters H of the velocity and of the modelled acceleration; SI units."""
 
     velocity: PerAxis
@@ -44,26 +43,23 @@ class INDI(AbstractAccelerationLaw):
     feedback: Float[Param, "*#n 2"] = param("1/s^2, 1/s", "state feedback", symbol="K")
 
     def __check_init__(self):
-        checks.positive("bandwidth", self.bandwidth, "rad/s")
-        checks.positive("damping", self.damping)
-        per_axis = {"bandwidth": self.bandwidth, "damping": self.damping}
-        check_gains(self.feedback, jnp.eye(2), per_axis, len(self.model.coordinates.angles))
+        check_second_order_gains(self.bandwidth, self.damping, self.feedback, len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> FilterState:
+    def begin(self, y: Measurement, r: Target) -> INDIState:
         rates = self.model.coordinates.velocity(y)
         zero = jnp.zeros_like(rates)
-        return FilterState(rates, zero, zero, zero)
+        return INDIState(rates, zero, zero, zero)
 
-    def demand(self, own: FilterState, y: Measurement, off: TrackingError):
+    def demand(self, own: INDIState, y: Measurement, off: TrackingError):
         error, rate, acceleration = off
         missing = own.acceleration - own.known
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
         signals = {"estimate": missing, "modelling_error": own.velocity - self.model.coordinates.velocity(y)}
         return feedback - missing, signals
 
-    def adapt(self, own: FilterState, y: Measurement, off: TrackingError, given: Given, dt) -> FilterState:
+    def adapt(self, own: INDIState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> INDIState:
         velocity, acceleration = self._filtered(own.velocity, own.acceleration, self.model.coordinates.velocity(y), dt)
-        return FilterState(velocity, acceleration, *self._filtered(own.known, own.known_rate, given.known, dt))
+        return INDIState(velocity, acceleration, *self._filtered(own.known, own.known_rate, given.known, dt))
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -64,7 +64,7 @@ class IntegralSlidingMode(AbstractAccelerationLaw):
         demanded = off.acceleration + self._nominal(off) + switching
         return demanded, {"estimate": -switching, "surface": surface}
 
-    def adapt(self, own: SlidingState, y: Measurement, off: TrackingError, given: Given, dt) -> SlidingState:
+    def adapt(self, own: SlidingState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> SlidingState:
         start = jnp.where(own.begun > 0, own.integral, -off.rate)
         return SlidingState(start + dt * (self._nominal(off) + given.missing), jnp.ones(()))
 
@@ -126,7 +126,7 @@ def integral_sliding_mode(
     )
 
 
-def _inside_the_layer(w, s) -> Law:
+def _inside_the_layer(w, s) -> LoopTransfer:
     """The law with the default damping and layer: (p + c) (p + w)^2 with c = 0.3 w."""
     c = _LAYER_RATE * w
-    return Law(w**2 + 2 * w * c + c * w**2 / s, 2 * w + c + 0 * s)
+    return LoopTransfer(w**2 + 2 * w * c + c * w**2 / s, 2 * w + c + 0 * s)

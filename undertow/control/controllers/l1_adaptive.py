@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, MODELLING_ERROR
 from undertow.control.controllers.observer_gains import gains_and_path
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
@@ -71,7 +71,9 @@ class L1Adaptive(AbstractAccelerationLaw):
             "modelling_error": seen.error,
         }
 
-    def adapt(self, own: PredictorState, y: Measurement, off: TrackingError, given: Given, dt) -> PredictorState:
+    def adapt(
+        self, own: PredictorState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> PredictorState:
         seen, velocity = self._adapted(own, y), self.model.coordinates.velocity(y)
         lost = -jnp.expm1(-self.predictor * dt)
         moved = (1 - lost) * seen.error + lost / self.predictor * seen.uncertainty

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Axis, Law, alike, axes_of, bandwidth_grid, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import Axis, LoopTransfer, alike, axes_of, bandwidth_grid, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -72,7 +72,7 @@ class LQI(AbstractAccelerationLaw):
         demanded = acceleration + of_error * error + of_rate * rate + own.integral
         return demanded - of_given * (own.acceleration - acceleration), {"estimate": -own.integral / (1 + of_given)}
 
-    def adapt(self, own: LQIState, y: Measurement, off: TrackingError, given: Given, dt) -> LQIState:
+    def adapt(self, own: LQIState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> LQIState:
         """State one sampling time later; what limits take away is given back to the integral, as in `pid`."""
         of_integral, _, of_rate, _ = jnp.moveaxis(self.gains, -1, 0)
         back = jnp.minimum(jnp.sqrt(of_integral / of_rate), 1 / dt) * given.missing
@@ -126,7 +126,7 @@ def lqi_frequency(axis: Axis, integral_weight: float, rate_weight: float, lag: f
         kept = np.exp(-dt / max(lag, _LEAST_LAG))
         of_integral, of_error, of_rate, of_given = (column[:, None] for column in gains.T)
         inner = 1 + of_given * (1 - kept) / (np.exp(s * dt) - kept)
-        return Law((of_error + of_integral / s) / inner, of_rate / inner)
+        return LoopTransfer((of_error + of_integral / s) / inner, of_rate / inner)
 
     return best_frequency(axis, law)
 

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.tracking_error import pole_placement
@@ -84,7 +84,9 @@ class MRAC(AbstractAccelerationLaw):
         behind = jnp.where(own.begun > 0, off.error - own.error, 0.0)
         return nominal - adapted, {"estimate": adapted, "model_error": behind}
 
-    def adapt(self, own: AdaptiveState, y: Measurement, off: TrackingError, given: Given, dt) -> AdaptiveState:
+    def adapt(
+        self, own: AdaptiveState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> AdaptiveState:
         """State one sampling time later; the reference model is sampled as a double integrator is.
 
         Where Phi is large, adaptation is slowed to gamma |Phi|^2 = zeta w / T: from twice that on Euler's method adds
@@ -175,7 +177,7 @@ def mrac(
     )
 
 
-def _load_alone(w, s) -> Law:
+def _load_alone(w, s) -> LoopTransfer:
     """The law with the default damping and adaptation, and the load as only parameter."""
     adaptation = _ADAPTATION * w**2
-    return Law(w**2 + adaptation + adaptation * _SLOPE * w / s, 2 * w + 0 * s)
+    return LoopTransfer(w**2 + adaptation + adaptation * _SLOPE * w / s, 2 * w + 0 * s)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
 from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, ROBUST_TERM
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
@@ -26,14 +26,14 @@ _WHOLE = 0.999  # an attained share below this means that limits bind
 _SIZE = {"weights_size": Signal((), "1", "Frobenius norm of all weights of the network")}
 
 
-class Weights(NamedTuple):
+class NetworkWeights(NamedTuple):
     """State of the law: the weights of the network."""
 
     output: Float[Array, "hidden+1 n"]  # W, m/s^2, rad/s^2; the first row is a bias
     hidden: Float[Array, "inputs hidden"]  # V; the first row is a bias
 
 
-class Seen(NamedTuple):
+class NetworkEvaluation(NamedTuple):
     """The network at one instant."""
 
     filtered: PerAxis  # r = e_dot + Lambda e, m/s, rad/s
@@ -75,17 +75,19 @@ class Neural(AbstractAccelerationLaw):
         for name in ("slope", "gain", "adaptation"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> Weights:
-        return Weights(jnp.zeros((self.start.shape[1] + 1, y.position.shape[0])), self.start)
+    def begin(self, y: Measurement, r: Target) -> NetworkWeights:
+        return NetworkWeights(jnp.zeros((self.start.shape[1] + 1, y.position.shape[0])), self.start)
 
-    def demand(self, own: Weights, y: Measurement, off: TrackingError):
+    def demand(self, own: NetworkWeights, y: Measurement, off: TrackingError):
         seen = self._seen(own, y, off)
         learnt = own.output[0] + matvec(own.output[1:].T, seen.layer)
         robust = self.robust_gain * (seen.size + self.weights_bound) * seen.filtered
         demanded = off.acceleration + self.slope * off.rate + self.gain * seen.filtered + learnt + robust
         return demanded, {"estimate": -learnt, "robust_term": robust, "weights_size": seen.size}
 
-    def adapt(self, own: Weights, y: Measurement, off: TrackingError, given: Given, dt) -> Weights:
+    def adapt(
+        self, own: NetworkWeights, y: Measurement, off: TrackingError, given: ActuationResult, dt
+    ) -> NetworkWeights:
         seen = self._seen(own, y, off)
         inner = seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
         r = self._within_reach(y, seen.filtered)  # an error that no input moves would be learnt for ever
@@ -99,16 +101,16 @@ class Neural(AbstractAccelerationLaw):
             seen.inputs[:, None] * back[None, :] - self.e_modification * size * own.hidden
         )
         step = jnp.where(given.share < _WHOLE, 0.0, dt)
-        return Weights(own.output + step * by_output, own.hidden + step * by_hidden)
+        return NetworkWeights(own.output + step * by_output, own.hidden + step * by_hidden)
 
     def signals(self):
         return ESTIMATE | ROBUST_TERM | _SIZE | ATTAINED_SHARE
 
-    def _seen(self, own: Weights, y: Measurement, off: TrackingError) -> Seen:
+    def _seen(self, own: NetworkWeights, y: Measurement, off: TrackingError) -> NetworkEvaluation:
         inputs = _inputs(self.model, y, off)
         layer = jax.nn.sigmoid(matvec(own.hidden.T, inputs))
         size = safe_sqrt((own.output**2).sum() + (own.hidden**2).sum())
-        return Seen(off.rate + self.slope * off.error, inputs, layer, size)
+        return NetworkEvaluation(off.rate + self.slope * off.error, inputs, layer, size)
 
 
 @flat_options()

@@ -7,11 +7,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.observer_gains import gains_and_path
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.receding_horizon import Horizon, Improved, improved, regulator
+from undertow.control.estimation.sampled_observer import corrected_disturbance
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.errors import BadInput
@@ -82,7 +83,7 @@ class NMPC(AbstractAccelerationLaw):
         usable = (own.elapsed > 0) & jnp.isfinite(planned).all()
         return jnp.where(usable, planned, alone), {"estimate": estimate}
 
-    def adapt(self, own: PlannedState, y: Measurement, off: TrackingError, given: Given, dt) -> PlannedState:
+    def adapt(self, own: PlannedState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PlannedState:
         """The plan, moved on by dt and improved from the measured state; made anew where it was not finite."""
         estimate, horizon = self._estimate(own, y), self._horizon(y)
         forces = own.plan.forces
@@ -100,9 +101,8 @@ class NMPC(AbstractAccelerationLaw):
         return ESTIMATE | ATTAINED_SHARE
 
     def _estimate(self, own: PlannedState, y: Measurement) -> PerAxis:
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
-        gain = -jnp.expm1(-self.bandwidth * step) / step
-        return own.estimate + gain * (self.model.coordinates.velocity(y) - own.predicted)
+        velocity = self.model.coordinates.velocity(y)
+        return corrected_disturbance(own.estimate, own.predicted, velocity, self.bandwidth, own.elapsed)
 
     def _horizon(self, y: Measurement) -> Horizon:
         inputs, axes = self.model.dynamics.gain(y).shape[1], y.position.shape[0]

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
 from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
@@ -51,7 +51,7 @@ class PID(AbstractAccelerationLaw):
         demanded = acceleration + self.proportional * error + self.derivative * rate + own
         return demanded, {"estimate": -own}
 
-    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
+    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PerAxis:
         """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
 
         Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.

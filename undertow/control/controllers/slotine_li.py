@@ -5,8 +5,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -111,7 +111,7 @@ class SlotineLi(AbstractAccelerationLaw):
         }
         return demanded + self._compensated(y, off), signals
 
-    def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: Given, dt) -> Parameters:
+    def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> Parameters:
         """Parameters one sampling time later.
 
         Euler's method adds T / 2 theta_dot^T (gamma Gamma)^-1 theta_dot to V_dot. Where that is more than half of what
@@ -198,7 +198,7 @@ def slotine_li(
     )
 
 
-def _small_errors(slope, s) -> Law:
+def _small_errors(slope, s) -> LoopTransfer:
     """The law with the default gains, and the load as only parameter."""
     adaptation = _ADAPTATION * slope**2
-    return Law(slope**2 + adaptation + adaptation * slope / s, 2 * slope + 0 * s)
+    return LoopTransfer(slope**2 + adaptation + adaptation * slope / s, 2 * slope + 0 * s)

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, Given, actuation_for
-from undertow.control.controllers.bandwidths import Law, alike, axes_of, best_frequency
+from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
+from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -67,7 +67,7 @@ class SuperTwisting(AbstractAccelerationLaw):
         demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + own
         return demanded, {"estimate": -own, "surface": surface}
 
-    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: Given, dt) -> PerAxis:
+    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PerAxis:
         """w one sampling time later; what limits take away is given back to it, as to the integral of `pid`."""
         surface = off.rate + self.slope * off.error
         second = self.second * self.rate_bound
@@ -163,8 +163,8 @@ def super_twisting(
     )
 
 
-def _inside_the_layer(slope, s) -> Law:
+def _inside_the_layer(slope, s) -> LoopTransfer:
     """The law with the default gains where it is linear."""
     steep = _STEEP * slope
     second = _SECOND * (steep / _FIRST) ** 2
-    return Law(slope * steep + second + slope * second / s, slope + steep + 0 * s)
+    return LoopTransfer(slope * steep + second + slope * second / s, slope + steep + 0 * s)

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core import checks
@@ -55,3 +56,14 @@ def check_gains(feedback: Array, weight: Array, per_axis: dict[str, Any], axes: 
     checks.per_axis("weight", weight, axes, (2, 2))
     checks.hurwitz("feedback", feedback)
     checks.positive_definite("weight", weight)
+
+
+def check_second_order_gains(bandwidth: Array, damping: Array, feedback: Array, axes: int) -> None:
+    """Check bandwidth and damping of an observer or a filter of second order, and the state feedback K beside it.
+
+    Raises:
+        BadInput: bandwidth or damping not positive, feedback not Hurwitz, or one of them does not fit the axes.
+    """
+    checks.positive("bandwidth", bandwidth, "rad/s")
+    checks.positive("damping", damping)
+    check_gains(feedback, jnp.eye(2), {"bandwidth": bandwidth, "damping": damping}, axes)

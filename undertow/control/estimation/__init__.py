@@ -1,4 +1,4 @@
-"""Estimation of the lumped uncertainty: the fuzzy system and the identification model whose error is its input."""
+"""Estimation of the lumped uncertainty: fuzzy system, identification model, and a sampled disturbance observer."""
 
 from undertow.control.estimation.fuzzy_system import FuzzySystem as FuzzySystem
 from undertow.control.estimation.fuzzy_system import gaussian_sets as gaussian_sets

@@ -23,7 +23,7 @@ _RMS, _CORRELATION, _SURE = 1.1, 0.1, 5.0
 PerSensor = Float[Array, " sensors"]
 
 
-class InnovationMonitor(NamedTuple):
+class InnovationConsistency(NamedTuple):
     """Innovations of each sensor, divided by their standard deviations: independent of each other and of variance 1.
 
     An error that the filter does not know makes them larger, or alike from one reading to the next. Means are over all
@@ -52,7 +52,7 @@ class InnovationMonitor(NamedTuple):
         changed = lambda means, value: means.at[sensor].add(share * value - weight * means[sensor])
         last = list(self.last)
         last[sensor] = jnp.where(new, innovation, last[sensor])
-        return InnovationMonitor(
+        return InnovationConsistency(
             tuple(last),
             self.readings.at[sensor].set(count),
             changed(self.squares, square),
@@ -76,14 +76,14 @@ class InnovationMonitor(NamedTuple):
         return jnp.where((larger | alike) & (self.readings >= _FEWEST), 1.0, 0.0)
 
 
-def innovation_monitor(widths: Sequence[int]) -> InnovationMonitor:
+def innovation_monitor(widths: Sequence[int]) -> InnovationConsistency:
     """The monitor before the first reading.
 
     Args:
         widths: entries of a reading of each sensor that a filter compares.
     """
     none = jnp.zeros(len(widths))
-    return InnovationMonitor(tuple(jnp.zeros(width) for width in widths), none, none, none)
+    return InnovationConsistency(tuple(jnp.zeros(width) for width in widths), none, none, none)
 
 
 def normalised_square(errors: Float[Array, " n"], covariance: Float[Array, "n n"]) -> Float[Array, ""]:

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from undertow.control.navigation.consistency import InnovationMonitor
+from undertow.control.navigation.consistency import InnovationConsistency
 from undertow.control.navigation.disagreement import Disagreement
 from undertow.control.navigation.inertial_covariance import MOTION_STATES, product
 from undertow.control.navigation.inertial_gate import InertialMemory
@@ -44,7 +44,7 @@ class KalmanState(NamedTuple):
     history: MotionHistory
     disagreement: Disagreement
     rejected: Int[Array, ""]  # readings so far
-    monitor: InnovationMonitor
+    monitor: InnovationConsistency
     sensor_errors: ErrorValues | None = None  # correlated errors of all sensors; None where the filter has none
 
     @property

@@ -33,7 +33,7 @@ from undertow.physics.sensors.received import Received
 from undertow.physics.sensors.sensor import AbstractSensor
 
 
-class ObserverState(NamedTuple):
+class NavigationObserverState(NamedTuple):
     """State of the observer."""
 
     estimate: Estimate
@@ -74,14 +74,16 @@ class Observer(AbstractFilter):
             if not checks.assumed(lambda share: (share <= 1).all(), blend):
                 raise BadInput(f"{name}_blend", "be at most 1", f"{float(blend):g}")
 
-    def start(self, y) -> ObserverState:
+    def start(self, y) -> NavigationObserverState:
         estimate = estimate_of(y)
         if not any(isinstance(sensor, PropellerSpeed) for sensor in self.sensors):
             estimate = estimate._replace(actuator=None)
         at_rest = matvec(estimate.rotation().T, -gravity())
-        return ObserverState(estimate, self.inertial.start(jnp.concatenate([estimate.rates, at_rest])))
+        return NavigationObserverState(estimate, self.inertial.start(jnp.concatenate([estimate.rates, at_rest])))
 
-    def update(self, state: ObserverState, elapsed, received: tuple[Received, ...]) -> ObserverState:
+    def update(
+        self, state: NavigationObserverState, elapsed, received: tuple[Received, ...]
+    ) -> NavigationObserverState:
         news = [
             (sensor, one.reading, one.fresh & jnp.isfinite(one.reading).all(), one.age)
             for sensor, one in zip(self.sensors, received, strict=True)
@@ -95,16 +97,16 @@ class Observer(AbstractFilter):
         for sensor, reading, new, age in news:
             correct = next(_CORRECTIONS[kind] for kind in _CORRECTIONS if isinstance(sensor, kind))
             estimate = _either(new, correct(self, sensor, estimate, reading, age), estimate)
-        return ObserverState(estimate, memory)
+        return NavigationObserverState(estimate, memory)
 
-    def measurement(self, state: ObserverState):
+    def measurement(self, state: NavigationObserverState):
         return state.estimate.measurement()
 
     def signals(self):
         meaning = "samples of the IMU so far that no motion of the vehicle explains"
         return {"rejected_inertial": Signal((), "1", meaning)}
 
-    def diagnostics(self, state: ObserverState):
+    def diagnostics(self, state: NavigationObserverState):
         return {"rejected_inertial": state.inertial.rejected}
 
     def advice(self, duration):

@@ -23,7 +23,7 @@ _PAIR_SQUARE, _PAIR_MARGIN, _PAIR_EXPLAINED = 5.0, 4.0, 0.8
 _APART = 1e-3
 
 
-class Bounds(NamedTuple):
+class FaultThresholds(NamedTuple):
     """What a fault must satisfy."""
 
     square: Float[Array, ""]  # least explained square
@@ -37,7 +37,7 @@ class Bounds(NamedTuple):
 
 
 def one_thruster(
-    state: OnsetState, missing_now: Float[Array, "k m"], used: PerActuator, bounds: Bounds
+    state: OnsetState, missing_now: Float[Array, "k m"], used: PerActuator, bounds: FaultThresholds
 ) -> tuple[PerActuator, Float[Array, ""]]:
     """1 for the thruster that explains the innovations since some onset as a fault can, and what it explains.
 
@@ -72,7 +72,7 @@ def one_thruster(
     return jnp.where(is_best.any(0) & clear & believable, 1.0, 0.0), best
 
 
-def two_thrusters(wide: Wide, forces: PerActuator, used: PerActuator, bounds: Bounds) -> PerActuator:
+def two_thrusters(wide: Wide, forces: PerActuator, used: PerActuator, bounds: FaultThresholds) -> PerActuator:
     """1 for both thrusters of the pair that explains the wide difference where both are off, else 0.
 
     The forces of a pair are the solution of its normal equations, two by two. They are computed only where one thruster

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.supervision.fault_hypotheses import Bounds, one_thruster
+from undertow.control.supervision.fault_hypotheses import FaultThresholds, one_thruster
 from undertow.control.supervision.fault_onset import OnsetState, cleared, examine, onset_state
 
 PerActuator = Float[Array, " m"]
@@ -43,9 +43,9 @@ def gradual_state(axes: int, actuators: int) -> Series:
     return unsuspected, unsuspected
 
 
-def gradual_bounds(square: Float[Array, ""], margin: Float[Array, ""], force: PerActuator) -> Bounds:
-    """What a thruster that is off must satisfy; arguments as in `Bounds`."""
-    return Bounds(square, margin, force, _LEAST_SHARE, _MOST_SHARE, _EXPLAINED)
+def gradual_bounds(square: Float[Array, ""], margin: Float[Array, ""], force: PerActuator) -> FaultThresholds:
+    """What a thruster that is off must satisfy; arguments as in `FaultThresholds`."""
+    return FaultThresholds(square, margin, force, _LEAST_SHARE, _MOST_SHARE, _EXPLAINED)
 
 
 def examine_next(
@@ -57,7 +57,7 @@ def examine_next(
     remains: Float[Array, "k+1 3"],
     learned: Float[Array, ""],
     used: PerActuator,
-    bounds: Bounds,
+    bounds: FaultThresholds,
     elapsed: Float[Array, ""],
 ) -> Series:
     """Both series after an examination by the one whose turn it is.

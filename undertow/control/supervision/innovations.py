@@ -12,7 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.supervision.motion import Motion, length, split
+from undertow.control.supervision.motion import MonitoredMotion, length, split
 from undertow.core import checks
 from undertow.core.numerics.rotations import attitude_error
 from undertow.core.param import Param, param
@@ -46,13 +46,19 @@ class InnovationMonitor(eqx.Module):
         for name in ("memory", "averaged", "noise"):
             checks.positive(name, getattr(self, name))
 
-    def init(self, y: Motion) -> InnovationState:
+    def init(self, y: MonitoredMotion) -> InnovationState:
         """State before the first innovation."""
         turned = jnp.zeros(3 if y.attitude.shape[0] else 0)
         return InnovationState(jnp.zeros_like(y.position), turned, jnp.zeros_like(y.velocity), jnp.zeros(4))
 
     def after(
-        self, state: InnovationState, accepted: Motion, expected: Motion, jumps: "JumpLimits", believe, dt: Scalar
+        self,
+        state: InnovationState,
+        accepted: MonitoredMotion,
+        expected: MonitoredMotion,
+        jumps: "JumpLimits",
+        believe,
+        dt: Scalar,
     ) -> InnovationState:
         """State with one more measurement.
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from undertow.control.supervision.innovations import InnovationMonitor, InnovationState, JumpLimits
-from undertow.control.supervision.motion import Motion, length, motion_of, predicted, split, with_motion
+from undertow.control.supervision.motion import MonitoredMotion, length, motion_of, predicted, split, with_motion
 from undertow.control.supervision.stuck_readings import StuckReadings, StuckState
 from undertow.core import checks
 from undertow.core.contracts import Measurement
@@ -29,7 +29,7 @@ _LARGEST = 1e12  # of any reading, in any unit
 class GateState(NamedTuple):
     """State of the gate."""
 
-    expected: Motion  # at this instant
+    expected: MonitoredMotion  # at this instant
     rates: Array  # believed rates of the outputs, m/s and rad/s
     stuck: StuckState
     innovations: InnovationState
@@ -86,7 +86,7 @@ class MeasurementGate(eqx.Module):
         zero = lambda array: jnp.where(jnp.isfinite(array), array, 0.0)
         level = jnp.eye(4)[0] if read.attitude.shape[0] else read.attitude
         attitude = jnp.where(jnp.isfinite(read.attitude).all(), read.attitude, level)
-        expected = Motion(zero(read.position), attitude, zero(read.velocity))
+        expected = MonitoredMotion(zero(read.position), attitude, zero(read.velocity))
         believed, actuator = with_motion(y, expected), jax.tree.map(zero, y.actuator)
         stuck, innovations = self.stuck.init(y), self.innovations.init(expected)
         return GateState(expected, believed.velocity, stuck, innovations, jnp.zeros(()), actuator)
@@ -100,16 +100,18 @@ class MeasurementGate(eqx.Module):
             believe: whether a jump is taken as the truth, since the prediction is not.
         """
         read, expected = motion_of(y), state.expected
-        finite = Motion(*map(jnp.isfinite, read))
+        finite = MonitoredMotion(*map(jnp.isfinite, read))
         of_size, of_jump = self._sizes(read), self._jumps(read, expected)
         stuck_state = self.stuck.after(state.stuck, y, state.rates, state.since)
         stuck = self.stuck.found(stuck_state)
-        held = Motion(*(part > 0 for part in _of_motion(read, stuck.position, stuck.velocity)))
-        known = lambda ratios, which: Motion(*(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True)))
+        held = MonitoredMotion(*(part > 0 for part in _of_motion(read, stuck.position, stuck.velocity)))
+        known = lambda ratios, which: MonitoredMotion(
+            *(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True))
+        )
         sizes = known(of_size, finite)
         # What is stuck departs from its prediction, of course.
-        jumps = known(of_jump, Motion(*(f & ~h for f, h in zip(finite, held, strict=True))))
-        good = Motion(
+        jumps = known(of_jump, MonitoredMotion(*(f & ~h for f, h in zip(finite, held, strict=True))))
+        good = MonitoredMotion(
             *(
                 f & (size <= 1) & ((jump <= 1) | believe) & ~stands
                 for f, size, jump, stands in zip(finite, sizes, jumps, held, strict=True)
@@ -122,7 +124,7 @@ class MeasurementGate(eqx.Module):
         unreported = sum((~good).sum(dtype=float) for good in jax.tree.leaves(usable))
         y = y._replace(actuator=reported)
 
-        chosen = Motion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
+        chosen = MonitoredMotion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
 
         all_good = jnp.stack([one.all() for one in good]).all()
         missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
@@ -159,34 +161,34 @@ class MeasurementGate(eqx.Module):
             position=jnp.clip(expected.position, -self.max_distance, self.max_distance),
             velocity=jnp.clip(expected.velocity, -speed, speed),
         )
-        expected = Motion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, now, strict=True)))
+        expected = MonitoredMotion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, now, strict=True)))
         return GateState(expected, y.velocity, passed.stuck, passed.innovations, jnp.asarray(dt), y.actuator)
 
-    def _sizes(self, read: Motion) -> Motion:
+    def _sizes(self, read: MonitoredMotion) -> MonitoredMotion:
         """Sizes of readings relative to their limits."""
         velocity = _each(read.velocity, self.max_speed, self.max_rate)
-        return Motion(
+        return MonitoredMotion(
             jnp.abs(read.position) / self.max_distance, jnp.zeros_like(read.attitude), jnp.abs(read.velocity) / velocity
         )
 
-    def _jumps(self, read: Motion, expected: Motion) -> Motion:
+    def _jumps(self, read: MonitoredMotion, expected: MonitoredMotion) -> MonitoredMotion:
         """Differences between readings and predictions relative to their limits."""
         turn = jnp.zeros(0)
         if read.attitude.shape[0]:
             off = attitude_error(read.attitude, expected.attitude)
             turn = jnp.broadcast_to(length(off) / self.jump_angle, (4,))
-        return Motion(
+        return MonitoredMotion(
             jnp.abs(read.position - expected.position) / self.jump_position,
             turn,
             jnp.abs(read.velocity - expected.velocity) / _each(read.velocity, self.jump_velocity, self.jump_rate),
         )
 
 
-def _of_motion(read: Motion, outputs: Array, velocity: Array) -> Motion:
+def _of_motion(read: MonitoredMotion, outputs: Array, velocity: Array) -> MonitoredMotion:
     """Flags of outputs and velocities, as those of a motion: an attitude as a whole."""
     if not read.attitude.shape[0]:
-        return Motion(outputs, read.attitude, velocity)
-    return Motion(outputs[:3], jnp.broadcast_to(outputs[3:].max(), (4,)), velocity)
+        return MonitoredMotion(outputs, read.attitude, velocity)
+    return MonitoredMotion(outputs[:3], jnp.broadcast_to(outputs[3:].max(), (4,)), velocity)
 
 
 def _each(velocity: Array, linear: Any, angular: Any) -> Array:

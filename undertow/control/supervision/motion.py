@@ -13,7 +13,7 @@ from undertow.core.numerics.rotations import Kinematics, quaternion_rate
 _LEAST = 1e-30  # far below the square of any length that matters
 
 
-class Motion(NamedTuple):
+class MonitoredMotion(NamedTuple):
     """Motion of a vehicle, or the outputs of another plant and their rates."""
 
     position: Array  # m, world; or the outputs
@@ -21,14 +21,14 @@ class Motion(NamedTuple):
     velocity: Array  # m/s, rad/s, body axes; or the rates
 
 
-def motion_of(y: Measurement) -> Motion:
+def motion_of(y: Measurement) -> MonitoredMotion:
     """The motion that a measurement holds."""
     if y.body is None:
-        return Motion(y.position, jnp.zeros(0), y.velocity)
-    return Motion(y.position[:3], y.body.attitude, y.body.nu)
+        return MonitoredMotion(y.position, jnp.zeros(0), y.velocity)
+    return MonitoredMotion(y.position[:3], y.body.attitude, y.body.nu)
 
 
-def with_motion(y: Measurement, motion: Motion) -> Measurement:
+def with_motion(y: Measurement, motion: MonitoredMotion) -> Measurement:
     """The measurement with another motion."""
     if y.body is None:
         return y._replace(position=motion.position, velocity=motion.velocity)
@@ -36,21 +36,21 @@ def with_motion(y: Measurement, motion: Motion) -> Measurement:
 
 
 def rate_of_velocity(y: Measurement, coordinates: AbstractCoordinates, acceleration: Outputs) -> Outputs:
-    """Rate of `Motion.velocity` for an acceleration in the coordinates of a model."""
+    """Rate of `MonitoredMotion.velocity` for an acceleration in the coordinates of a model."""
     if y.body is None or coordinates.axes:
         return acceleration
     kinematics = Kinematics(y.body.rotation)
     return kinematics.to_body(acceleration - kinematics.rate_term(y.body.nu))
 
 
-def predicted(y: Measurement, acceleration: Outputs, dt: Number) -> Motion:
-    """Motion dt (s) after a measurement, for a rate of `Motion.velocity`."""
+def predicted(y: Measurement, acceleration: Outputs, dt: Number) -> MonitoredMotion:
+    """Motion dt (s) after a measurement, for a rate of `MonitoredMotion.velocity`."""
     motion = motion_of(y)
     attitude = motion.attitude
     if y.body is not None:
         turned = attitude + dt * quaternion_rate(attitude, y.body.nu[3:])
         attitude = turned / jnp.sqrt((turned * turned).sum())
-    return Motion(
+    return MonitoredMotion(
         motion.position + dt * y.velocity[: motion.position.shape[0]], attitude, motion.velocity + dt * acceleration
     )
 

@@ -32,7 +32,7 @@ class StuckState(NamedTuple):
     velocity_moved: Entries  # integral of the rates since then
 
 
-class Stuck(NamedTuple):
+class StuckFlags(NamedTuple):
     """Which readings are stuck: 1, else 0."""
 
     position: Entries  # outputs
@@ -85,7 +85,7 @@ class StuckReadings(eqx.Module):
             velocity_moved=jnp.where(moving, 0.0, state.velocity_moved + path),
         )
 
-    def found(self, state: StuckState) -> Stuck:
+    def found(self, state: StuckState) -> StuckFlags:
         """Which readings are stuck now."""
         turns = np.array(self.angles)
         limits = jnp.where(jnp.asarray(turns), self.angle, self.distance)
@@ -99,7 +99,7 @@ class StuckReadings(eqx.Module):
         together = jnp.where(jnp.asarray(turns), turned / self.angle, straight / self.distance)
         together = jnp.where(state.velocity_held >= self.readings, together, 0.0)
         one = lambda ratio: jnp.where(ratio > 1, 1.0, 0.0)
-        return Stuck(one(alone), one(together), jnp.maximum(alone.max(), together.max()))
+        return StuckFlags(one(alone), one(together), jnp.maximum(alone.max(), together.max()))
 
 
 def _finite(read: Array) -> Array:

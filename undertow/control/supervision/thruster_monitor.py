@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.control.supervision.fault_hypotheses import Bounds, missing_effect, one_thruster, two_thrusters
+from undertow.control.supervision.fault_hypotheses import FaultThresholds, missing_effect, one_thruster, two_thrusters
 from undertow.control.supervision.fault_onset import (
     OnsetState,
     cleared,
@@ -49,7 +49,7 @@ _STRAINED = 0.9
 _CHANGE = 20.0
 
 
-class Findings(NamedTuple):
+class ThrusterMonitorState(NamedTuple):
     """What the examinations keep."""
 
     onsets: OnsetState
@@ -75,7 +75,7 @@ class MonitorState(NamedTuple):
     residual: PerAxis  # rho behind the second low-pass, m/s^2, rad/s^2
     forces: Float[Array, "2 m"]  # nominal forces behind one and two low-passes, N
     wait: Float[Array, ""]  # time until the next examination, s
-    findings: Findings
+    findings: ThrusterMonitorState
     gradual: Series  # what is known of gradual onsets
 
     @property
@@ -174,7 +174,7 @@ class ThrusterMonitor(eqx.Module):
         actuators, zero, none = model.actuators.init(), jnp.zeros(()), jnp.zeros_like(self.largest)
         velocity = model.coordinates.velocity(y)
         axes, count = velocity.shape[0], none.shape[0]
-        findings = Findings(
+        findings = ThrusterMonitorState(
             onsets=onset_state(axes, count),
             wide_covariance=wide_covariance(axes),
             background=jnp.zeros_like(velocity),
@@ -249,7 +249,7 @@ class ThrusterMonitor(eqx.Module):
 
     def _examined(
         self,
-        past: Findings,
+        past: ThrusterMonitorState,
         gradual: Series,
         effect: Float[Array, "n m"],
         residual: PerAxis,
@@ -257,7 +257,7 @@ class ThrusterMonitor(eqx.Module):
         differs: PerActuator,
         used: PerActuator,
         elapsed: Float[Array, ""],
-    ) -> Findings:
+    ) -> ThrusterMonitorState:
         """Findings with one more residual.
 
         Args:
@@ -280,7 +280,7 @@ class ThrusterMonitor(eqx.Module):
             past.onsets, past.wide_covariance, scaled_residual, forces[0], scaled, error_share, learned
         )
         since = jnp.maximum(past.examinations, 1.0) * elapsed  # while it is short, the covariance is not well known
-        bounds = Bounds(
+        bounds = FaultThresholds(
             ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest
         )
         awake = past.quiet <= 0
@@ -310,7 +310,7 @@ class ThrusterMonitor(eqx.Module):
         forgotten = -jnp.expm1(-elapsed / self.background_time)
         steady = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
         weight = steady * jnp.minimum(1.0, _CLIP * len(slow) / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
-        return Findings(
+        return ThrusterMonitorState(
             onsets=cleared(onsets, raised),
             wide_covariance=covariance_of_wide,
             background=past.background + forgotten * (residual - past.background),
@@ -331,7 +331,7 @@ class ThrusterMonitor(eqx.Module):
     def _examined_rarely(
         self,
         series: Series,
-        past: Findings,
+        past: ThrusterMonitorState,
         effect: Float[Array, "n m"],
         residual: PerAxis,
         forces: PerActuator,
@@ -375,7 +375,7 @@ class ThrusterMonitor(eqx.Module):
         differs = jnp.where(jnp.abs(before - predicted) > allowed, 1.0, 0.0)
         return after, force, model.advance(state.unreported, u_applied, dt), differs
 
-    def _accumulated(self, past: Findings, ratio: Float[Array, "m m"], used: PerActuator, elapsed):
+    def _accumulated(self, past: ThrusterMonitorState, ratio: Float[Array, "m m"], used: PerActuator, elapsed):
         """Log-likelihood ratios one examination later, and 1 for the actuator, and for the pair, that stands out."""
         ratio = jnp.clip(ratio, -_CHANGE, _CHANGE) * (elapsed / self.correlation)
         summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)

@@ -24,7 +24,7 @@ class TransitionLog(NamedTuple):
     limit: Float[Array, " kept"]
 
 
-class Transition(NamedTuple):
+class SupervisorTransition(NamedTuple):
     """One transition, for people."""
 
     time: float  # s
@@ -58,9 +58,12 @@ def logged(log: TransitionLog, changed: Any, entry: tuple[Any, Any, Any, Any, An
     return jax.lax.cond(changed, written, lambda: log)
 
 
-def transitions(log: Any) -> Sequence[Transition]:
+def transitions(log: Any) -> Sequence[SupervisorTransition]:
     """The transitions of a log, oldest first; the last `KEPT` of them."""
     count, *columns = jax.tree.map(np.asarray, tuple(log))
     slots = [k % KEPT for k in range(max(0, int(count) - KEPT), int(count))]
     rows = ([column[slot] for column in columns] for slot in slots)
-    return [Transition(float(t), state_of(int(s)), reason_of(c), float(v), float(limit)) for t, s, c, v, limit in rows]
+    return [
+        SupervisorTransition(float(t), state_of(int(s)), reason_of(c), float(v), float(limit))
+        for t, s, c, v, limit in rows
+    ]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from undertow.core.errors import BadInput
-from undertow.outside.stepped_vehicle import State
+from undertow.outside.stepped_vehicle import VehicleOutputs
 from undertow.outside.thruster_channels import Channels
 
 # Magic number -> channels; the second with SERVO_32_ENABLE = 1.
@@ -50,7 +50,7 @@ class ServoPacket(NamedTuple):
         return cls(frame_rate, frame_count, tuple(pwm))
 
 
-def reply(timestamp: float, state: State, channels: Channels, depth: float = 0.0) -> bytes:
+def reply(timestamp: float, state: VehicleOutputs, channels: Channels, depth: float = 0.0) -> bytes:
     """The answer to a packet, between two line ends: ArduPilot takes what stands between the last two.
 
     There is no space in it: ArduPilot looks for a vector right behind the colon.

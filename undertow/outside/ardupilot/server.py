@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from undertow.core.errors import BadInput
 from undertow.outside.ardupilot.session import Session
-from undertow.outside.realtime.statistics import Durations
+from undertow.outside.realtime.loop_statistics import Durations
 
 PORT = 9002  # to which ArduPilot sends; 10 more for each further instance (-I1 sends to 9012)
 

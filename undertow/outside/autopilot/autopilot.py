@@ -13,7 +13,7 @@ import numpy as np
 from undertow.control.supervision.conditions import Request, reason_of, state_of
 from undertow.control.supervision.supervised_controller import SupervisedState, state_in, transfer
 from undertow.control.supervision.supervisor import largest_estimate
-from undertow.control.supervision.transition_log import Transition, transitions
+from undertow.control.supervision.transition_log import SupervisorTransition, transitions
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.authority import authority_of
@@ -21,11 +21,11 @@ from undertow.core.checks import numbers
 from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
-from undertow.outside.autopilot.clock import Clock
+from undertow.outside.autopilot.clock import StepClock
 from undertow.outside.autopilot.functions import Functions
-from undertow.outside.autopilot.measured_motion import Format, Motion
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 from undertow.outside.autopilot.output import output_of
-from undertow.outside.autopilot.saved_state import packed, unpacked
+from undertow.outside.autopilot.saved_state import packed, restore_arrays
 from undertow.outside.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.physics.power.esc import ESC
 from undertow.scenario.build import Built, build
@@ -116,7 +116,7 @@ class Autopilot(Uncopied):
         with runtime.on_processor(), runtime.in_precision(precision):
             self._compile(Functions(loop, form, conversion))
             self._largest_estimate = _largest_estimate(loop)
-        self._clock = Clock(self.sampling_time)
+        self._clock = StepClock(self.sampling_time)
         self._command, self._before = np.zeros_like(self._convert.inputs), np.zeros_like(self._convert.inputs)
         self._blended, self._started, self._broken = (np.zeros((), dtype=bool) for _ in range(3))
         self._restarts = np.zeros((), dtype=int)
@@ -193,7 +193,7 @@ class Autopilot(Uncopied):
             BadInput: a shape is wrong, or a number is not finite, or the law's command is not: then call `start` again.
         """
         motion = self._motion(position, velocity, attitude)
-        for name, value in zip(Motion._fields, motion, strict=True):
+        for name, value in zip(MeasuredMotion._fields, motion, strict=True):
             checks.finite(name, value)
         if _is_no_rotation(motion.attitude):
             raise BadInput(
@@ -313,8 +313,7 @@ class Autopilot(Uncopied):
         Raises:
             BadInput: it is damaged, or of another controller; everything stays as it was.
         """
-        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
-            place[...] = value
+        restore_arrays(self._kept(), state, self._identity())
 
     def _kept(self) -> list[np.ndarray]:
         """Everything that changes from step to step."""
@@ -382,7 +381,7 @@ class Autopilot(Uncopied):
         state, reason = self.state
         return f"{state} ({reason})" if reason else state
 
-    def transitions(self) -> Sequence[Transition]:
+    def transitions(self) -> Sequence[SupervisorTransition]:
         """The last transitions of the supervisor, oldest first.
 
         Raises:
@@ -412,9 +411,9 @@ class Autopilot(Uncopied):
         command = Signal(("actuator",), self._loop.plant.input_unit, "input that the law commands")
         return {"command": command} | self._loop.controller.signals()
 
-    def _motion(self, position: Any, velocity: Any, attitude: Any) -> Motion:
-        given = zip(Motion._fields, (position, attitude, velocity), self._shapes, strict=True)
-        return Motion(*(numbers(name, value, shape) for name, value, shape in given))
+    def _motion(self, position: Any, velocity: Any, attitude: Any) -> MeasuredMotion:
+        given = zip(MeasuredMotion._fields, (position, attitude, velocity), self._shapes, strict=True)
+        return MeasuredMotion(*(numbers(name, value, shape) for name, value, shape in given))
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""

@@ -12,7 +12,7 @@ _NEVER = 1e9  # s: no time between two steps
 _COUNTS = ("steps", "late", "missed", "repeated")
 
 
-class Clock:
+class StepClock:
     """Counts steps and tells how much time has passed.
 
     Args:

@@ -8,13 +8,13 @@ import numpy as np
 
 from undertow.core.contracts import AbstractController, Measurement, Target
 from undertow.core.numerics.random_keys import key_of_seed
-from undertow.outside.autopilot.measured_motion import Format, Motion
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 from undertow.outside.autopilot.output import Output
 from undertow.simulation.loop.closed_loop import ClosedLoop
-from undertow.simulation.loop.controller_step import Answer, Memory, first_step, next_step
+from undertow.simulation.loop.controller_step import Answer, ControllerMemory, first_step, next_step
 
 
-class Given(NamedTuple):
+class StepInputs(NamedTuple):
     """What a step is given.
 
     Attributes:
@@ -24,7 +24,7 @@ class Given(NamedTuple):
         health: of the actuators, see `Measurement`; None for a loop in which none announces anything.
     """
 
-    motion: Motion
+    motion: MeasuredMotion
     actuator: Any
     target: Target
     health: Any = None
@@ -50,24 +50,24 @@ class Functions:
         kind = jax.dtypes.canonicalize_dtype(float)
         number = lambda shape: np.zeros(shape, dtype=kind)
         zero: Any = number(len(loop.plant.outputs))
-        motion = Motion(zero, number(0), zero)
+        motion = MeasuredMotion(zero, number(0), zero)
         if self.form is not None:
             names = form.columns()
             upright = np.array([float(name == "w") for name in names.attitude], dtype=kind)
-            motion = Motion(number(3), upright, number(len(names.velocity)))
+            motion = MeasuredMotion(number(3), upright, number(len(names.velocity)))
         actuator = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), truth.actuator)
-        self.given = Given(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
+        self.given = StepInputs(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
         self.applied, self.time = number(loop.plant.inputs()), number(())
 
-    def first(self, law: AbstractController, given: Given) -> tuple[Memory, Answer]:
+    def first(self, law: AbstractController, given: StepInputs) -> tuple[ControllerMemory, Answer]:
         """The step with which control begins."""
         return first_step(law, self._measured(law, given), given.target)
 
-    def following(self, law: AbstractController, memory: Memory, given: Given, applied: Any, dt: Any):
+    def following(self, law: AbstractController, memory: ControllerMemory, given: StepInputs, applied: Any, dt: Any):
         """A step `dt` (s) after the last one."""
         return next_step(law, memory, self._measured(law, given), given.target, applied, dt)
 
-    def _measured(self, law: AbstractController, given: Given):
+    def _measured(self, law: AbstractController, given: StepInputs):
         measured = given.motion.measurement(law.model.coordinates, self.form, given.actuator)
         return measured._replace(health=given.health)
 

@@ -58,11 +58,11 @@ class Format(NamedTuple):
         if (self.attitude == "both") != (self.velocity == "both"):
             raise BadInput("attitude", "be `both` where velocity is, and only there", self.attitude)
 
-    def columns(self) -> "Motion":
+    def columns(self) -> "MeasuredMotion":
         """Names of the numbers of a motion."""
-        return Motion(BODY_OUTPUTS[:3], _ATTITUDES[self.attitude], _VELOCITIES[self.velocity])
+        return MeasuredMotion(BODY_OUTPUTS[:3], _ATTITUDES[self.attitude], _VELOCITIES[self.velocity])
 
-    def measurement(self, motion: "Motion", actuator: Any) -> Measurement:
+    def measurement(self, motion: "MeasuredMotion", actuator: Any) -> Measurement:
         """The measurement of a body from its motion in this format."""
         position, attitude, velocity = motion
         if self.attitude == "both":
@@ -89,7 +89,7 @@ class Format(NamedTuple):
         return Measurement(outputs, rates, actuator, BodyMotion(quaternion, rotation, nu))
 
 
-class Motion(NamedTuple):
+class MeasuredMotion(NamedTuple):
     """A measured motion: that of a vehicle in a `Format`, or the outputs of another plant and their rates."""
 
     position: Any  # m, north, east, down; or all outputs
@@ -103,11 +103,11 @@ class Motion(NamedTuple):
         return form.measurement(self, actuator)
 
 
-def motion_in(form: Format | None, measurement: Measurement) -> Motion:
-    """A measurement as a motion in a format: what `Motion.measurement` turns back."""
+def motion_in(form: Format | None, measurement: Measurement) -> MeasuredMotion:
+    """A measurement as a motion in a format: what `MeasuredMotion.measurement` turns back."""
     position, velocity, body = measurement.position, measurement.velocity, measurement.body
     if form is None or body is None:
-        return Motion(position, jnp.zeros(0), velocity)
+        return MeasuredMotion(position, jnp.zeros(0), velocity)
     world = jnp.concatenate([matvec(body.rotation, body.nu[:3]), matvec(body.rotation, body.nu[3:])])
     attitudes = {
         "euler": position[3:],
@@ -115,7 +115,7 @@ def motion_in(form: Format | None, measurement: Measurement) -> Motion:
         "both": jnp.concatenate([position[3:], body.attitude]),
     }
     velocities = {"body": body.nu, "world": world, "rates": velocity, "both": jnp.concatenate([velocity, body.nu])}
-    return Motion(position[:3], attitudes[form.attitude], velocities[form.velocity])
+    return MeasuredMotion(position[:3], attitudes[form.attitude], velocities[form.velocity])
 
 
 def _unit(quaternion: Float[Array, "4"]) -> Float[Array, "4"]:

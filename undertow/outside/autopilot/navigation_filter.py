@@ -13,9 +13,9 @@ from undertow.core import checks, runtime
 from undertow.core.checks import numbers
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.logs.frames import attitudes_of_quaternions, quaternions
-from undertow.outside.autopilot.clock import Clock
+from undertow.outside.autopilot.clock import StepClock
 from undertow.outside.autopilot.filter_functions import EstimatedMotion, FilterFunctions
-from undertow.outside.autopilot.saved_state import packed, unpacked
+from undertow.outside.autopilot.saved_state import packed, restore_arrays
 from undertow.outside.autopilot.step_log import StepLog, filter_signals
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
@@ -67,7 +67,7 @@ class NavigationFilter(Uncopied):
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
         self.sampling_time = built.scenario.loop.dt
-        self._clock, self._started = Clock(self.sampling_time), np.zeros((), dtype=bool)
+        self._clock, self._started = StepClock(self.sampling_time), np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))
         declared, values = self.declared_signals(), self._go_on.outputs.signals
@@ -171,8 +171,7 @@ class NavigationFilter(Uncopied):
         Raises:
             BadInput: it is damaged, or of another filter; everything stays as it was.
         """
-        for place, value in zip(self._kept(), unpacked(state, self._identity(), self._kept()), strict=True):
-            place[...] = value
+        restore_arrays(self._kept(), state, self._identity())
 
     def _kept(self) -> list[np.ndarray]:
         steps = jax.tree.leaves((self._go_on.state, self._go_on.outputs))

@@ -41,3 +41,13 @@ def unpacked(state: Any, identity: bytes, like: Sequence[np.ndarray]) -> list[np
     ends_at = np.cumsum([head, *sizes])
     parts = [whole[start:end] for start, end in itertools.pairwise(ends_at)]
     return [np.frombuffer(part, array.dtype).reshape(array.shape) for part, array in zip(parts, like, strict=True)]
+
+
+def restore_arrays(arrays: Sequence[np.ndarray], state: Any, identity: bytes) -> None:
+    """Write the numbers that `packed` made into arrays like those it was given.
+
+    Raises:
+        BadInput: see `unpacked`; then all arrays stay as they were.
+    """
+    for array, value in zip(arrays, unpacked(state, identity, arrays), strict=True):
+        array[...] = value

@@ -18,7 +18,7 @@ from undertow.logs.background_writer import BackgroundWriter
 from undertow.logs.known_signals import SIGNALS, thruster_columns
 from undertow.logs.log_signals import Series
 from undertow.logs.mcap_writer import LiveLog
-from undertow.outside.autopilot.measured_motion import Format, Motion
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 
 _STEPS = {
     "measured_position": Signal(("axis",), "[axis]", "position that the controller receives"),
@@ -52,7 +52,7 @@ class ReceivedStep(NamedTuple):
         elapsed: time since the last step, s; 0 at a start.
     """
 
-    motion: Motion
+    motion: MeasuredMotion
     actuator: Any
     target: Target
     health: Any
@@ -61,7 +61,7 @@ class ReceivedStep(NamedTuple):
 
     def numbers(self) -> dict[str, Any]:
         """The numbers by name of the signal; reports of several kinds one behind the other."""
-        found = {f"received_{name}": value for name, value in zip(Motion._fields, self.motion, strict=True)}
+        found = {f"received_{name}": value for name, value in zip(MeasuredMotion._fields, self.motion, strict=True)}
         reports = jax.tree.leaves(self.actuator)
         if reports:
             found["received_report"] = np.concatenate([np.ravel(one) for one in reports])
@@ -183,8 +183,8 @@ def received_signals(plant: AbstractPlant, form: Format | None, numbers: Mapping
         numbers: examples, of `ReceivedStep.numbers`.
     """
     outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
-    names = Motion(outputs, (), outputs) if form is None else form.columns()
-    columns = {f"received_{name}": found for name, found in zip(Motion._fields, names, strict=True)}
+    names = MeasuredMotion(outputs, (), outputs) if form is None else form.columns()
+    columns = {f"received_{name}": found for name, found in zip(MeasuredMotion._fields, names, strict=True)}
     columns |= dict.fromkeys(("reference_velocity", "reference_acceleration"), outputs)
     columns |= dict.fromkeys(("received_health", "applied_input"), inputs)
     made = lambda name, value: Series(

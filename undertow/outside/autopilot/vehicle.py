@@ -15,7 +15,7 @@ from undertow.core.contracts import Measurement
 from undertow.core.numerics.integrators import COMPACT_METHODS
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.status import Status
-from undertow.outside.autopilot.measured_motion import Format, Motion, motion_in
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion, motion_in
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.plants.pulse_input import applied_voltage, pulse_driven
 from undertow.physics.power.esc import ESC
@@ -58,7 +58,7 @@ class VehicleOutput(NamedTuple):
     applied: Any
     propellers: Any
     health: Any
-    truth: Motion
+    truth: MeasuredMotion
     specific_force: Any
     status: Status
 
@@ -80,8 +80,8 @@ class _Shown(NamedTuple):
     """Outputs of a step."""
 
     observation: PlantObservation
-    measured: Motion
-    truth: Motion
+    measured: MeasuredMotion
+    truth: MeasuredMotion
     specific_force: Any
 
 

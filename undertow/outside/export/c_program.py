@@ -15,7 +15,7 @@ import numpy as np
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.simulation.loop.simd_batch import Unsupported, unavailable
-from undertow.simulation.loop.stepped import Step, put
+from undertow.simulation.loop.stepped import CompiledStep, put
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
 _TAKEN = ("test", "example", "clean")  # a file of this name would be overwritten, or a target of the Makefile
@@ -46,7 +46,7 @@ class System(NamedTuple):
     period: float
 
 
-class Function(NamedTuple):
+class CFunction(NamedTuple):
     """A further function (t) -> outputs of a program, `NAME_what(t, output)`, and the struct of its outputs."""
 
     what: str
@@ -90,7 +90,7 @@ class Exported(NamedTuple):
             write_whole(folder / name, content)
 
 
-class Program:
+class CProgram:
     """The C program of a system.
 
     Attributes:
@@ -103,7 +103,7 @@ class Program:
         Unsupported: the system needs an operation that the batch compiler has no rule for.
     """
 
-    def __init__(self, system: System, functions: Sequence[Function] = ()):
+    def __init__(self, system: System, functions: Sequence[CFunction] = ()):
         if not _NAME.fullmatch(system.name):
             raise BadInput("name", "be lower-case letters, digits and underscores, at most 31", repr(system.name))
         if system.name in _TAKEN:
@@ -159,7 +159,7 @@ class Program:
             further="\n".join(further) + "\n" if further else "",
         )
 
-    def _signature(self, one: Function) -> str:
+    def _signature(self, one: CFunction) -> str:
         name = self.system.name
         return f"void {name}_{one.what}({self.kind} t, {name}_{one.struct} *{one.struct})"
 
@@ -179,8 +179,8 @@ class Program:
         """Random steps and what the batch compiler gives for them."""
         system, chance = self.system, np.random.default_rng(0)
         kept = jax.tree.map(lambda leaf: np.zeros(leaf.shape, leaf.dtype), self._state)
-        first = Step(lambda _, __, given: ((), system.start(given)), (), (), system.inputs)
-        later = Step(lambda _, state, given: system.step(state, given), (), kept, system.inputs)
+        first = CompiledStep(lambda _, __, given: ((), system.start(given)), (), (), system.inputs)
+        later = CompiledStep(lambda _, state, given: system.step(state, given), (), kept, system.inputs)
         given, results = [], []
         for k in range(_VECTORS):
             taken, inputs = (later if k else first), system.sample(chance, k)

@@ -11,10 +11,10 @@ from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import starting_at
 from undertow.core.errors import BadInput
 from undertow.outside.autopilot.clock import MISSED
-from undertow.outside.autopilot.functions import Functions, Given
+from undertow.outside.autopilot.functions import Functions, StepInputs
 from undertow.outside.autopilot.measured_motion import Format
 from undertow.outside.autopilot.output import output_of
-from undertow.outside.export.c_program import Exported, Function, Program, System, made_from
+from undertow.outside.export.c_program import CFunction, CProgram, Exported, System, made_from
 from undertow.physics.power.esc import ESC
 from undertow.scenario.build import Built
 from undertow.simulation.loop.simd_batch import Unsupported
@@ -89,7 +89,7 @@ def functions_of(built: Built, form: Format, output: str = "input", esc: ESC | N
     return Functions(loop, form, output_of(output, loop.plant, loop.controller, esc))
 
 
-def controller_program(built: Built, name: str, of: Functions) -> Program:
+def controller_program(built: Built, name: str, of: Functions) -> CProgram:
     """The C program of a controller, in the present precision.
 
     Raises:
@@ -97,9 +97,9 @@ def controller_program(built: Built, name: str, of: Functions) -> Program:
     """
     reference = starting_at(of.reference, of.given.target.position)
     target = "Target of the scenario's reference at a time."
-    further = Function("reference", "target", target, reference.at, "Target of the scenario's reference at t, s.")
+    further = CFunction("reference", "target", target, reference.at, "Target of the scenario's reference at t, s.")
     try:
-        return Program(_system(built, name, of), [further])
+        return CProgram(_system(built, name, of), [further])
     except Unsupported as error:
         must = "be made of operations that the batch compiler has"
         raise BadInput("controller", must, f"one that needs others: {error}") from None
@@ -113,7 +113,7 @@ def _system(built: Built, name: str, of: Functions) -> System:
         return memory, ControllerOutput(answer.command, of.output.of(answer.command))
 
     def start(inputs: ControllerInput):
-        return answered(*of.first(of.controller, Given(*inputs[:4])))
+        return answered(*of.first(of.controller, StepInputs(*inputs[:4])))
 
     def step(memory, inputs: ControllerInput):
         """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was.
@@ -121,11 +121,11 @@ def _system(built: Built, name: str, of: Functions) -> System:
         A supervisor gets the time as it is.
         """
         if of.controller.takes_raw_readings:
-            return answered(*of.following(of.controller, memory, Given(*inputs[:4]), inputs.applied, inputs.dt))
+            return answered(*of.following(of.controller, memory, StepInputs(*inputs[:4]), inputs.applied, inputs.dt))
         usual = jnp.asarray(period, dtype=inputs.dt.dtype)
         passed = (inputs.dt > 0) & (inputs.dt < jnp.inf)
         elapsed = jnp.where(passed, jnp.minimum(inputs.dt, MISSED * usual), usual)
-        after, answer = answered(*of.following(of.controller, memory, Given(*inputs[:4]), inputs.applied, elapsed))
+        after, answer = answered(*of.following(of.controller, memory, StepInputs(*inputs[:4]), inputs.applied, elapsed))
         return jax.tree.map(lambda new, old: jnp.where(passed, new, old), after, memory), answer
 
     def sample(chance: np.random.Generator, _: int) -> ControllerInput:

@@ -27,7 +27,7 @@ from undertow.outside.autopilot.measured_motion import Format
 from undertow.outside.export.c_program import Exported
 from undertow.outside.export.controller import checked, controller_program, functions_of
 from undertow.outside.export.fmu_sources import sources_of
-from undertow.outside.export.model_description import Unit, model_description
+from undertow.outside.export.model_description import ModelDescription, model_description
 from undertow.outside.export.variables import Names, Variable, group, signals
 from undertow.outside.export.vehicle import numbers_of, vehicle_program
 from undertow.physics.power.esc import ESC
@@ -140,7 +140,7 @@ def compiled(sources: Mapping[str, str], name: str) -> tuple[bytes | None, str]:
         return (Path(folder) / f"{name}.so").read_bytes(), ""
 
 
-def _archive(sources: Mapping[str, str], unit: Unit, library: bytes | None) -> bytes:
+def _archive(sources: Mapping[str, str], unit: ModelDescription, library: bytes | None) -> bytes:
     """The archive; the same parts give the same bytes."""
     contents: dict[str, bytes] = {
         "modelDescription.xml": model_description(unit, f"undertow {version('undertow')}").encode()

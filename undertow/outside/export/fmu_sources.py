@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from undertow.core.status import Status
-from undertow.outside.export.c_program import Program
-from undertow.outside.export.model_description import Unit
+from undertow.outside.export.c_program import CProgram
+from undertow.outside.export.model_description import ModelDescription
 from undertow.outside.export.variables import Variable
 
 _HERE = Path(__file__).parent
 _ROLES = {role: f"FMU_{role.upper()}" for role in ("output", "input", "measured", "parameter", "tunable")}
 
 
-def sources_of(program: Program, variables: Sequence[Variable], duration: float) -> tuple[dict[str, str], Unit]:
+def sources_of(
+    program: CProgram, variables: Sequence[Variable], duration: float
+) -> tuple[dict[str, str], ModelDescription]:
     """The files of the folder `sources`, and the unit."""
     system = program.system
     rows = ",\n    ".join(_row(program, one) for one in variables)
@@ -30,10 +32,10 @@ def sources_of(program: Program, variables: Sequence[Variable], duration: float)
     guid, identity = f"{{{uuid.UUID(bytes=digest[:16])}}}", int.from_bytes(digest[16:24], "little")
     sources["fmu_model.h"] = model.replace("@GUID@", guid).replace("@IDENTITY@", f"{identity}ULL")
     compiled_ones = [name for name in sources if name.endswith(".c")]
-    return sources, Unit(system.name, guid, system.about, variables, compiled_ones, system.period, duration)
+    return sources, ModelDescription(system.name, guid, system.about, variables, compiled_ones, system.period, duration)
 
 
-def _row(program: Program, one: Variable) -> str:
+def _row(program: CProgram, one: Variable) -> str:
     """The row of a variable in the table in C."""
     struct, member, index = one.place
     place = f"offsetof(fmu_model, {member if struct == 'model' else struct})"

@@ -33,7 +33,7 @@ _ROLES = {  # causality, variability, initial
 }
 
 
-class Unit(NamedTuple):
+class ModelDescription(NamedTuple):
     """What is described.
 
     Attributes:
@@ -55,7 +55,7 @@ class Unit(NamedTuple):
     duration: float
 
 
-def model_description(unit: Unit, tool: str) -> str:
+def model_description(unit: ModelDescription, tool: str) -> str:
     """The file's text; `tool` made the unit."""
     root = ET.Element(
         "fmiModelDescription",

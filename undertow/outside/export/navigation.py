@@ -10,7 +10,7 @@ from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import checks, runtime
 from undertow.core.errors import BadInput
 from undertow.outside.autopilot.filter_functions import EstimatedMotion, FilterFunctions
-from undertow.outside.export.c_program import Exported, Program, System, check_compiler, made_from
+from undertow.outside.export.c_program import CProgram, Exported, System, check_compiler, made_from
 from undertow.physics.sensors.received import Received
 from undertow.scenario.build import Built
 from undertow.simulation.loop.simd_batch import Unsupported
@@ -44,7 +44,7 @@ def export_navigation(built: Built, name: str = "navigation", *, precision: str 
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
 
-def navigation_program(built: Built, name: str) -> Program:
+def navigation_program(built: Built, name: str) -> CProgram:
     """The C program of a navigation filter, in the present precision.
 
     Raises:
@@ -55,7 +55,7 @@ def navigation_program(built: Built, name: str) -> Program:
     if not isinstance(navigation, SensorNavigation):
         raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
     try:
-        return Program(_system(built, name, FilterFunctions(navigation.filter, built.closed_loop.plant)))
+        return CProgram(_system(built, name, FilterFunctions(navigation.filter, built.closed_loop.plant)))
     except Unsupported as error:
         must = "be made of operations that the batch compiler has"
         raise BadInput("navigation", must, f"one that needs others: {error}") from None

@@ -16,10 +16,10 @@ from undertow.core.numerics.integrators import COMPACT_METHODS
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.signals import Signal
 from undertow.core.status import Status
-from undertow.outside.autopilot.measured_motion import Format, Motion, motion_in
-from undertow.outside.export.c_program import Exported, Program, System, check_compiler, has_counterpart, made_from
+from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion, motion_in
+from undertow.outside.export.c_program import CProgram, Exported, System, check_compiler, has_counterpart, made_from
 from undertow.outside.export.controller import checked, described
-from undertow.physics.disturbances.adding import Together
+from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.scenario.build import Built
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.outcome import status_of
@@ -29,7 +29,7 @@ from undertow.simulation.loop.simd_batch import Unsupported, realized_disturbanc
 _SPREAD = 2.0  # of the random commands of a test, V
 
 
-class Initial(NamedTuple):
+class InitialOutputs(NamedTuple):
     """Outputs of the plant at the start, and their rates."""
 
     position: Any
@@ -39,7 +39,7 @@ class Initial(NamedTuple):
 class ExportedVehicleInput(NamedTuple):
     """Input of a step: start, command, force and moment from outside, and time at which the step begins."""
 
-    initial: Initial
+    initial: InitialOutputs
     command: Any
     external_wrench: Any
     t: Any
@@ -51,7 +51,7 @@ class ExportedVehicleOutput(NamedTuple):
     `signals` are those numbers that the plant declares, such as the voltage of a battery.
     """
 
-    motion: Motion
+    motion: MeasuredMotion
     actuator: Any
     applied: Any
     status: Any
@@ -84,7 +84,7 @@ def export_vehicle(
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
 
-def vehicle_program(built: Built, name: str, form: Format) -> Program:
+def vehicle_program(built: Built, name: str, form: Format) -> CProgram:
     """The C program of a plant under its disturbance, in the present precision.
 
     Raises:
@@ -98,7 +98,7 @@ def vehicle_program(built: Built, name: str, form: Format) -> Program:
     realization = None
     try:
         realization = jax.tree.map(jnp.asarray, realized_disturbance(loop, key_of_seed(built.scenario.seed)))
-        return Program(_system(built, name, loop, form, realization))
+        return CProgram(_system(built, name, loop, form, realization))
     except Unsupported as error:
         where = "disturbance" if realization is None else _not_exported(loop, realization, built) or "plant"
         must = "be made of operations that the batch compiler has"
@@ -112,7 +112,7 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     given = built.scenario.initial
     at = lambda values: zero if values is None else np.asarray(values)
     kind = jax.dtypes.canonicalize_dtype(float)
-    whole = ExportedVehicleInput(Initial(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
+    whole = ExportedVehicleInput(InitialOutputs(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
     inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), whole)
     integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
 
@@ -181,8 +181,8 @@ class _WithOutsideWrench(AbstractDisturbance):
 
 def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:
     """Key of the disturbance that has no counterpart in C; "" where all have one."""
-    several = isinstance(loop.disturbance, Together)
-    members = loop.disturbance.members if isinstance(loop.disturbance, Together) else (loop.disturbance,)
+    several = isinstance(loop.disturbance, SumOfDisturbances)
+    members = loop.disturbance.members if isinstance(loop.disturbance, SumOfDisturbances) else (loop.disturbance,)
     realized = realization if several else (realization,)
     parts = built.scenario.disturbance if isinstance(built.scenario.disturbance, list) else [built.scenario.disturbance]
     x = loop.plant.initial_state()

@@ -18,7 +18,7 @@ import gymnasium
 
 from undertow.outside.gymnasium.env import Env as Env
 from undertow.outside.gymnasium.env import make as make
-from undertow.outside.gymnasium.episodes import Cost as Cost
+from undertow.outside.gymnasium.episodes import QuadraticCost as QuadraticCost
 from undertow.outside.gymnasium.stable_baselines import for_stable_baselines as for_stable_baselines
 from undertow.outside.gymnasium.vector_env import VectorEnv as VectorEnv
 from undertow.outside.gymnasium.vector_env import make_vec as make_vec

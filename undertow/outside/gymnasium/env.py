@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
-from undertow.outside.gymnasium.episodes import Cost, Episodes, Seen
+from undertow.outside.gymnasium.episodes import Episodes, EpisodeStep, QuadraticCost
 from undertow.outside.gymnasium.shown import shown
 from undertow.outside.gymnasium.variants import Vary
 from undertow.simulation.loop.stepped import Uncopied
@@ -21,13 +21,13 @@ _SEEDS = 2**32  # of runs
 class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
     """A vehicle, or another plant, whose inputs an agent chooses at every sampling time.
 
-    Observations and actions are described at `PolicyInterface`, the reward at `Cost`. An episode is `terminated` where
-    the run fails (it diverges, a state is not finite, ...; `info["status"]` says which) and `truncated` at the duration
-    of the scenario. `reset(seed=n)` begins the run that the scenario has with `seed: n`; without a seed the next one
-    follows from the one before.
+    Observations and actions are described at `PolicyInterface`, the reward at `QuadraticCost`. An episode is
+    `terminated` where the run fails (it diverges, a state is not finite, ...; `info["status"]` says which) and
+    `truncated` at the duration of the scenario. `reset(seed=n)` begins the run that the scenario has with `seed: n`;
+    without a seed the next one follows from the one before.
 
-    Arguments are those of `Episodes`, without `count`, and how numbers are shown (see `Shown`): `float32` whatever the
-    precision of the scenario, `normalised` observations, and the `reward`.
+    Arguments are those of `Episodes`, without `count`, and how numbers are shown (see `AgentInterface`): `float32`
+    whatever the precision of the scenario, `normalised` observations, and the `reward`.
     """
 
     _instead = "Make another one, `reset` it with the same seed, and give it the same actions"
@@ -39,7 +39,7 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         *,
         action: str = "normalised",
         scale: Any = None,
-        cost: Cost | Mapping[str, float] | None = None,
+        cost: QuadraticCost | Mapping[str, float] | None = None,
         vary: Vary | None = None,
         variants: int = 64,
         allow_code: bool = False,
@@ -101,7 +101,7 @@ def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     return found
 
 
-def info_of(seen: Seen, number: int) -> dict[str, Any]:
+def info_of(seen: EpisodeStep, number: int) -> dict[str, Any]:
     """What the agent does not observe: true outputs, tracking error, and the status of the run."""
     status = Status(int(seen.status[number]))
     return {"position": seen.position[number], "error": seen.error[number], "status": status.word}

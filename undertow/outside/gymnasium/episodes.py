@@ -26,10 +26,10 @@ from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.outcome import Ending, going
 from undertow.simulation.loop.plant_step import PlantState
 from undertow.simulation.loop.recording import freeze_on_failure, instant
-from undertow.simulation.loop.stepped_batch import BatchStep, Starter
+from undertow.simulation.loop.stepped_batch import CompiledBatchStep, Starter
 
 
-class Cost(NamedTuple):
+class QuadraticCost(NamedTuple):
     """Quadratic cost of a step, whose negative is the reward.
 
     |e_p|^2 / position^2 + |e_a|^2 / angle^2 + effort mean(a^2) + variation mean((a - a_before)^2), with the tracking
@@ -55,11 +55,11 @@ class Cost(NamedTuple):
             checks.not_negative(f"cost.{name}", getattr(self, name))
 
 
-class Plan(NamedTuple):
+class EpisodeSettings(NamedTuple):
     """What all episodes share, and what is not traced."""
 
     interface: PolicyInterface
-    cost: Cost
+    cost: QuadraticCost
     dt: float
     method: str
     substeps: int
@@ -83,7 +83,7 @@ class _State(NamedTuple):
     ending: Ending
 
 
-class Seen(NamedTuple):
+class EpisodeStep(NamedTuple):
     """What a step shows, with a leading axis over episodes."""
 
     observation: Any
@@ -123,7 +123,7 @@ class Episodes:
         count: int,
         action: str = "normalised",
         scale: Any = None,
-        cost: Cost | Mapping[str, float] | None = None,
+        cost: QuadraticCost | Mapping[str, float] | None = None,
         vary: Vary | None = None,
         variants: int = 64,
         allow_code: bool = False,
@@ -140,13 +140,13 @@ class Episodes:
         with runtime.on_processor(), runtime.in_precision(self._precision):
             model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model.options, folder=text.folder)
             self.interface = policy_interface_of(model, action, scale)
-            plan = Plan(self.interface, weights, settings.dt, settings.method, settings.substeps)
+            plan = EpisodeSettings(self.interface, weights, settings.dt, settings.method, settings.substeps)
             found, constant = variants_of(built, vary or {}, variants)
             leaves = [jax.tree.leaves(eqx.filter(one, eqx.is_array)) for one in found]
             self._numbers = [np.stack(column) for column in zip(*leaves, strict=True)]
             self._compile(plan, _Known(*found[0], key_of_seed(0)), constant, count)
 
-    def _compile(self, plan: Plan, known: _Known, constant: list[bool], count: int) -> None:
+    def _compile(self, plan: EpisodeSettings, known: _Known, constant: list[bool], count: int) -> None:
         arrays, rest = eqx.partition(known, eqx.is_array)
         whole = lambda arrays: eqx.combine(arrays, rest)
         self._form = jax.tree.structure(arrays)
@@ -167,10 +167,10 @@ class Episodes:
         self._same = [*constant[:of_loop], *[False] * (len(jax.tree.leaves(realized)) - of_loop)]
         action = np.asarray(plan.interface.first())
         function = lambda realized, state, action: _step(plan, eqx.combine(realized, still), state, action)
-        self._stepper = BatchStep(function, realized, state, action, count, self._same)
+        self._stepper = CompiledBatchStep(function, realized, state, action, count, self._same)
         self.backend = self._stepper.backend
 
-    def start(self, seeds: NDArray, which: NDArray) -> Seen:
+    def start(self, seeds: NDArray, which: NDArray) -> EpisodeStep:
         """Begin episodes.
 
         Args:
@@ -186,13 +186,13 @@ class Episodes:
         self._stepper.put("state", state, which)
         return seen
 
-    def step(self, actions: NDArray) -> Seen:
+    def step(self, actions: NDArray) -> EpisodeStep:
         """One step of every episode; those that have failed stay as they are."""
         self._stepper.put("inputs", actions)
         return self._stepper()
 
 
-def _begin(plan: Plan, realization: Realization, start: Any) -> tuple[_State, Seen]:
+def _begin(plan: EpisodeSettings, realization: Realization, start: Any) -> tuple[_State, EpisodeStep]:
     zero, action = jnp.zeros(()), plan.interface.first()
     vehicle, seen = plant_step.begin(realization, start)
     r = realization.loop.reference.at(zero)
@@ -200,10 +200,10 @@ def _begin(plan: Plan, realization: Realization, start: Any) -> tuple[_State, Se
     observation = _observed(plan, seen.measurement, r, action, blank)
     state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), going())
     error = plan.interface.coordinates.difference(r.position, seen.truth.position)
-    return state, Seen(observation, zero, state.ending.status, seen.truth.position, error)
+    return state, EpisodeStep(observation, zero, state.ending.status, seen.truth.position, error)
 
 
-def _step(plan: Plan, realization: Realization, state: _State, action: Any) -> tuple[_State, Seen]:
+def _step(plan: EpisodeSettings, realization: Realization, state: _State, action: Any) -> tuple[_State, EpisodeStep]:
     """As `sampled.control_step`, with the command of an action in place of a law's."""
     loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
     t, before = instant(state.step, dt), state.vehicle
@@ -221,16 +221,16 @@ def _step(plan: Plan, realization: Realization, state: _State, action: Any) -> t
     failing = (ending.status != int(Status.OK)) & (state.ending.status == int(Status.OK))
     reward = -_cost_of(plan, error, action, state.action) - plan.cost.failure * failing.astype(float)
     new = _State(vehicle, action, observation, state.step + 1, ending)
-    return new, Seen(observation, reward, ending.status, seen.truth.position, error)
+    return new, EpisodeStep(observation, reward, ending.status, seen.truth.position, error)
 
 
-def _observed(plan: Plan, y: Any, r: Any, action: Any, before: Any) -> Any:
+def _observed(plan: EpisodeSettings, y: Any, r: Any, action: Any, before: Any) -> Any:
     """The observation; entries that are not finite were not measured, and are those of the observation before."""
     found = plan.interface.observation(y, r, action)
     return jnp.where(jnp.isfinite(found), found, before)
 
 
-def _cost_of(plan: Plan, error: Any, action: Any, before: Any) -> Any:
+def _cost_of(plan: EpisodeSettings, error: Any, action: Any, before: Any) -> Any:
     low, high = map(jnp.asarray, plan.interface.action_bounds())
     size = jnp.maximum(-low, high)
     used, changed = ((part / size) ** 2 for part in (action, action - before))
@@ -239,12 +239,14 @@ def _cost_of(plan: Plan, error: Any, action: Any, before: Any) -> Any:
     return ((error / scales) ** 2).sum() + plan.cost.effort * used.mean() + plan.cost.variation * changed.mean()
 
 
-def _cost(given: Any) -> Cost:
+def _cost(given: Any) -> QuadraticCost:
     if isinstance(given, Mapping):
-        if unknown := set(given) - set(Cost._fields):
-            raise BadInput("cost", f"have the keys {', '.join(Cost._fields)}", ", ".join(sorted(map(str, unknown))))
-        given = Cost(**given)
-    found = Cost() if given is None else given
+        if unknown := set(given) - set(QuadraticCost._fields):
+            raise BadInput(
+                "cost", f"have the keys {', '.join(QuadraticCost._fields)}", ", ".join(sorted(map(str, unknown)))
+            )
+        given = QuadraticCost(**given)
+    found = QuadraticCost() if given is None else given
     found.check()
     return found
 

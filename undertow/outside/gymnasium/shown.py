@@ -12,7 +12,7 @@ from undertow.core import checks
 REWARDS = ("negative_cost", "bounded")
 
 
-class Shown(NamedTuple):
+class AgentInterface(NamedTuple):
     """How numbers are shown.
 
     Attributes:
@@ -54,11 +54,11 @@ class Shown(NamedTuple):
         return values if self.reward == "negative_cost" else 1 / (1 - values)
 
 
-def shown(interface: PolicyInterface, dtype: Any, float32: bool, normalised: bool, reward: str) -> Shown:
+def shown(interface: PolicyInterface, dtype: Any, float32: bool, normalised: bool, reward: str) -> AgentInterface:
     """How numbers are shown.
 
     Raises:
         BadInput: there is no such reward.
     """
     checks.choice("reward", reward, REWARDS)
-    return Shown(interface, np.dtype("float32") if float32 else dtype, normalised, reward)
+    return AgentInterface(interface, np.dtype("float32") if float32 else dtype, normalised, reward)

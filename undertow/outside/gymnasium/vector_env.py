@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.outside.gymnasium.env import actions_of
-from undertow.outside.gymnasium.episodes import Cost, Episodes, Seen
+from undertow.outside.gymnasium.episodes import Episodes, EpisodeStep, QuadraticCost
 from undertow.outside.gymnasium.shown import shown
 from undertow.outside.gymnasium.variants import Vary
 from undertow.simulation.loop.stepped import Uncopied
@@ -42,7 +42,7 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         *,
         action: str = "normalised",
         scale: Any = None,
-        cost: Cost | Mapping[str, float] | None = None,
+        cost: QuadraticCost | Mapping[str, float] | None = None,
         vary: Vary | None = None,
         variants: int = 64,
         allow_code: bool = False,
@@ -123,7 +123,7 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         self._generators[number], _ = seeding.np_random(seed)
         return seed % _SEEDS
 
-    def _info(self, seen: Seen, which: NDArray[Any]) -> dict[str, Any]:
+    def _info(self, seen: EpisodeStep, which: NDArray[Any]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for name in ("position", "error", "status"):
             found |= self._of(name, getattr(seen, name), which)

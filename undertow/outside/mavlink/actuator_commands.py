@@ -25,7 +25,7 @@ _PER_COMMAND, _PER_GROUP = 6, 8  # outputs of MAV_CMD_DO_SET_ACTUATOR and SET_AC
 _ACTUATORS, _CONTROLS = 2 * _PER_COMMAND, 2 * _PER_GROUP
 
 
-class Target(NamedTuple):
+class MavlinkTarget(NamedTuple):
     """To whom commands go."""
 
     system: int
@@ -45,10 +45,10 @@ class Pulses(NamedTuple):
         return {channel: share(pulse) for channel, pulse in self.by_channel.items()}
 
 
-Commands = Callable[[Target, Pulses, int], list[Any]]
+Commands = Callable[[MavlinkTarget, Pulses, int], list[Any]]
 
 
-def rc_override(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
+def rc_override(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]:
     """One RC_CHANNELS_OVERRIDE; other channels stay as they are."""
     channels = [_IGNORED] * _RC_CHANNELS
     for channel, pulse in pulses.by_channel.items():
@@ -56,7 +56,7 @@ def rc_override(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
     return [mavlink.MAVLink_rc_channels_override_message(*target, *channels)]
 
 
-def servo(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
+def servo(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]:
     """A MAV_CMD_DO_SET_SERVO for each channel."""
     return [
         _command(target, mavlink.MAV_CMD_DO_SET_SERVO, [channel, round(pulse), 0, 0, 0, 0, 0])
@@ -64,13 +64,13 @@ def servo(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
     ]
 
 
-def actuator(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
+def actuator(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]:
     """A MAV_CMD_DO_SET_ACTUATOR for each six outputs; NaN leaves an output as it is."""
     blocks = _blocks(pulses.shares(), _PER_COMMAND, np.nan)
     return [_command(target, mavlink.MAV_CMD_DO_SET_ACTUATOR, [*values, index]) for index, values in blocks.items()]
 
 
-def control_target(target: Target, pulses: Pulses, time_usec: int) -> list[Any]:
+def control_target(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]:
     """A SET_ACTUATOR_CONTROL_TARGET for each group of eight controls."""
     blocks = _blocks(pulses.shares(), _PER_GROUP, 0.0)
     made = mavlink.MAVLink_set_actuator_control_target_message
@@ -103,7 +103,7 @@ def commands_of(output: str, highest: int) -> Commands:
     return commands
 
 
-def _command(target: Target, command: int, parameters: list[float]) -> Any:
+def _command(target: MavlinkTarget, command: int, parameters: list[float]) -> Any:
     return mavlink.MAVLink_command_long_message(*target, command, 0, *map(float, parameters))
 
 

@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import common as mavlink
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.outside.autopilot.autopilot import Autopilot
-from undertow.outside.mavlink.actuator_commands import Target
+from undertow.outside.mavlink.actuator_commands import MavlinkTarget
 from undertow.outside.mavlink.message_requests import MessageRequests
-from undertow.outside.mavlink.odometry import Odometry, OdometryReader
+from undertow.outside.mavlink.odometry import MavlinkOdometry, OdometryReader
 from undertow.outside.mavlink.permission import Permission
 from undertow.outside.mavlink.thruster_driver import ThrusterDriver
 from undertow.outside.realtime.link import LinkMeasurement
@@ -95,14 +95,14 @@ class Companion:
                 raise BadInput(name, "be from 1 to 255", number)
         checks.positive("timeout", timeout, "s")
         self.timeout = float(timeout)
-        self._reader, self._target = OdometryReader(source), Target(target_system, target_component)
+        self._reader, self._target = OdometryReader(source), MavlinkTarget(target_system, target_component)
         text = read_for_link(Path(scenario), allow_code=allow_code, unsupervised=unsupervised)
         self.autopilot = Autopilot(text, attitude="quaternion", log_later=True)
         self._driver = ThrusterDriver(self.autopilot, output, self._target, frame, channels)
         self.channels = self._driver.channels
         self.counts, self.complaint = dict.fromkeys(_COUNTS, 0), ""
-        self._last: Odometry | None = None  # that was used
-        self._placed: Odometry | None = None  # the last one with a pose
+        self._last: MavlinkOdometry | None = None  # that was used
+        self._placed: MavlinkOdometry | None = None  # the last one with a pose
         self._sent_heartbeat = -np.inf
         self._clock = SenderClock(self.timeout)
         self._permission = Permission(target_system)
@@ -181,7 +181,7 @@ class Companion:
             result = mavlink.enums["MAV_RESULT"].get(message.result)
             self.complaint = f"command {message.command} was answered {result.name if result else message.result}"
 
-    def _measurement(self, odometry: Odometry, now: float) -> LinkMeasurement | None:
+    def _measurement(self, odometry: MavlinkOdometry, now: float) -> LinkMeasurement | None:
         """The measurement of an odometry; None of one that is not of the present."""
         jumps = self._clock.jumps
         objection = self._clock.objection(odometry.time_usec / 1e6, now)
@@ -209,13 +209,13 @@ class Companion:
             stamp=odometry.time_usec * _MICROSECOND,
         )
 
-    def _note_reset(self, odometry: Odometry) -> None:
+    def _note_reset(self, odometry: MavlinkOdometry) -> None:
         """The estimator has jumped, and with it the place from which a relative target counts."""
         self.counts["estimator resets"] += 1
         if self._relative and self._placed is not None and odometry.has_pose:
             self._origin = self._origin + _HORIZONTAL * (odometry.position - self._placed.position)
 
-    def _has_leapt(self, odometry: Odometry) -> bool:
+    def _has_leapt(self, odometry: MavlinkOdometry) -> bool:
         """Whether no vehicle moves so far from its last position in that time; false without one."""
         before = self._placed
         if before is None or not odometry.has_pose:

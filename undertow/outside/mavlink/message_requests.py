@@ -4,7 +4,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from undertow.outside.mavlink.actuator_commands import Target
+from undertow.outside.mavlink.actuator_commands import MavlinkTarget
 from undertow.outside.mavlink.odometry import MESSAGES
 
 _AGAIN = 1.0  # s from one request to the next: an acknowledgement does not say to which message it belongs
@@ -28,7 +28,7 @@ class MessageRequests:
         interval: s between two messages of a kind.
     """
 
-    def __init__(self, source: str, target: Target, interval: float):
+    def __init__(self, source: str, target: MavlinkTarget, interval: float):
         self._target, self._interval = target, interval
         self._names = MESSAGES[source]
         self.begin_again()

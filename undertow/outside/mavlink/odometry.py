@@ -23,7 +23,7 @@ _LENGTH = 0.1  # by which a quaternion may miss the length 1
 _APART = 0.1  # s, between a position and the attitude that goes with it
 
 
-class Odometry(NamedTuple):
+class MavlinkOdometry(NamedTuple):
     """Motion at an instant; entries that were not measured are NaN.
 
     Attributes:
@@ -63,7 +63,7 @@ class OdometryReader:
         checks.choice("input", source, tuple(MESSAGES))
         self._source, self._attitude = source, None
 
-    def read(self, message: Any) -> Odometry | None:
+    def read(self, message: Any) -> MavlinkOdometry | None:
         """The odometry that a message completes; None for another message, or one that waits for its attitude.
 
         Raises:
@@ -82,7 +82,7 @@ class OdometryReader:
         return of_local_position(message, self._attitude)
 
 
-def of_odometry(message: Any) -> Odometry:
+def of_odometry(message: Any) -> MavlinkOdometry:
     """Odometry of a message ODOMETRY: pose in the local frame, velocity in body axes.
 
     Raises:
@@ -96,10 +96,12 @@ def of_odometry(message: Any) -> Odometry:
     position = np.array([message.x, message.y, message.z], dtype=float)
     attitude = _unit(np.array(message.q, dtype=float))
     check_plausible("ODOMETRY", position, velocity)
-    return Odometry(message.time_usec, position, attitude, np.array(velocity, dtype=float), message.reset_counter)
+    return MavlinkOdometry(
+        message.time_usec, position, attitude, np.array(velocity, dtype=float), message.reset_counter
+    )
 
 
-def of_local_position(position: Any, attitude: Any) -> Odometry:
+def of_local_position(position: Any, attitude: Any) -> MavlinkOdometry:
     """Odometry of LOCAL_POSITION_NED, whose velocity is in world axes, and ATTITUDE_QUATERNION.
 
     Raises:
@@ -111,7 +113,7 @@ def of_local_position(position: Any, attitude: Any) -> Odometry:
     velocity = np.concatenate([in_body_axes(quaternion, world), rates])
     place = np.array([position.x, position.y, position.z], dtype=float)
     check_plausible("LOCAL_POSITION_NED", place, velocity)
-    return Odometry(1000 * position.time_boot_ms, place, quaternion, velocity)
+    return MavlinkOdometry(1000 * position.time_boot_ms, place, quaternion, velocity)
 
 
 def in_body_axes(quaternion: NDArray, world: NDArray) -> NDArray:

@@ -8,7 +8,7 @@ import numpy as np
 from undertow.core import runtime
 from undertow.core.contracts import Inputs
 from undertow.outside.autopilot.autopilot import Autopilot
-from undertow.outside.mavlink.actuator_commands import Pulses, Target, commands_of
+from undertow.outside.mavlink.actuator_commands import MavlinkTarget, Pulses, commands_of
 from undertow.outside.thruster_channels import channels_of_vehicle
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.plants.pulse_input import pulse_driven
@@ -32,7 +32,9 @@ class ThrusterDriver:
         BadInput: something given cannot be used.
     """
 
-    def __init__(self, autopilot: Autopilot, output: str, target: Target, frame: str | None, channels: str | None):
+    def __init__(
+        self, autopilot: Autopilot, output: str, target: MavlinkTarget, frame: str | None, channels: str | None
+    ):
         plant = pulse_driven(autopilot.plant, battery_suffices=False)
         self._esc, self._target = plant.power.esc or esc(), target
         self.channels = channels_of_vehicle(np.asarray(plant.thruster_matrix), frame, channels)

@@ -12,7 +12,7 @@ if importlib.util.find_spec("mujoco") is None:
     remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[mujoco]'"
     raise ModuleNotFoundError(f"MuJoCo is not installed. {remedy}", name="mujoco")
 
-from undertow.outside.mujoco_engine.hydrodynamics import Water as Water
+from undertow.outside.mujoco_engine.hydrodynamics import UniformFlow as UniformFlow
 from undertow.outside.mujoco_engine.mjcf import mjcf as mjcf
 from undertow.outside.mujoco_engine.mujoco_run import MujocoRun as MujocoRun
 from undertow.outside.mujoco_engine.mujoco_run import run_in_mujoco as run_in_mujoco

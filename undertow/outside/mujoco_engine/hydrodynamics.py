@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from undertow.outside.mujoco_engine.frames import cross
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 
-class Water(NamedTuple):
+class UniformFlow(NamedTuple):
     """How the water moves, everywhere alike; world axes north, east, down."""
 
     velocity: ArrayLike = (0.0, 0.0, 0.0)  # m/s
@@ -29,14 +29,14 @@ class Hydrodynamics:
         held: whether the engine holds the added mass as a body; otherwise it is a force.
     """
 
-    def __init__(self, vehicle: Vehicle, held: bool = False):
+    def __init__(self, vehicle: VehicleModel, held: bool = False):
         self.added_mass = np.asarray(vehicle.added_mass) * (not held)
         self._held = np.asarray(vehicle.added_mass) * held
         self._linear, self._quadratic = np.asarray(vehicle.linear_damping), np.asarray(vehicle.quadratic_damping)
         self._displaced = float(vehicle.buoyancy) * float(vehicle.mass) / float(vehicle.weight)
         self._r_b = np.asarray(vehicle.r_b)
 
-    def wrench(self, rotation: NDArray, nu: NDArray, water: Water) -> NDArray:
+    def wrench(self, rotation: NDArray, nu: NDArray, water: UniformFlow) -> NDArray:
         """Force and moment on the body at the origin, N and N m, but for -M_A nu_dot.
 
         Args:

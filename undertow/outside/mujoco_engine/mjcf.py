@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.outside.mujoco_engine.frames import flip, flip_tensor
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _CLOSE = 1e-9  # share of the largest entry by which a matrix may miss a pattern
 
@@ -75,7 +75,7 @@ def is_possible(inertia: NDArray) -> bool:
 _LIFTED = 1e-3
 
 
-def mjcf(vehicle: Vehicle, timestep: float = 2e-3, added_mass: bool = False) -> str:
+def mjcf(vehicle: VehicleModel, timestep: float = 2e-3, added_mass: bool = False) -> str:
     """MJCF text of a vehicle in water without added mass and damping.
 
     Auto-reset is off: a state that is not finite stays visible instead of starting the motion anew.
@@ -131,7 +131,7 @@ def mjcf(vehicle: Vehicle, timestep: float = 2e-3, added_mass: bool = False) -> 
 """
 
 
-def _as_body(vehicle: Vehicle) -> RigidBody:
+def _as_body(vehicle: VehicleModel) -> RigidBody:
     body = as_rigid_body(vehicle.added_mass)
     if body is None:
         hint = "Apply it as a force instead"

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from undertow.core import checks
 from undertow.core.status import Status
 from undertow.outside.mujoco_engine import frames
-from undertow.outside.mujoco_engine.hydrodynamics import Hydrodynamics, Water
+from undertow.outside.mujoco_engine.hydrodynamics import Hydrodynamics, UniformFlow
 from undertow.outside.mujoco_engine.mjcf import mjcf
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _ENVELOPE = 1e3  # m, m/s, rad/s; far beyond any vehicle
 
@@ -41,13 +41,15 @@ class Submerged:
             does not have three finite numbers.
     """
 
-    def __init__(self, vehicle: Vehicle, timestep: float = 2e-3, added_mass: str = "force", water: Water | None = None):
+    def __init__(
+        self, vehicle: VehicleModel, timestep: float = 2e-3, added_mass: str = "force", water: UniformFlow | None = None
+    ):
         checks.choice("added_mass", added_mass, ("force", "body"))
         held = added_mass == "body"
         self.model = mujoco.MjModel.from_xml_string(mjcf(vehicle, timestep, held))
         self.data = mujoco.MjData(self.model)
         self._hydrodynamics = Hydrodynamics(vehicle, held)
-        self._water = Water() if water is None else water
+        self._water = UniformFlow() if water is None else water
         for name, rate in self._water._asdict().items():
             checks.length(name, rate, 3, "north, east, down")
             checks.finite(name, rate)

@@ -19,7 +19,7 @@ import numpy as np
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.core.errors import BadInput
 from undertow.outside.python_control.signals import signals_of, state_names, target_of, vector_of, vector_of_measurement
-from undertow.outside.python_control.states import LinearSystem, seen, with_angles
+from undertow.outside.python_control.states import StateSpaceMatrices, seen, with_angles
 from undertow.outside.python_control.systems import Scenario, built_of, computing, measurement_of, sampled_of
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
@@ -130,7 +130,7 @@ def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct
         a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
         c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
         names = state_names(at.parts.plant_state(state), "plant")
-        found = LinearSystem(a, b, c, names)
+        found = StateSpaceMatrices(a, b, c, names)
         found = found if all_states else seen(with_angles(found, np.asarray(state)))
     system = ct.ss(found.a, found.b, found.c, np.zeros((len(c), b.shape[1])))
     if sampled:
@@ -154,7 +154,7 @@ def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpac
         given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
         (a, b), (c, d) = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given))
         names = state_names(at.parts.law_state(state), "law")
-    found = LinearSystem(a, b, c, names)
+    found = StateSpaceMatrices(a, b, c, names)
     found = found if all_states else seen(found)
     inputs = of.measured | of.desired | of.applied
     system = ct.ss(found.a, found.b, found.c, d, built.scenario.loop.dt)

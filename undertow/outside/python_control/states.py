@@ -20,7 +20,7 @@ _NUMBER = re.compile(r"_\d+$")
 _ROUNDING = 1e-9
 
 
-class LinearSystem(NamedTuple):
+class StateSpaceMatrices(NamedTuple):
     """Matrices of a linear system, and the names of its states."""
 
     a: NDArray
@@ -28,12 +28,12 @@ class LinearSystem(NamedTuple):
     c: NDArray
     names: list[str]
 
-    def in_coordinates(self, forth: NDArray, back: NDArray, names: list[str]) -> "LinearSystem":
+    def in_coordinates(self, forth: NDArray, back: NDArray, names: list[str]) -> "StateSpaceMatrices":
         """The system in states forth @ x, where back @ forth @ x is x, or differs from it in nothing that is seen."""
-        return LinearSystem(forth @ self.a @ back, forth @ self.b, self.c @ back, names)
+        return StateSpaceMatrices(forth @ self.a @ back, forth @ self.b, self.c @ back, names)
 
 
-def seen(system: LinearSystem) -> LinearSystem:
+def seen(system: StateSpaceMatrices) -> StateSpaceMatrices:
     """The system without what no output follows from.
 
     These are states (counters, ledgers), and combinations of states with the same name, such as those differences of
@@ -49,7 +49,7 @@ def seen(system: LinearSystem) -> LinearSystem:
     return system.in_coordinates(basis.T, basis, names)
 
 
-def with_angles(system: LinearSystem, values: NDArray) -> LinearSystem:
+def with_angles(system: StateSpaceMatrices, values: NDArray) -> StateSpaceMatrices:
     """The system with angles in place of unit quaternions, which are four states `attitude_1`, ... after any prefix.
 
     Args:
@@ -83,7 +83,7 @@ def _slopes(quaternion):
     return jax.jacfwd(angles_of)(quaternion), sign * jax.jacfwd(quaternion_from_euler)(angles)
 
 
-def _acting(system: LinearSystem) -> LinearSystem:
+def _acting(system: StateSpaceMatrices) -> StateSpaceMatrices:
     """The system in the states from which an output follows, directly or through other states."""
     acts = (system.c != 0).any(axis=0)
     while True:
@@ -92,10 +92,10 @@ def _acting(system: LinearSystem) -> LinearSystem:
             break
         acts = further
     names = [name for name, stays in zip(system.names, acts, strict=True) if stays]
-    return LinearSystem(system.a[np.ix_(acts, acts)], system.b[acts], system.c[:, acts], names)
+    return StateSpaceMatrices(system.a[np.ix_(acts, acts)], system.b[acts], system.c[:, acts], names)
 
 
-def _seen_of_group(system: LinearSystem, group: NDArray) -> NDArray:
+def _seen_of_group(system: StateSpaceMatrices, group: NDArray) -> NDArray:
     """Orthonormal columns, of all states, that span what is seen of a group of states; the states where all is."""
     whole = np.eye(len(system.names))[:, group]
     rows = np.vstack([system.c, system.a[~group]])

@@ -21,7 +21,7 @@ from undertow.outside.realtime.control_session import ControlSession
 from undertow.outside.realtime.link import AbstractLink, AbstractPacingLink, LinkMeasurement
 from undertow.outside.realtime.loop_clock import AbstractLoopClock
 from undertow.outside.realtime.loop_settings import LoopSettings, Reason
-from undertow.outside.realtime.statistics import LoopStatistics
+from undertow.outside.realtime.loop_statistics import LoopStatistics
 
 _LITTLE = 0.1  # periods, by which a step may begin late and counts as on time for the controller
 _ROUNDING = 1e-6  # periods

@@ -107,7 +107,7 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
     return Datagram(kind, bool(flags), session, sequence, time, answered, values)
 
 
-class Received:
+class DatagramFilter:
     """Judges the datagrams of one side: only those of one session, each later than the last.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 
 from undertow.core.errors import BadInput, within
 from undertow.outside.autopilot.measured_motion import Format
-from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, MOTION, Received, Sender, address_of
+from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, MOTION, DatagramFilter, Sender, address_of
 from undertow.outside.realtime.link import AbstractLink, LinkMeasurement
 from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.outside.realtime.watchdog import Watchdog
@@ -46,7 +46,7 @@ class UdpVehicleLink(AbstractLink):
             raise BadInput("--link", "name a host that is known", host) from None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._received = Received(MEASUREMENT, self._actuators)
+        self._received = DatagramFilter(MEASUREMENT, self._actuators)
         self._sender = Sender(COMMAND, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._sent = self._unsent = self._others = 0
         self._watchdog: Watchdog | None = None
@@ -125,7 +125,7 @@ class UdpVehicleServer:
     def __init__(self, built: Built, place: str):
         _check_vehicle(built)
         self._period, self._actuators = float(built.scenario.loop.dt), built.closed_loop.plant.inputs()
-        self._received = Received(COMMAND, self._actuators)
+        self._received = DatagramFilter(COMMAND, self._actuators)
         self._sender = Sender(MEASUREMENT, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:

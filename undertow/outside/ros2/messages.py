@@ -86,7 +86,7 @@ class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
 
 @dataclass
 @final
-class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+class PoseMessage(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
     """Position and attitude."""
 
     position: Point = field(default_factory=Point)
@@ -95,7 +95,7 @@ class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
 
 @dataclass
 @final
-class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
+class TwistMessage(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
     """Velocity (m/s) and angular velocity (rad/s)."""
 
     linear: Vector3 = field(default_factory=Vector3)
@@ -116,7 +116,7 @@ class Wrench(IdlStruct, typename="geometry_msgs::msg::dds_::Wrench_"):
 class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovariance_"):
     """A pose with its covariance by rows; zeros where it is not known."""
 
-    pose: Pose = field(default_factory=Pose)
+    pose: PoseMessage = field(default_factory=PoseMessage)
     covariance: Matrix6 = field(default_factory=lambda: [0.0] * 36)
 
 
@@ -125,7 +125,7 @@ class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWith
 class TwistWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"):
     """A velocity with its covariance."""
 
-    twist: Twist = field(default_factory=Twist)
+    twist: TwistMessage = field(default_factory=TwistMessage)
     covariance: Matrix6 = field(default_factory=lambda: [0.0] * 36)
 
 
@@ -160,7 +160,7 @@ class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
     """A pose in the frame of the header."""
 
     header: Header = field(default_factory=Header)
-    pose: Pose = field(default_factory=Pose)
+    pose: PoseMessage = field(default_factory=PoseMessage)
 
 
 @dataclass

@@ -24,7 +24,7 @@ def stamp_of(nanoseconds: int) -> ros.Time:
 
 def odometry_of(motion: PoseAndVelocity, stamp: ros.Time, frames: Frames) -> ros.Odometry:
     """Odometry of a motion."""
-    twist = ros.Twist(_vector(motion.velocity[:3]), _vector(motion.velocity[3:]))
+    twist = ros.TwistMessage(_vector(motion.velocity[:3]), _vector(motion.velocity[3:]))
     return ros.Odometry(
         ros.Header(stamp, frames.world[0]),
         frames.body,
@@ -67,7 +67,7 @@ def _vector(frd: ArrayLike) -> ros.Vector3:
     return ros.Vector3(x, y, z)
 
 
-def _pose(position: ArrayLike, quaternion: ArrayLike) -> ros.Pose:
+def _pose(position: ArrayLike, quaternion: ArrayLike) -> ros.PoseMessage:
     w, x, y, z = between_attitudes(quaternion).tolist()
     east, north, up = between_ned_and_enu(position).tolist()
-    return ros.Pose(ros.Point(east, north, up), ros.Quaternion(x, y, z, w))
+    return ros.PoseMessage(ros.Point(east, north, up), ros.Quaternion(x, y, z, w))

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 Found = Mapping[str, Any]  # variant -> `study.Variant`
 
 
-class Verdict(NamedTuple):
+class AblationVerdict(NamedTuple):
     """Verdict on the theory's prediction."""
 
     agrees: str  # yes, partly or no
@@ -32,7 +32,7 @@ class Ablation(NamedTuple):
     prediction: str
     left_out: str
     long: bool
-    judge: Callable[[Found], Verdict]
+    judge: Callable[[Found], AblationVerdict]
 
 
 ABLATIONS: list[Ablation] = []
@@ -45,7 +45,7 @@ _PRESETS = ("Table 1", "robust")
 def _ablation(campaigns: str, metrics: str, prediction: str, left_out: str = "", long: bool = True):
     """Register the verdict on an ablation; its number is that in the name of its first campaign."""
 
-    def register(judge: Callable[[Found], Verdict]) -> Callable[[Found], Verdict]:
+    def register(judge: Callable[[Found], AblationVerdict]) -> Callable[[Found], AblationVerdict]:
         names = tuple(campaigns.split())
         number = f"A{int(names[0][1:3])}"
         ABLATIONS.append(Ablation(number, names, tuple(metrics.split()), prediction, left_out, long, judge))
@@ -54,9 +54,9 @@ def _ablation(campaigns: str, metrics: str, prediction: str, left_out: str = "",
     return register
 
 
-def _verdict(agrees: bool, text: str, partly: bool = False) -> Verdict:
+def _verdict(agrees: bool, text: str, partly: bool = False) -> AblationVerdict:
     """`yes` if the prediction holds, else `partly` if part of it does, else `no`."""
-    return Verdict("yes" if agrees else "partly" if partly else "no", text)
+    return AblationVerdict("yes" if agrees else "partly" if partly else "no", text)
 
 
 def _tracking(found: Found, names: Sequence[str] | None = None) -> dict[str, float]:
@@ -78,7 +78,7 @@ def _lost_by_most(one: Any) -> bool:
     "At equal gamma the state is worse by the ratio of |xi|^2; at equal gamma |xi|^2 both are equal.",
     "loads that depend on position, which only the state could learn",
 )
-def _fuzzy_input(found: Found) -> Verdict:
+def _fuzzy_input(found: Found) -> AblationVerdict:
     own, more, same = (found[name].median("estimation_rms") for name in ("error", "state", "state, matched"))
     text = f"State: {more / own:.2f} times the error at equal gamma, {same / own:.3f} times at equal gamma |xi|^2."
     alike = abs(same / own - 1) < 0.05
@@ -86,7 +86,7 @@ def _fuzzy_input(found: Found) -> Verdict:
 
 
 @_ablation("a02_sets", "estimation_rms tracking_rms weights_peak", "Equal results at equal gamma |xi|^2.")
-def _sets(found: Found) -> Verdict:
+def _sets(found: Found) -> AblationVerdict:
     ratio = {
         name: one.median("estimation_rms") / found["5 sets"].median("estimation_rms") for name, one in found.items()
     }
@@ -102,7 +102,7 @@ def _sets(found: Found) -> Verdict:
     "`robust`; RAFC at Table 1 does not.",
     long=False,
 )
-def _linear_equivalents(found: Found) -> Verdict:
+def _linear_equivalents(found: Found) -> AblationVerdict:
     error = _tracking(found)
     beside = {"linear observer": "RCAFC", "INDI": "RCAFC"}
     of_robust = dict.fromkeys(("robust, 1 set", "robust's linear observer", "robust's INDI"), "robust")
@@ -120,7 +120,7 @@ def _linear_equivalents(found: Found) -> Verdict:
     "It acts as a PD of gain 100: without it the error is 19 times larger and the noise in u 2.6 times smaller.",
     long=False,
 )
-def _robust_term(found: Found) -> Verdict:
+def _robust_term(found: Found) -> AblationVerdict:
     own, without, instead = (found[f"{name}, exact"].median(_TRACKING) for name in ("with", "without", "PD instead"))
     noise = found["with, noise"].median("input_variation") / found["without, noise"].median("input_variation")
     error, same = without / own, instead / own
@@ -136,7 +136,7 @@ def _robust_term(found: Found) -> Verdict:
     "tracking_rms input_rms input_variation",
     "Only the slope w_bar/phi matters, as a PD gain; sign chatters at half the sampling rate.",
 )
-def _switching(found: Found) -> Verdict:
+def _switching(found: Found) -> AblationVerdict:
     error, variation = _tracking(found), found["sign"].median("input_variation")
     same, slope = error["20 / 1"] / error["10 / 0.5"], error["10 / 2.5"] / error["2 / 0.5"]
     chatter = variation / found["10 / 0.5"].median("input_variation")
@@ -155,7 +155,7 @@ def _switching(found: Found) -> Verdict:
     "other costs than tracking rms / 1 mm + variation of the input / 1000 per s; 16 trials on 4 other seeds each, "
     "1 mm/s of velocity noise",
 )
-def _composite(found: Found) -> Verdict:
+def _composite(found: Found) -> AblationVerdict:
     laws = ("RCAFC", "RAFC", "linear observer")
     error = {law: found[f"{law}, tuned"].median(_TRACKING) for law in laws}
     limited = {law: found[f"{law}, limited"] for law in laws}
@@ -175,7 +175,7 @@ def _composite(found: Found) -> Verdict:
     "Below 50 rad/s the estimate helps, above 103 rad/s it adds error, at any amplitude.",
     "chirps (Fig. 7 has one)",
 )
-def _frequency(found: Found) -> Verdict:
+def _frequency(found: Found) -> AblationVerdict:
     of = lambda load: found[f"RCAFC, {load}"].median("share")
     share = {rate: of(f"{rate} rad/s") for rate in (1, 10, 50, 150)}
     small, large = of("0.1 m/s^2"), of("50 m/s^2")
@@ -190,7 +190,7 @@ def _frequency(found: Found) -> Verdict:
     "Table 1 is unstable below 141 Hz and beyond 4.75 ms of delay; `robust` is stable at every rate.",
     "jitter: the loop has one sampling time",
 )
-def _sampling(found: Found) -> Verdict:
+def _sampling(found: Found) -> AblationVerdict:
     rates, delays = ("1000 Hz", "100 Hz", "50 Hz"), ("4 ms", "6 ms", "15 ms")
     asked = [f"Table 1, {how}" for how in (*rates, *delays)] + [f"robust, {how}" for how in rates]
     asked += [f"robust 20 rad/s, {how}" for how in delays]
@@ -213,7 +213,7 @@ def _sampling(found: Found) -> Verdict:
     "Table 1 amplifies noise by 110 in the input and cannot use a 5 Hz DVL; a lower bandwidth is better.",
     "drift until divergence, which takes longer: see A18 and A21",
 )
-def _noise(found: Found) -> Verdict:
+def _noise(found: Found) -> AblationVerdict:
     laws = (*_PRESETS, "robust 10 rad/s")
     amplified = {law: found[f"{law}, 1 mm/s"].median("input_rms") / 1e-3 for law in laws}
     end = lambda one: "ends early" if _lost_by_most(one) else f"error {one.median(_TRACKING):.2g} m"
@@ -233,7 +233,7 @@ def _noise(found: Found) -> Verdict:
     "slew rate; dead band (the static motor has one, see the fidelity comparison)",
     long=False,
 )
-def _limits(found: Found) -> Verdict:
+def _limits(found: Found) -> AblationVerdict:
     lost = [name for name, error in _tracking(found).items() if not error < _LOST]
     text = f"Not back within 0.1 m (rad) after 10 s: {'; '.join(lost) or 'none'}."
     laws, limits = ("RCAFC", "RCAFC, command fed", "RAFC", "robust"), ("5 m/s^2", "3 m/s^2", "1.5 m/s^2")
@@ -248,7 +248,7 @@ def _limits(found: Found) -> Verdict:
     "tracking_rms estimation_rms input_variation",
     "Table 1 is stable without and unstable with them; a slow observer or an inner speed loop is stable.",
 )
-def _motor(found: Found) -> Verdict:
+def _motor(found: Found) -> AblationVerdict:
     said = lambda one: (
         f"ended early in {one.failures} of {one.seeds}" if one.failures else f"{one.median(_TRACKING):.3g}"
     )
@@ -264,7 +264,7 @@ def _motor(found: Found) -> Verdict:
     "Very wrong: every true gain of the right sign is stable in continuous time.",
     "shift of the centre of gravity, single entries of B",
 )
-def _model_errors(found: Found) -> Verdict:
+def _model_errors(found: Found) -> AblationVerdict:
     worst = []
     for law in _PRESETS:
         exact = found[f"{law}, exact"].median(_TRACKING)
@@ -283,7 +283,7 @@ def _model_errors(found: Found) -> Verdict:
     "Any loss that keeps rank 6 is tolerated (one always, two in 16 of 28 pairs, three never); a reversed one is not.",
     "thrusters that are stuck at a thrust",
 )
-def _thruster_loss(found: Found) -> Verdict:
+def _thruster_loss(found: Found) -> AblationVerdict:
     one = [found[f"{law}, one off"].metrics[_TRACKING] for law in _PRESETS]
     triple = all(not found[f"{law}, three off"].median(_TRACKING) < _LOST for law in _PRESETS)
     text = f"Median tracking rms: {_listed(_tracking(found), '.2g')}."
@@ -297,7 +297,7 @@ def _thruster_loss(found: Found) -> Verdict:
     "No: all of them are slower than 10 rad/s.",
     "payload pick-up, which needs the inverse of the mass matrix at every step",
 )
-def _water(found: Found) -> Verdict:
+def _water(found: Found) -> AblationVerdict:
     text = f"Tracking rms: {_listed(_tracking(found), '.2g')}."
     return _verdict(all(one.median(_TRACKING) < _LOST and not one.failures for one in found.values()), text)
 
@@ -308,7 +308,7 @@ def _water(found: Found) -> Verdict:
     "Euler angles fail near a pitch of 90 deg; a law in body axes does not.",
     "errors are in Euler angles, which exaggerates them at steep pitch",
 )
-def _references(found: Found) -> Verdict:
+def _references(found: Found) -> AblationVerdict:
     end = lambda one: f"{one.failures} of {one.seeds} end early" if one.failures else f"{one.median(_TRACKING):.2g}"
     text = "Tracking rms: " + ", ".join(f"{name} {end(one)}" for name, one in found.items()) + "."
     fine = not any(one.failures for name, one in found.items() if name.startswith("robust, "))
@@ -320,7 +320,7 @@ def _references(found: Found) -> Verdict:
     "tracking_rms uncertainty_rms estimation_rms",
     "In d it is up to 2.8 m/s^2 at 1 m/s: it must be in the model.",
 )
-def _rate_term(found: Found) -> Verdict:
+def _rate_term(found: Found) -> AblationVerdict:
     error, size = _tracking(found), {name: one.median("uncertainty_rms") for name, one in found.items()}
     text = "; ".join(
         f"{what}: rms of d {size[f'{what}, in F']:.3g} in F, {size[f'{what}, in d']:.3g} in d, tracking rms "
@@ -336,7 +336,7 @@ def _rate_term(found: Found) -> Verdict:
     "tracking_rms input_rms",
     "Six independent ones are enough; below rank 6 there are directions in open loop.",
 )
-def _thrusters(found: Found) -> Verdict:
+def _thrusters(found: Found) -> AblationVerdict:
     error = {count: found[f"N = {count}"].median(_TRACKING) for count in (8, 6, 5, 4)}
     text = "Tracking rms: " + ", ".join(f"N = {count} {value:.3g}" for count, value in error.items()) + "."
     whole = error[8] < _LOST and error[6] < _LOST
@@ -350,7 +350,7 @@ def _thrusters(found: Found) -> Verdict:
     "fails after 7.5 s.",
     long=False,
 )
-def _drift(found: Found) -> Verdict:
+def _drift(found: Found) -> AblationVerdict:
     lost = {name for name, one in found.items() if _lost_by_most(one)}
     kept = [f"{name} ({one.median(_TRACKING):.2g} m)" for name, one in found.items() if name not in lost]
     text = f"Ended early: {', '.join(sorted(lost)) or 'none'}. Kept: {', '.join(kept)}."
@@ -366,7 +366,7 @@ def _drift(found: Found) -> Verdict:
     "tracking_rms input_rms input_variation",
     "As printed the variant with sensors is ill-posed and unstable; an inner loop of computed voltage uses them.",
 )
-def _speed_sensor(found: Found) -> Verdict:
+def _speed_sensor(found: Found) -> AblationVerdict:
     sensors, most = ("sensorless", "measured"), 5e-3
     bad = all(found[f"Table 1, {how}"].median(_TRACKING) > most for how in sensors)
     good = all(found[f"robust, {how}"].median(_TRACKING) < most for how in sensors)
@@ -379,7 +379,7 @@ def _speed_sensor(found: Found) -> Verdict:
     "An estimator of 20 to 50 rad/s and almost no robust term, instead of 142 rad/s and 10 m/s^2.",
     "other costs than tracking rms / 1 mm + variation of the input / 1000 per s; 12 trials on 4 other seeds per law",
 )
-def _tuning(found: Found) -> Verdict:
+def _tuning(found: Found) -> AblationVerdict:
     error = _tracking(found)
     better = all(error[f"{law}, searched"] < error["Table 1"] for law in ("paper's law", "robust"))
     return _verdict(better, _error_and_voltage(found))
@@ -391,7 +391,7 @@ def _tuning(found: Found) -> Verdict:
     "Only projected and linear laws; without projection three sets spaced 0.2 diverge after 21 s.",
     "24 h: here 60 s with narrow sets, for which the drift is 25 times as fast as for sets spaced 1",
 )
-def _long_run(found: Found) -> Verdict:
+def _long_run(found: Found) -> AblationVerdict:
     text = "Ended early: " + ", ".join(f"{name} {one.failures} of {one.seeds}" for name, one in found.items()) + "."
     own = found["Table 1"]
     others = not any(found[name].failures for name in ("projected", "linear observer", "robust"))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.paper.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim, steady
+from undertow.paper.claims.finding import EQUAL_GAIN, ClaimVerdict, Runs, at_table_1, claim, steady
 from undertow.paper.horizons import BOUND, Long, sampled
 from undertow.paper.running import BatchedRun
 from undertow.paper.setup import RAFC, RCAFC, equal_gain, scenario
@@ -100,12 +100,12 @@ def _estimation_scenarios(quick: bool) -> dict:
     scenarios=_estimation_scenarios,
     batched=_conditions,
 )
-def estimation(runs: Runs, long: Long) -> Finding:
+def estimation(runs: Runs, long: Long) -> ClaimVerdict:
     """At the paper's gains, at equal tuning effort, and at that under limits and noise."""
     return compared(runs, long, "estimation_rms", "rms estimation error", "m/s^2")
 
 
-def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Finding:
+def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> ClaimVerdict:
     """Verdict on `RCAFC has a smaller <metric> than RAFC`."""
     text, numbers = at_table_1(runs, metric, what, unit)
     rcafc, rafc, fair = numbers.values()
@@ -115,19 +115,19 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Findi
     numbers, text = numbers | found, f"{text} {more}"
     simulated = "level ideal, U1, 20 s"
     if rcafc >= rafc:
-        return Finding("fails", text, "ideal_rcafc", simulated, numbers)
+        return ClaimVerdict("fails", text, "ideal_rcafc", simulated, numbers)
     if rcafc < fair:
-        return Finding("holds", text, "ideal_rcafc", simulated, numbers)
+        return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
     where = []
     if lost_by_limits(long):
         where.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
     if worse_by_noise(long, metric):
         where.append("velocities are noisy (1 cm/s)")
     else_where = f"; at equal loop gain only where {' or '.join(where)}" if where else "; not at equal loop gain"
-    return Finding(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
+    return ClaimVerdict(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
 
 
 @claim("C3", "RCAFC needs a smaller robust control signal than RAFC.")
-def robust_term(runs: Runs, long: Long) -> Finding:
+def robust_term(runs: Runs, long: Long) -> ClaimVerdict:
     """As C2, since for small signals u_r is the filtered estimation error."""
     return compared(runs, long, "robust_rms", "rms robust term", "m/s^2")

@@ -13,7 +13,7 @@ Runs = Mapping[str, ScenarioResult]
 Scenarios = dict[str, dict[str, Any]]
 
 
-class Finding(NamedTuple):
+class ClaimVerdict(NamedTuple):
     """Verdict on one claim."""
 
     verdict: str
@@ -28,7 +28,7 @@ class Claim(NamedTuple):
 
     id: str  # C1 to C14
     text: str
-    judge: Callable[[Runs, Any], Finding]  # from the runs, and the batched runs
+    judge: Callable[[Runs, Any], ClaimVerdict]  # from the runs, and the batched runs
     scenarios: Callable[[bool], Scenarios]  # runs besides the examples, by name; fewer points of the sweeps when quick
     batched: Callable[[bool], Scenarios]  # sampled ones of which metrics are enough
 
@@ -41,7 +41,7 @@ def claim(
 ) -> Callable[[Any], Any]:
     """Register the function that judges a claim; see `Claim`."""
 
-    def register(judge: Callable[[Runs, Any], Finding]) -> Callable[[Runs, Any], Finding]:
+    def register(judge: Callable[[Runs, Any], ClaimVerdict]) -> Callable[[Runs, Any], ClaimVerdict]:
         CLAIMS.append(Claim(id, text, judge, scenarios, batched))
         CLAIMS.sort(key=lambda one: int(one.id[1:]))
         return judge

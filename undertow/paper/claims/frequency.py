@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from undertow.analysis.small_signal import crossing_frequency, estimation_response
-from undertow.paper.claims.finding import Finding, Runs, claim, steady
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, steady
 from undertow.paper.horizons import Long
 from undertow.paper.setup import CONTROLLERS, SIX_AXES, law_of, scenario
 
@@ -33,7 +33,7 @@ def _frequency_scenarios(quick: bool) -> dict:
 @claim(
     "C6", "The scheme estimates uncertainties of large amplitude and high frequency.", scenarios=_frequency_scenarios
 )
-def frequency(runs: Runs, long: Long) -> Finding:
+def frequency(runs: Runs, long: Long) -> ClaimVerdict:
     """|d_hat - d| / |d| against frequency, measured and predicted."""
     sweep = {controller: _sweep(runs, controller) for controller in CONTROLLERS}
     points = list(zip(sweep["rcafc"]["frequency"], sweep["rcafc"]["measured"], strict=True))
@@ -45,7 +45,7 @@ def frequency(runs: Runs, long: Long) -> Finding:
     )
     numbers = {"sweep": sweep, "crossing_measured": crossing, "crossing_predicted": predicted}
     verdict = f"holds if d stays well below {crossing:.0f} rad/s"
-    return Finding(verdict, text, _name("rcafc", 0), "six axes without a motor, sinusoids, 20 s", numbers)
+    return ClaimVerdict(verdict, text, _name("rcafc", 0), "six axes without a motor, sinusoids, 20 s", numbers)
 
 
 def _name(controller: str, block: int) -> str:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from undertow.paper.claims.finding import Finding, Runs, claim, steady
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, steady
 from undertow.paper.horizons import Long, sampled
 from undertow.paper.running import BatchedRun
 from undertow.paper.setup import FIDELITIES, same_loop_gain, scenario
@@ -37,7 +37,7 @@ def _fuzzy_input_batched(quick: bool) -> dict:
     "With the modelling error as input fewer rules are needed than with the state, and the estimate is better.",
     batched=_fuzzy_input_batched,
 )
-def fuzzy_input(runs: Runs, long: Long) -> Finding:
+def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
     """Estimation error and chattering at every fidelity level; at the printed gamma at `ideal`."""
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
     levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
@@ -63,10 +63,10 @@ def fuzzy_input(runs: Runs, long: Long) -> Finding:
         elif not any(other and other["estimation_rms"] <= _AS_GOOD * own["estimation_rms"] for other in others):
             better.append(level)
     if not better:
-        return Finding("fails", text, _name(levels[0], "state_25"), simulated, numbers)
+        return ClaimVerdict("fails", text, _name(levels[0], "state_25"), simulated, numbers)
     verdict = f"holds if the thruster lags (level {' and '.join(better)}) and with five sets, not one"
     verdict += f"; at the same loop gain it makes no difference at {' and '.join(alike)}" if alike else ""
-    return Finding(verdict, text, _name(better[0], "error_1"), simulated, numbers)
+    return ClaimVerdict(verdict, text, _name(better[0], "error_1"), simulated, numbers)
 
 
 def _name(level: str, law: str) -> str:

@@ -1,6 +1,6 @@
 """C9: square and non-square gain matrices."""
 
-from undertow.paper.claims.finding import Finding, Runs, claim, steady, tracking_error
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, steady, tracking_error
 from undertow.paper.horizons import Long
 from undertow.paper.setup import plant_of, scenario
 
@@ -39,7 +39,7 @@ def _gain_matrices_scenarios(quick: bool) -> dict:
     "The scheme works for square and non-square gain matrices (Eqs. (22)-(28)).",
     scenarios=_gain_matrices_scenarios,
 )
-def gain_matrices(runs: Runs, long: Long) -> Finding:
+def gain_matrices(runs: Runs, long: Long) -> ClaimVerdict:
     """Tracking by number of thrusters and rank."""
     everything = steady(runs["ideal_rcafc"])["tracking_rms"]
     numbers = {"n8_rank6": everything}
@@ -62,11 +62,11 @@ def gain_matrices(runs: Runs, long: Long) -> Finding:
             failed.append((count, rank))
     text = "Tracking rms, m and rad, from 10 s on: " + "; ".join(parts) + "."
     if any(rank == 6 for _, rank in failed):
-        return Finding("fails", text, "ideal_rcafc", _SIMULATED, numbers)
+        return ClaimVerdict("fails", text, "ideal_rcafc", _SIMULATED, numbers)
     if not failed:
-        return Finding("holds", text, "ideal_rcafc", _SIMULATED, numbers)
+        return ClaimVerdict("holds", text, "ideal_rcafc", _SIMULATED, numbers)
     text += " Below rank 6 the directions outside the range of G are in open loop for any w_bar."
-    return Finding("holds if rank G = 6, so not for N < 6", text, _name("n4_rank3"), _SIMULATED, numbers)
+    return ClaimVerdict("holds if rank G = 6, so not for N < 6", text, _name("n4_rank3"), _SIMULATED, numbers)
 
 
 def _name(key: str) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from undertow.analysis.certificate.function import of_set_point, share_increasing
-from undertow.paper.claims.finding import Finding, Runs, claim
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim
 from undertow.paper.horizons import Long
 from undertow.paper.setup import GOAL, SIX_AXES, law_of, scenario
 
@@ -24,7 +24,7 @@ def _lyapunov_function_decreases_scenarios(quick: bool) -> dict:
 
 
 @claim("C12", "V_dot <= 0 along every solution (Eqs. (46)-(58)).", scenarios=_lyapunov_function_decreases_scenarios)
-def lyapunov_function_decreases(runs: Runs, long: Long) -> Finding:
+def lyapunov_function_decreases(runs: Runs, long: Long) -> ClaimVerdict:
     """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
     law = law_of(runs["ideal_rcafc"])
     judged = {"constant": runs["c12_constant"], "u1": runs["ideal_rcafc"]}
@@ -35,14 +35,14 @@ def lyapunov_function_decreases(runs: Runs, long: Long) -> Finding:
         "range of d, which Table 1 (0.1) does not give."
     )
     if steps["constant"] > 0:
-        return Finding("fails", text, "c12_constant", _SIMULATED, steps)
+        return ClaimVerdict("fails", text, "c12_constant", _SIMULATED, steps)
     if steps["u1"] > 0:
-        return Finding("holds if d is constant", text, "ideal_rcafc", _SIMULATED, steps)
-    return Finding("holds", text, "ideal_rcafc", _SIMULATED, steps)
+        return ClaimVerdict("holds if d is constant", text, "ideal_rcafc", _SIMULATED, steps)
+    return ClaimVerdict("holds", text, "ideal_rcafc", _SIMULATED, steps)
 
 
 @claim("C13", "A positive definite P solves Eq. (21) for the gains of Table 1.")
-def lyapunov_equation(runs: Runs, long: Long) -> Finding:
+def lyapunov_equation(runs: Runs, long: Long) -> ClaimVerdict:
     """Residual of Eq. (21) and eigenvalues of P."""
     law = law_of(runs["ideal_rcafc"])
     p, (k1, k2), q = np.asarray(law.lyapunov()), np.asarray(law.feedback), np.asarray(law.weight)
@@ -52,4 +52,4 @@ def lyapunov_equation(runs: Runs, long: Long) -> Finding:
     text = f"P = {p.tolist()}, smallest eigenvalue {smallest:.3f}, residual {residual:.1g}."
     good = residual <= 1e-12 * np.abs(q).max() and smallest > 0
     verdict, numbers = "holds" if good else "fails", {"residual": residual, "smallest": smallest}
-    return Finding(verdict, text, "ideal_rcafc", "algebra, nothing is simulated", numbers)
+    return ClaimVerdict(verdict, text, "ideal_rcafc", "algebra, nothing is simulated", numbers)

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from undertow.core.status import Status
-from undertow.paper.claims.finding import Finding, Runs, claim, tracking_error
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, tracking_error
 from undertow.paper.horizons import Long
 from undertow.paper.setup import scenario
 from undertow.physics.plants.magnetic_levitation import LevitationRig, MagneticLevitation
@@ -44,7 +44,7 @@ def _other_plants_scenarios(quick: bool) -> dict:
     "The method works for other systems x_ddot = f + G u + d (pendulum, magnetic levitation).",
     scenarios=_other_plants_scenarios,
 )
-def other_plants(runs: Runs, long: Long) -> Finding:
+def other_plants(runs: Runs, long: Long) -> ClaimVerdict:
     """Tracking on both plants, and the lag of the coil at which it fails."""
     coils = sorted((_lag(runs[_at(gap)]), gap) for gap in _GAPS if _at(gap) in runs)
     numbers = {
@@ -64,11 +64,11 @@ def other_plants(runs: Runs, long: Long) -> Finding:
     lost = [lag for lag, gap in coils if runs[_at(gap)].status is not Status.OK]
     kept = [lag for lag, _ in coils if not lost or lag < lost[0]]
     if runs[_PENDULUM].status is not Status.OK or not kept:
-        return Finding("fails", text, _PENDULUM if kept else _at(coils[0][1]), _SIMULATED, numbers)
+        return ClaimVerdict("fails", text, _PENDULUM if kept else _at(coils[0][1]), _SIMULATED, numbers)
     if not lost:
-        return Finding("holds", text, _PENDULUM, _SIMULATED, numbers)
+        return ClaimVerdict("holds", text, _PENDULUM, _SIMULATED, numbers)
     verdict = f"holds if the actuator lags by no more than {1e3 * kept[-1]:.1f} ms; not with {1e3 * lost[0]:.1f} ms"
-    return Finding(verdict, text, next(_at(gap) for lag, gap in coils if lag == lost[0]), _SIMULATED, numbers)
+    return ClaimVerdict(verdict, text, next(_at(gap) for lag, gap in coils if lag == lost[0]), _SIMULATED, numbers)
 
 
 def _at(gap: int) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 
 from undertow.analysis.drift import time_to_divergence
 from undertow.core.status import Status
-from undertow.paper.claims.finding import Finding, Runs, claim, steady
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, steady
 from undertow.paper.horizons import Long, sampled
 from undertow.paper.setup import SIX_AXES, law_of, scenario
 
@@ -65,7 +65,7 @@ def _robustness_batched(quick: bool) -> dict:
     scenarios=_robustness_scenarios,
     batched=_robustness_batched,
 )
-def robustness(runs: Runs, long: Long) -> Finding:
+def robustness(runs: Runs, long: Long) -> ClaimVerdict:
     """Spread of the tracking error, and the counterexample."""
     nominal = steady(runs["ideal_rcafc"])["tracking_rms"]
     swept = {n: r for n, r in runs.items() if n.startswith("c10_")}
@@ -89,11 +89,11 @@ def robustness(runs: Runs, long: Long) -> Finding:
     if any(run.lasted for run in noisy):
         count = sum(run.lasted for run in noisy)
         text += f"With 1 cm/s of velocity noise at 1 kHz {count} of {_SEEDS} runs last {_NOISY:g} s."
-        return Finding("holds" if not failed else "fails", text, f"{_NOISE}_0", simulated, numbers)
+        return ClaimVerdict("holds" if not failed else "fails", text, f"{_NOISE}_0", simulated, numbers)
     ends = sorted(run.ended for run in noisy)
     text += (
         f"With 1 cm/s of velocity noise at 1 kHz and the sets of the benchmark (width 0.5) the weights drift and the "
         f"run ends after {ends[0]:.0f} to {ends[-1]:.0f} s ({_SEEDS} seeds; theory of section 3.8: {expected:.0f} s)."
     )
     verdict = "holds if there is neither noise nor sampling, for 20 s"
-    return Finding(verdict, text, f"{_NOISE}_0", simulated, numbers)
+    return ClaimVerdict(verdict, text, f"{_NOISE}_0", simulated, numbers)

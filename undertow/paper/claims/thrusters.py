@@ -5,7 +5,7 @@ import numpy as np
 
 from undertow.core.arrays import as_array
 from undertow.core.status import Status
-from undertow.paper.claims.finding import Finding, Runs, claim, steady
+from undertow.paper.claims.finding import ClaimVerdict, Runs, claim, steady
 from undertow.paper.horizons import Long, name_of
 from undertow.paper.setup import plant_of, scenario
 from undertow.paper.thruster_response import thruster_response
@@ -30,7 +30,7 @@ def _speed_sensor_scenarios(quick: bool) -> dict:
     "Speed-sensorless control performs like control with propeller-speed sensors.",
     scenarios=_speed_sensor_scenarios,
 )
-def speed_sensor(runs: Runs, long: Long) -> Finding:
+def speed_sensor(runs: Runs, long: Long) -> ClaimVerdict:
     """Perfect sensor (ideal) against none (static, shaft), and both with the full motor model."""
     with_sensor, without = (steady(runs[name])["tracking_rms"] for name in ("ideal_rcafc", "static_rcafc"))
     full = {"sensor": runs[_SENSOR], "sensorless": runs["electromechanical_rcafc"]}
@@ -57,11 +57,11 @@ def speed_sensor(runs: Runs, long: Long) -> Finding:
     if all(run.status is not Status.OK for run in full.values()):
         verdict += "; with the full motor model both end within seconds"
     simulated = "levels ideal, static and electromechanical, U1, 20 s; shaft at 1 kHz"
-    return Finding(verdict, text.strip(), _SENSOR, simulated, numbers)
+    return ClaimVerdict(verdict, text.strip(), _SENSOR, simulated, numbers)
 
 
 @claim("C8", "With voltage as the control input no step from thrust to voltage is needed.")
-def voltage_as_input(runs: Runs, long: Long) -> Finding:
+def voltage_as_input(runs: Runs, long: Long) -> ClaimVerdict:
     """Difference of the thrust from alpha V, which G assumes, in Example 2."""
     run = runs["static_rcafc"]
     thruster = plant_of(run).thruster
@@ -77,7 +77,7 @@ def voltage_as_input(runs: Runs, long: Long) -> Finding:
         "compensate it."
     )
     verdict = "holds if the fixed ratio alpha inside G is not counted as such a step"
-    return Finding(verdict, text, "static_rcafc", "level static, U1, 20 s", {"thrust_not_alpha_v": share})
+    return ClaimVerdict(verdict, text, "static_rcafc", "level static, U1, 20 s", {"thrust_not_alpha_v": share})
 
 
 # A model with a smaller error than this share of the signal counts as valid.
@@ -85,7 +85,7 @@ _VALID = 10.0  # %
 
 
 @claim("C11", "T = c_0 V, T = c_V V|V| and I = c_I T hold only for long-period inputs.")
-def thruster_models(runs: Runs, long: Long) -> Finding:
+def thruster_models(runs: Runs, long: Long) -> ClaimVerdict:
     """Error of each model, fitted to V = 10 sin t, at V = 10 sin t and V = 10 sin 10t."""
     laws = thruster_response().laws
     numbers = {law.text: {"long": law.error_long, "short": law.error_short} for law in laws}
@@ -112,4 +112,6 @@ def thruster_models(runs: Runs, long: Long) -> Finding:
         verdict = f"holds if only {' and '.join(valid)} is meant: the others are wrong at long periods too"
     else:
         verdict = "fails"
-    return Finding(verdict, text, "electromechanical_rcafc", "the motor alone, 8 periods; the loop as stated", numbers)
+    return ClaimVerdict(
+        verdict, text, "electromechanical_rcafc", "the motor alone, 8 periods; the loop as stated", numbers
+    )

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 
-from undertow.paper.claims.finding import EQUAL_GAIN, Finding, Runs, at_table_1, claim
+from undertow.paper.claims.finding import EQUAL_GAIN, ClaimVerdict, Runs, at_table_1, claim
 from undertow.paper.horizons import Long, name_of
 from undertow.paper.lag_map import windings
 from undertow.paper.setup import FIDELITIES, law_of
@@ -13,7 +13,7 @@ _SMALL = 1e-3  # m, rad; rms
 
 
 @claim("C1", "The tracking error converges to a small neighbourhood of zero.")
-def tracking(runs: Runs, long: Long) -> Finding:
+def tracking(runs: Runs, long: Long) -> ClaimVerdict:
     """At every fidelity level, for 20 s and for the long horizon; and against the inductance of the winding."""
     lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
     short = {level: one.windows[0] for level, one in lasting.items()}
@@ -43,15 +43,15 @@ def tracking(runs: Runs, long: Long) -> Finding:
     simulated = f"levels {', '.join(lasting)}, U2 at 1 kHz, {horizon:g} s"
     good = [level for level, found in short.items() if found and found["tracking_rms"] < _SMALL]
     if len(good) == len(short) and not lost:
-        return Finding("holds", text, "ideal_rcafc", simulated, numbers)
+        return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
     if not good:
-        return Finding("fails", text, "electromechanical_rcafc", simulated, numbers)
+        return ClaimVerdict("fails", text, "electromechanical_rcafc", simulated, numbers)
     verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
     early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
     completed = [level for level in good if lasting[level].lasted]
     verdict += f"; for {horizon:g} s only at fidelity {' and '.join(completed)}" if completed else ""
     verdict += f" ({', '.join(early)})" if early else ""
-    return Finding(verdict, text, "electromechanical_rcafc", simulated, numbers)
+    return ClaimVerdict(verdict, text, "electromechanical_rcafc", simulated, numbers)
 
 
 def _ending(run) -> str:
@@ -59,7 +59,7 @@ def _ending(run) -> str:
 
 
 @claim("C4", "RCAFC reduces chattering considerably.")
-def chattering(runs: Runs, long: Long) -> Finding:
+def chattering(runs: Runs, long: Long) -> ClaimVerdict:
     """Total variation of the voltages above that of a law that knows d, which must follow the load, too."""
     text, numbers = at_table_1(runs, "input_variation", "total variation of the voltages", "V/s")
     needed = perfect_variation(runs["ideal_rcafc"])
@@ -71,7 +71,7 @@ def chattering(runs: Runs, long: Long) -> Finding:
     )
     verdict = "fails" if numbers["rcafc"] >= numbers["rafc"] else "holds"
     numbers |= {"needed": needed} | {f"excess_{law}": value for law, value in excess.items()}
-    return Finding(verdict, text, "ideal_rcafc", "level ideal, U1, 20 s", numbers)
+    return ClaimVerdict(verdict, text, "ideal_rcafc", "level ideal, U1, 20 s", numbers)
 
 
 def perfect_variation(run: ScenarioResult) -> float:

@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from undertow.paper.thruster_response import Law, ThrusterResponse
+from undertow.paper.thruster_response import MemorylessFit, ThrusterResponse
 from undertow.report.figures import recorded, style
 from undertow.report.figures.multiples import Block, small_multiples
 from undertow.report.signal_names import axis_names, input_names
@@ -50,7 +50,7 @@ def _loop(panel: Axes, x: np.ndarray, y: np.ndarray, name: str, look: style.Look
     panel.plot(x, y, **look._replace(width=look.width + 0.2).line, label=name)
 
 
-def _errors(panel: Axes, laws: tuple[Law, ...]) -> None:
+def _errors(panel: Axes, laws: tuple[MemorylessFit, ...]) -> None:
     places = np.arange(len(laws))
     for key, shift, values in (
         ("long", -0.18, [law.error_long for law in laws]),
@@ -75,7 +75,7 @@ def _typeset(law: str) -> str:
     return "$" + law.replace("|V|", r"\,|V|") + "$"
 
 
-def _fitted(law: Law) -> str:
+def _fitted(law: MemorylessFit) -> str:
     symbol = law.text.split(" = ")[1].split()[0]
     return f"{_typeset(law.text)}, ${symbol}$ = {law.coefficient:.3g} {style.power(law.unit)}"
 

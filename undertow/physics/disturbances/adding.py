@@ -25,7 +25,7 @@ class AbstractSmoothDisturbance(AbstractDisturbance):
         return ()
 
 
-class Together(AbstractDisturbance):
+class SumOfDisturbances(AbstractDisturbance):
     """Several disturbances at once, each with a random key of its own."""
 
     members: tuple[AbstractDisturbance, ...]

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, Together, with_surface
+from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, SumOfDisturbances, with_surface
 from undertow.physics.disturbances.waves import Waves
 
 
@@ -56,5 +56,5 @@ def stated_depths(disturbance: AbstractDisturbance) -> list[float]:
     """Depths of the world's origin below the surface that a disturbance states, m; the first one counts."""
     if isinstance(disturbance, UnderSurface):
         return [*stated_depths(disturbance.inner), float(disturbance.surface.depth)]
-    members = disturbance.members if isinstance(disturbance, Together) else (disturbance,)
+    members = disturbance.members if isinstance(disturbance, SumOfDisturbances) else (disturbance,)
     return [float(one.depth) for one in members if isinstance(one, Waves | StillSurface)]

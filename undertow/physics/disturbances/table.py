@@ -12,7 +12,7 @@ from undertow.core.param import Param, param
 from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
 
 
-class Table(AbstractSmoothDisturbance):
+class TabulatedDisturbance(AbstractSmoothDisturbance):
     """Samples of the lumped acceleration, linear in between, constant before the first and after the last.
 
     Raises:
@@ -40,10 +40,10 @@ class Table(AbstractSmoothDisturbance):
         return load._replace(acceleration=load.acceleration + signal)
 
 
-def table(samples) -> Table:
+def table(samples) -> TabulatedDisturbance:
     """Lumped acceleration replayed from rows (t, d1, d2, ...); in a scenario, `file: d.csv` gives them.
 
     Args:
         samples: rows of time (s) and one value per axis (m/s^2, rad/s^2), linear in between.
     """
-    return Table(samples)
+    return TabulatedDisturbance(samples)

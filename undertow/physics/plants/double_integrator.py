@@ -9,7 +9,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.contracts import AbstractDynamics, Load, Measurement, Model
 from undertow.core.coordinates import OutputCoordinates
 from undertow.core.param import Param, param
-from undertow.physics.plants.mechanism import AbstractOutputMechanism, Motion, both_ways
+from undertow.physics.plants.mechanism import AbstractOutputMechanism, MechanismState, both_ways
 
 
 class UnitMasses(AbstractDynamics):
@@ -36,13 +36,13 @@ class DoubleIntegrator(AbstractOutputMechanism):
     def __check_init__(self):
         checks.not_negative("limit", self.limit, finite=False)
 
-    def acceleration(self, t, x: Motion, u, d: Load):
+    def acceleration(self, t, x: MechanismState, u, d: Load):
         return u + d.acceleration - d.wrench
 
     def limits(self):
         return both_ways(self.limit, len(self.outputs))
 
-    def power(self, x: Motion, u):
+    def power(self, x: MechanismState, u):
         return u * x.velocity
 
     def model(self) -> Model:

@@ -35,8 +35,8 @@ from undertow.physics.thrusters.inflow import advance_speed, with_inflow
 from undertow.physics.thrusters.thruster import AbstractThruster
 from undertow.physics.vehicles.alteration import altered
 from undertow.physics.vehicles.body import Body, seen_from_water
-from undertow.physics.vehicles.submersion import Hull, hull_of
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.submersion import HullEllipsoid, hull_of
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _ENVELOPE = 1e3  # m, m/s, rad/s; far above the values of any vehicle
 
@@ -60,11 +60,11 @@ class HybridVehicle(AbstractPlant):
     Arguments are those of `hybrid_vehicle`, which can leave thrusters out.
     """
 
-    vehicle: Vehicle
+    vehicle: VehicleModel
     thruster: AbstractThruster
     power: HybridPower
     body: Body
-    hull: Hull
+    hull: HullEllipsoid
     thruster_matrix: Float[Array, "6 N"]
     inflow_loss: Float[Array, ""] | None  # lambda of `with_inflow`, N^(1/2) s/m; None for none
     outputs: tuple[str, ...] = eqx.field(static=True)
@@ -74,7 +74,7 @@ class HybridVehicle(AbstractPlant):
     @double_outside_runs
     def __init__(
         self,
-        vehicle: Vehicle,
+        vehicle: VehicleModel,
         thruster: AbstractThruster,
         battery: Battery | None = None,
         esc: ESC | None = None,
@@ -185,7 +185,7 @@ class HybridVehicle(AbstractPlant):
         rate_term: bool = False,
         regularisation: float | None = None,
         affine: bool = True,
-        vehicle: Vehicle | None = None,
+        vehicle: VehicleModel | None = None,
         thruster: AbstractThruster | None = None,
     ) -> Model:
         """Nominal model of this plant for the controller.
@@ -251,7 +251,7 @@ def _static(inverse_mass, thruster_matrix, voltage_gain):
 
 
 def hybrid_vehicle(
-    vehicle: Vehicle,
+    vehicle: VehicleModel,
     thruster: AbstractThruster,
     thrusters=None,
     battery: Battery | None = None,

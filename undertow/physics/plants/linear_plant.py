@@ -12,7 +12,7 @@ from undertow.core.coordinates import OutputCoordinates
 from undertow.core.errors import BadInput
 from undertow.core.numerics.linear_algebra import matvec, pseudo_inverse
 from undertow.core.param import Param, param
-from undertow.physics.plants.mechanism import AbstractOutputMechanism, Motion, both_ways, nominal
+from undertow.physics.plants.mechanism import AbstractOutputMechanism, MechanismState, both_ways, nominal
 
 
 class LinearSystem(eqx.Module):
@@ -69,14 +69,14 @@ class LinearPlant(AbstractOutputMechanism):
     def __check_init__(self):
         checks.not_negative("limit", self.limit, finite=False)
 
-    def acceleration(self, t, x: Motion, u, d: Load):
+    def acceleration(self, t, x: MechanismState, u, d: Load):
         own = self.system.drift(x.position, x.velocity) + matvec(self.system.gain, u)
         return own + d.acceleration - d.wrench
 
     def limits(self):
         return both_ways(self.limit, self.system.gain.shape[1])
 
-    def power(self, x: Motion, u):
+    def power(self, x: MechanismState, u):
         """Power given to unit masses: u_j times the velocity along column j of G."""
         return u * matvec(self.system.gain.T, x.velocity)
 

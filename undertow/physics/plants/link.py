@@ -36,7 +36,7 @@ class LinkForces(NamedTuple):
     second: Float[Array, "6"]  # likewise on the second
 
 
-class Link(eqx.Module):
+class SpringDamper(eqx.Module):
     """Straight spring and damper: tension k x + c x_dot at an extension x. A tether pulls only, and only where x > 0.
 
     Its mass, weight and drag are neglected. Forces on both bodies are equal and opposite, along the line between the

@@ -59,7 +59,7 @@ class AbstractMechanism(AbstractPlant):
         return {}
 
 
-class Motion(NamedTuple):
+class MechanismState(NamedTuple):
     """Outputs (m, rad) and their rates (m/s, rad/s)."""
 
     position: Outputs
@@ -71,17 +71,17 @@ class AbstractOutputMechanism(AbstractMechanism):
 
     envelope: ClassVar[float] = 1e6  # m, rad, m/s, rad/s; far above plausible values
 
-    def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> Motion:
+    def initial_state(self, position: Outputs | None = None, velocity: Outputs | None = None) -> MechanismState:
         n = len(self.outputs)
-        return Motion(given_or_zero(position, n), given_or_zero(velocity, n))
+        return MechanismState(given_or_zero(position, n), given_or_zero(velocity, n))
 
-    def dynamics(self, t, x: Motion, u: Inputs, d: Load) -> Motion:
-        return Motion(x.velocity, self.acceleration(t, x, u, d))
+    def dynamics(self, t, x: MechanismState, u: Inputs, d: Load) -> MechanismState:
+        return MechanismState(x.velocity, self.acceleration(t, x, u, d))
 
-    def output(self, t, x: Motion) -> Measurement:
+    def output(self, t, x: MechanismState) -> Measurement:
         return Measurement(x.position, x.velocity)
 
-    def status(self, x: Motion) -> Array:
+    def status(self, x: MechanismState) -> Array:
         far = (jnp.abs(x.position) > self.envelope).any() | (jnp.abs(x.velocity) > self.envelope).any()
         return jnp.where(far, int(Status.DIVERGED), int(Status.OK))
 

@@ -13,7 +13,7 @@ from undertow.core.coordinates import OutputCoordinates
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.param import Param, param
 from undertow.core.parametric_dynamics import AbstractParametricDynamics, Parametrization
-from undertow.physics.plants.mechanism import AbstractOutputMechanism, Motion, both_ways, nominal
+from undertow.physics.plants.mechanism import AbstractOutputMechanism, MechanismState, both_ways, nominal
 
 _BOOK = "Slotine and Li 1991, Example 9.1"
 
@@ -118,14 +118,14 @@ class TwoLinkArm(AbstractOutputMechanism):
     input_unit: str = eqx.field(static=True, default="N m")
     envelope = 1e3  # rad, rad/s
 
-    def acceleration(self, t, x: Motion, u, d: Load):
+    def acceleration(self, t, x: MechanismState, u, d: Load):
         turned = matvec(self.links.inverse_mass_matrix(x.position), u - d.wrench)
         return self.links.drift(self.output(t, x)) + turned + d.acceleration
 
     def limits(self):
         return both_ways(self.limit, 2)
 
-    def power(self, x: Motion, u):
+    def power(self, x: MechanismState, u):
         return u * x.velocity
 
     def model(

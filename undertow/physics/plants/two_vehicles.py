@@ -13,9 +13,9 @@ from undertow.core.numerics.rotations import rotation_from_quaternion
 from undertow.core.signals import Signal
 from undertow.core.status import Status
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle, VehicleState, hybrid_vehicle
-from undertow.physics.plants.link import Link, LinkForces, Place
+from undertow.physics.plants.link import LinkForces, Place, SpringDamper
 from undertow.physics.thrusters.thruster import AbstractThruster
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _SIGNALS = {
     "tension": Signal((), "N", "tension of the link between the vehicles"),
@@ -41,7 +41,7 @@ class TwoVehicles(AbstractPlant):
 
     first: HybridVehicle
     second: HybridVehicle
-    link: Link
+    link: SpringDamper
     outputs: tuple[str, ...] = eqx.field(static=True)
     output_units: tuple[str, ...] = eqx.field(static=True)
     input_unit: str = eqx.field(static=True)
@@ -94,7 +94,7 @@ class TwoVehicles(AbstractPlant):
         rate_term: bool = False,
         regularisation: float | None = None,
         affine: bool = True,
-        vehicle: Vehicle | None = None,
+        vehicle: VehicleModel | None = None,
         thruster: AbstractThruster | None = None,
     ) -> Model:
         """Nominal models of both vehicles side by side; the link is in neither.
@@ -151,9 +151,9 @@ def _place(x: VehicleState) -> Place:
 
 
 def two_vehicles(
-    vehicle: Vehicle,
+    vehicle: VehicleModel,
     thruster: AbstractThruster,
-    second_vehicle: Vehicle | None = None,
+    second_vehicle: VehicleModel | None = None,
     link: str = "tether",
     length: float = 5.0,
     stiffness: float = 200.0,
@@ -190,7 +190,7 @@ def two_vehicles(
     return TwoVehicles(
         first=one,
         second=other,
-        link=Link(first_point, second_point, length, stiffness, damping, link),
+        link=SpringDamper(first_point, second_point, length, stiffness, damping, link),
         outputs=tuple(f"{name}_{i}" for i in (1, 2) for name in one.outputs),
         output_units=one.output_units * 2,
         input_unit=one.input_unit,

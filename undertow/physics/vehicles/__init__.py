@@ -2,6 +2,6 @@
 
 from undertow.core.catalogue import publish
 from undertow.physics.vehicles.body import Body as Body
-from undertow.physics.vehicles.vehicle import Vehicle as Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel as VehicleModel
 
 __getattr__ = publish(__name__)

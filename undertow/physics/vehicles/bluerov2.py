@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from undertow.physics.vehicles.published import Hull, Layout, assemble, choose
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, choose
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _HKPOLYU = "HKPolyU-UAV/bluerov2@371f35d"
 _KTH = "ViktorNfa/bluerov2_dynamics fossen/parameters.py@aafc093"
@@ -98,13 +98,13 @@ _INWARD = np.sqrt(0.5) * np.array([[1, -1, 0], [1, 1, 0], [-1, -1, 0], [-1, 1, 0
 _UP = np.array([[0, 0, -1], [0, 0, -1]], dtype=float)
 
 LAYOUTS = {
-    "hkpolyu": Layout(
+    "hkpolyu": ThrusterLayout(
         f"{_HKPOLYU} bluerov2_environ/urdf/actuators.xacro and bluerov2_dobmpc/config/TAM.yaml",
         [[0.1355, 0.1, 0.0725], [0.1355, -0.1, 0.0725], [-0.1475, 0.1, 0.0725], [-0.1475, -0.1, 0.0725]]
         + [[0.0025, 0.1105, 0.005], [0.0025, -0.1105, 0.005]],
         np.concatenate([_INWARD, _UP]),
     ),
-    "ignition": Layout(
+    "ignition": ThrusterLayout(
         "clydemcqueen/bluerov2_ignition models/bluerov2/configs.yaml@9ec0350; signs of 1-4: ArduSub, of 5-6: ours",
         [[0.140, 0.092, 0], [0.140, -0.092, 0], [-0.150, 0.092, 0], [-0.150, -0.092, 0]]
         + [[0, 0.109, -0.077], [0, -0.109, -0.077]],
@@ -113,7 +113,7 @@ LAYOUTS = {
 }
 
 
-def bluerov2(parameters: str = "hkpolyu", layout: str = "hkpolyu") -> Vehicle:
+def bluerov2(parameters: str = "hkpolyu", layout: str = "hkpolyu") -> VehicleModel:
     """BlueROV2 with six thrusters: five degrees of freedom are independent, pitch follows surge and heave.
 
     Args:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from undertow.physics.vehicles.published import Hull, Layout, assemble, choose
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, choose
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _WU = "Wu 2018, MSc thesis, Flinders University, via OsloMet-OceanLab/BlueROV2 BlueRov_m_script.m@a536a75"
 _NG = "dorsa-rh/bluerov2heavy bluerov2heavy_mpc/scripts/bluerov2heavy.py@0bb69f9"
@@ -97,13 +97,13 @@ def _vertical(*down: int) -> np.ndarray:
 
 
 LAYOUTS = {
-    "vonbenzon2022": Layout(
+    "vonbenzon2022": ThrusterLayout(
         "von Benzon et al. 2022, mirror images, via ViktorNfa/bluerov2_dynamics fossen/BlueROV2.py@aafc093",
         _POSITIONS,
         np.concatenate([_INWARD, _vertical(-1, -1, -1, -1)]),
     ),
-    "wu2018": Layout(_WU, _POSITIONS, np.concatenate([_INWARD, _vertical(-1, 1, 1, -1)])),
-    "ardusub_gazebo": Layout(
+    "wu2018": ThrusterLayout(_WU, _POSITIONS, np.concatenate([_INWARD, _vertical(-1, 1, 1, -1)])),
+    "ardusub_gazebo": ThrusterLayout(
         f"positions: {_IGNITION}; signs: ArduPilot AP_Motors6DOF.cpp, SUB_FRAME_VECTORED_6DOF",
         [[0.140, 0.092, 0], [0.140, -0.092, 0], [-0.150, 0.092, 0], [-0.150, -0.092, 0]]
         + [[0.118, 0.215, -0.064], [0.118, -0.215, -0.064], [-0.118, 0.215, -0.064], [-0.118, -0.215, -0.064]],
@@ -112,7 +112,7 @@ LAYOUTS = {
 }
 
 
-def bluerov2_heavy(parameters: str = "vonbenzon2022", layout: str = "vonbenzon2022") -> Vehicle:
+def bluerov2_heavy(parameters: str = "vonbenzon2022", layout: str = "vonbenzon2022") -> VehicleModel:
     """BlueROV2 Heavy with one of its published parameter sets.
 
     The sets are different vehicles and fits, not repeated measurements: surge drag at 0.5 m/s is 6.6 (wu2018), 10.4

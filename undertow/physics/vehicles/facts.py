@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.physics.vehicles.published import inertia_about_origin
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 FRESH_WATER = 1000.0  # kg/m^3
 
@@ -71,7 +71,7 @@ class Facts(NamedTuple):
         return np.sqrt(np.abs(np.diag(self.inertia)) / self.mass)
 
 
-def facts_of(vehicle: Vehicle) -> Facts:
+def facts_of(vehicle: VehicleModel) -> Facts:
     """Facts of a vehicle made in Python or from the catalogue."""
     numbers = {
         name: np.asarray(getattr(vehicle, name), dtype=float)

@@ -1,7 +1,7 @@
 """LAUV, Light AUV of the University of Porto and OceanScan: 1.1 m, 18 kg torpedo with one propeller and four fins."""
 
-from undertow.physics.vehicles.published import Hull, Layout, assemble
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _UUV = "uuvsimulator/lauv_gazebo lauv_description/urdf@3529e02"
 
@@ -36,10 +36,10 @@ _HULL = Hull(
         "inertia": f"solid cylinder of 1.08 m and 0.15 m; {_UUV}/base.xacro",
     },
 )
-_LAYOUT = Layout(f"{_UUV}/actuators.xacro", [[-0.53994, 0, 0]], [[1, 0, 0]])
+_LAYOUT = ThrusterLayout(f"{_UUV}/actuators.xacro", [[-0.53994, 0, 0]], [[1, 0, 0]])
 
 
-def lauv() -> Vehicle:
+def lauv() -> VehicleModel:
     """LAUV with its propeller only: surge is controlled, the other degrees of freedom are not.
 
     Not modelled: the four fins (each 0.0064 m^2 at x = -0.4 m, lift coefficient 3, drag coefficient 1.98) and the

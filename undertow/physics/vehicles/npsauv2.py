@@ -3,8 +3,8 @@
 import numpy as np
 
 from undertow.core import checks
-from undertow.physics.vehicles.published import Hull, Layout, assemble, choose
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, choose
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _HEALEY = "Healey & Lienard 1993, IEEE J. Oceanic Eng. 18(3) 327-339"
 _LENGTH = 5.3  # m
@@ -37,7 +37,7 @@ _Z_QDOT, _Y_RDOT = -6.8e-3, 1.2e-3
 _DRAG, _DRAG_SIDEWAYS, _DRAG_VERTICAL = 3.85e-3, 0.5, 0.6  # surge, and two-dimensional cross flow
 
 
-def npsauv2(parameters: str = "fossen_mss", speed: float = 1.63) -> Vehicle:
+def npsauv2(parameters: str = "fossen_mss", speed: float = 1.63) -> VehicleModel:
     """NPS AUV II with its propeller only: surge is controlled, the other degrees of freedom are not.
 
     Derived from the published derivatives: linear damping in sway, heave, roll, pitch and yaw is that of Y_v u v,
@@ -88,4 +88,6 @@ def npsauv2(parameters: str = "fossen_mss", speed: float = 1.63) -> Vehicle:
             "quadratic_damping": f"derived: closed form of the cross-flow integrals; {source}",
         },
     )
-    return assemble("npsauv2", hull, Layout("derived: on the axis at the stern", [[-_LENGTH / 2, 0, 0]], [[1, 0, 0]]))
+    return assemble(
+        "npsauv2", hull, ThrusterLayout("derived: on the axis at the stern", [[-_LENGTH / 2, 0, 0]], [[1, 0, 0]])
+    )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _BOOK = "G. Antonelli, Underwater Robots, 2nd ed., Springer 2006, App. A.4"
 
@@ -12,13 +12,13 @@ _CORNERS = np.array([[1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]], dtype=floa
 _TANGENTS = np.sqrt(0.5) * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], dtype=float)
 
 
-def odin() -> Vehicle:
+def odin() -> VehicleModel:
     """ODIN with the parameters of Antonelli (2006); assumed to be the paper's unnamed vehicle.
 
     Thrusters 1-4 are horizontal, 5-8 vertical (positive thrust pushes up), both on the four corners counted from
     fore port. In the book's thruster matrix the sign of (Y, thruster 2) reads -; only + gives four corners.
     """
-    return Vehicle(
+    return VehicleModel(
         name="odin",
         mass=125.0,
         weight=1226.0,

@@ -1,4 +1,4 @@
-"""A `Vehicle` from published numbers: variants by name, diagonals as matrices, inertia about the body origin."""
+"""A `VehicleModel` from published numbers: variants by name, diagonals as matrices, inertia about the body origin."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from undertow.core import checks
 from undertow.core.arrays import as_array
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 Variant = TypeVar("Variant")
 
@@ -34,7 +34,7 @@ class Hull(NamedTuple):
     size: ArrayLike | None = None  # m; length, width, height
 
 
-class Layout(NamedTuple):
+class ThrusterLayout(NamedTuple):
     """One published thruster layout, in the same axes."""
 
     source: str
@@ -53,14 +53,14 @@ def choose(argument: str, name: str, variants: Mapping[str, Variant]) -> Variant
     return variants[name]
 
 
-def assemble(name: str, hull: Hull, layout: Layout) -> Vehicle:
+def assemble(name: str, hull: Hull, layout: ThrusterLayout) -> VehicleModel:
     """Vehicle from one parameter set and one layout, which keeps both sources."""
     inertia, sources = _matrix(hull.inertia), {"*": hull.source}
     if np.any(hull.r_g) and not hull.inertia_about_origin:
         inertia = inertia_about_origin(inertia, hull.mass, hull.r_g)
         sources["inertia"] = f"{hull.source}; moved from the centre of gravity to the body origin"
     sources |= {"thruster_positions": layout.source, "thruster_directions": layout.source}
-    return Vehicle(
+    return VehicleModel(
         name=name,
         mass=hull.mass,
         weight=hull.weight,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from undertow.physics.vehicles.published import Hull, Layout, assemble, choose, inertia_about_origin
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, choose, inertia_about_origin
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _PRESTERO = "Prestero 2001, MSc thesis, MIT and WHOI"
 _MSS = "cybergalactic/MSS CRAFT/AUV/models/remus100.m@736a3d1"
@@ -90,7 +90,7 @@ PARAMETERS = {
 }
 
 
-def remus100(parameters: str = "prestero2001") -> Vehicle:
+def remus100(parameters: str = "prestero2001") -> VehicleModel:
     """REMUS 100 with its propeller only: surge is controlled, the other degrees of freedom are not.
 
     Not modelled: rudder, stern planes and propeller torque; lift of the hull; terms in u v, u w, u q and u r other than
@@ -107,5 +107,5 @@ def remus100(parameters: str = "prestero2001") -> Vehicle:
     """
     hull = choose("parameters", parameters, PARAMETERS)
     stern = -0.5 * (1.33 if parameters == "prestero2001" else 1.6)
-    layout = Layout("derived: on the axis at the stern", [[stern, 0, 0]], [[1, 0, 0]])
+    layout = ThrusterLayout("derived: on the axis at the stern", [[stern, 0, 0]], [[1, 0, 0]])
     return assemble("remus100", hull, layout)

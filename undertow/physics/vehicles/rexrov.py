@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from undertow.physics.vehicles.published import Hull, Layout, assemble, choose
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.published import Hull, ThrusterLayout, assemble, choose
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 _UUV = "uuvsimulator/uuv_simulator@bfb40cb"
 _BODY = {
@@ -60,12 +60,12 @@ _POSITIONS = np.array(
 )
 _AXES = np.column_stack([np.cos(_PITCH) * np.cos(_YAW), np.cos(_PITCH) * np.sin(_YAW), -np.sin(_PITCH)])
 
-_LAYOUT = Layout(
+_LAYOUT = ThrusterLayout(
     f"{_UUV} uuv_descriptions/urdf/rexrov_actuators.xacro", _POSITIONS * _TO_STARBOARD_DOWN, _AXES * _TO_STARBOARD_DOWN
 )
 
 
-def rexrov(parameters: str = "berg2012") -> Vehicle:
+def rexrov(parameters: str = "berg2012") -> VehicleModel:
     """RexROV: thrusters 1-4 mostly vertical (positive thrust pushes up), 5-8 horizontal at 45 degrees.
 
     Poses are those of the URDF, turned from forward, port, up. The added mass is unchanged, because UUV Simulator

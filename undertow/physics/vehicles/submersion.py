@@ -26,7 +26,7 @@ from undertow.core.contracts import FreeSurface, ModelScaling
 from undertow.core.numerics.linear_algebra import inverse_symmetric, matvec
 from undertow.core.numerics.rotations import cross
 from undertow.physics.vehicles.body import Body, SeenFromWater, coriolis_force
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 
 Vector3 = Float[Array, "3"]
 Vector6 = Float[Array, "6"]
@@ -37,7 +37,7 @@ _GRID = 2.0**-44  # m, a twentieth of a picometre
 _SPHERE = 3 / (4 * np.pi * FRESH_WATER)  # m^3/kg, cube of the radius of a sphere of water over its mass
 
 
-def half_size(vehicle: Vehicle) -> Float[Array, "3"]:
+def half_size(vehicle: VehicleModel) -> Float[Array, "3"]:
     """Semi-axes of the ellipsoid, m: half of the vehicle's `size`, or the radius of a sphere of its displaced volume.
 
     The volume is that of fresh water. The radius is rounded a little, so that it has the same bits where many
@@ -98,7 +98,7 @@ class Cut(NamedTuple):
         return eqx.tree_at(lambda b: b.inverse_mass_matrix, self.submerged, inverse)
 
 
-class Hull(eqx.Module):
+class HullEllipsoid(eqx.Module):
     """The ellipsoid of a vehicle, and what else of it the surface changes."""
 
     half_size: Vector3  # m
@@ -126,6 +126,6 @@ class Hull(eqx.Module):
         return Cut(body, added_mass, down, x, dry_share(x), half_height, square / half_height, dry_thrusters)
 
 
-def hull_of(vehicle: Vehicle) -> Hull:
+def hull_of(vehicle: VehicleModel) -> HullEllipsoid:
     """The hull of a vehicle."""
-    return Hull(half_size(vehicle), vehicle.added_mass, vehicle.thruster_positions)
+    return HullEllipsoid(half_size(vehicle), vehicle.added_mass, vehicle.thruster_positions)

@@ -17,7 +17,7 @@ from undertow.physics.vehicles.body import Body, rigid_body_mass
 from undertow.physics.vehicles.thruster_labels import check_own, labels
 
 
-class Vehicle(eqx.Module):
+class VehicleModel(eqx.Module):
     """Hull and thruster layout. Body axes forward, starboard, down; matrices positive.
 
     Raises:
@@ -130,7 +130,7 @@ class Vehicle(eqx.Module):
         )
 
     @double_outside_runs
-    def with_thrusters(self, numbers) -> "Vehicle":
+    def with_thrusters(self, numbers) -> "VehicleModel":
         """The same hull with some of its thrusters only, numbered from 1.
 
         Raises:

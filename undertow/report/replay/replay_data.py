@@ -20,7 +20,7 @@ from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS
 from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.vehicles.facts import facts_of
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.report.replay.recomputed import environment, firing_along, thrust_along, thrust_limits
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
@@ -42,7 +42,7 @@ class Thrusters(NamedTuple):
     limits: np.ndarray  # N, shape (N, 2): reverse (negative) and forward
 
 
-class Replay(NamedTuple):
+class ReplayData(NamedTuple):
     """One run to be shown.
 
     Attributes:
@@ -90,7 +90,7 @@ def can_be_shown(plant: AbstractPlant) -> bool:
 
 def replay_of(
     run: xr.Dataset, loop: ClosedLoop, seed: int, hull: Sequence[float] | None, label: str = ""
-) -> Replay | None:
+) -> ReplayData | None:
     """What a replay shows of a run; None for a plant that is no vehicle with thrusters, or a single record.
 
     Args:
@@ -111,7 +111,7 @@ def replay_of(
 
 def _replay_of(
     run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, seed: int, size: np.ndarray, label: str
-) -> Replay:
+) -> ReplayData:
     time, frames = run["time"].values, _frames(run["time"].values)
     shown = run.isel(time=frames)
     position, reference = shown["position"].values, shown["reference"].values
@@ -143,7 +143,7 @@ def _replay_of(
     limits, limited = _limits(plant, thrust)
     vehicle = plant.vehicle
     positions = np.asarray(vehicle.thruster_positions)
-    return Replay(
+    return ReplayData(
         label=label,
         status=str(run.attrs.get("status", "")),
         time=shown["time"].values,
@@ -213,7 +213,7 @@ def _limits(plant: HybridVehicle, thrust: np.ndarray) -> tuple[np.ndarray, bool]
     return np.tile([-most, most], (plant.inputs(), 1)), False
 
 
-def hull_size(vehicle: Vehicle, known: Sequence[float] | None) -> np.ndarray:
+def hull_size(vehicle: VehicleModel, known: Sequence[float] | None) -> np.ndarray:
     """Length, width and height, m: the known ones, or those of the even box of the same mass and inertia."""
     if known is not None:
         return np.asarray(known, dtype=float)
@@ -223,13 +223,13 @@ def hull_size(vehicle: Vehicle, known: Sequence[float] | None) -> np.ndarray:
     return np.maximum(sides, _THINNEST * max(float(sides.max()), facts.scale))
 
 
-def page_data(replays: Sequence[Replay]) -> str:
+def page_data(replays: Sequence[ReplayData]) -> str:
     """All that the script of the page needs, as JSON that may stand inside a script element."""
     runs = [_described(replay, COLOURS[number % len(COLOURS)]) for number, replay in enumerate(replays)]
     return json.dumps({"runs": runs}, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _described(replay: Replay, colour: str) -> dict[str, Any]:
+def _described(replay: ReplayData, colour: str) -> dict[str, Any]:
     names, positions, directions, limits = replay.thrusters
     numbers = lambda values: np.round(np.asarray(values, dtype=float), 5).tolist()
     return {

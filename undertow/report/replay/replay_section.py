@@ -6,7 +6,7 @@ from importlib.resources import files
 from undertow.core.user_code import python_says
 from undertow.report.formats import prose
 from undertow.report.page import Html, section, tag
-from undertow.report.replay.replay_data import Replay, page_data
+from undertow.report.replay.replay_data import ReplayData, page_data
 
 _THREE_JS = ("jupyter_threejs_sage", "static/r130/three.min.js")
 _SCRIPTS = ("unpack.js", "scene.js", "panels.js", "replay.js")  # one after the other they are one script
@@ -22,7 +22,7 @@ _KEYS = (
 )
 
 
-def replay_section(replays: Sequence[Replay], caption: str = "") -> Html:
+def replay_section(replays: Sequence[ReplayData], caption: str = "") -> Html:
     """A section with the replay of one run, or of several in one scene; of each, label and colour differ.
 
     Without the package that holds three.js, a sentence that says how to install it.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from undertow.report.replay.replay_data import COLOURS, FRAMES, Replay, replay_of
+from undertow.report.replay.replay_data import COLOURS, FRAMES, ReplayData, replay_of
 from undertow.report.replay.replay_section import not_made
 from undertow.scenario.build import Built
 from undertow.scenario.prepare import prepare
@@ -15,7 +15,7 @@ from undertow.simulation.run_many import run_many
 MOST = len(COLOURS)  # vehicles in one scene, each in a colour of its own
 
 
-def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[Replay], list[str]]:
+def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[ReplayData], list[str]]:
     """Run trials again and return what a replay shows of them, and a sentence for each failure.
 
     Trials of one structure share a compiled program; compiling takes most of the time.
@@ -27,7 +27,7 @@ def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[Replay], list[s
     for label, built in trials.items():
         kind = (tuple(built.closed_loop.signals()), _time_between_records(built))
         alike.setdefault(kind, {})[label] = built
-    found: dict[str, Replay] = {}
+    found: dict[str, ReplayData] = {}
     failures: list[str] = []
     for (signals, every), several in alike.items():
         try:
@@ -37,8 +37,8 @@ def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[Replay], list[s
     return [found[label] for label in trials if label in found], failures
 
 
-def _together(trials: Mapping[str, Built], signals: Sequence[str], every: float) -> dict[str, Replay]:
-    found: dict[str, Replay] = {}
+def _together(trials: Mapping[str, Built], signals: Sequence[str], every: float) -> dict[str, ReplayData]:
+    found: dict[str, ReplayData] = {}
     labels = list(trials)
     for several in run_many(prepare(built, signals, every) for built in trials.values()):
         for place, outcome in several.each():

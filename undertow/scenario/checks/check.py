@@ -13,7 +13,7 @@ from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import place_of
 from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.thrusters.thruster import AbstractThruster
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario import factory
 from undertow.scenario.build import build, in_its_precision
 from undertow.scenario.checks.controller_check import check_stability
@@ -96,7 +96,7 @@ def _of_vehicle(facts: Facts, where: Callable[[str], str] = lambda key: "") -> R
 
 
 def _of_part(name: str, part: Any) -> Report:
-    if isinstance(part, Vehicle):
+    if isinstance(part, VehicleModel):
         return _of_vehicle(facts_of(part))
     if isinstance(part, AbstractThruster):
         return _of_thruster(part, f"{name} (thruster)", partial(_place, part))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from undertow.analysis.success import Success
 from undertow.analysis.temporal.requirements import Verdict
 from undertow.control.supervision.conditions import State
-from undertow.control.supervision.transition_log import Transition
+from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core.json_text import to_json
 from undertow.core.metric import Metric
 from undertow.core.status import Status
@@ -58,7 +58,7 @@ class RunFacts(NamedTuple):
     requirements: Mapping[str, Verdict] = MappingProxyType({})
     certificate: Mapping[str, Any] | None = None
     navigation: Mapping[str, Any] | None = None
-    transitions: Sequence[Transition] | None = None
+    transitions: Sequence[SupervisorTransition] | None = None
     code: str = ""
     left_to_xla: str = ""
     versions: Mapping[str, str] = MappingProxyType({})
@@ -160,8 +160,8 @@ def _status(word: str) -> Status:
     raise ValueError(f"unknown status {word!r}")
 
 
-def _transition(entry: Mapping[str, Any]) -> Transition:
-    return Transition(**{**entry, "state": State(entry["state"])})
+def _transition(entry: Mapping[str, Any]) -> SupervisorTransition:
+    return SupervisorTransition(**{**entry, "state": State(entry["state"])})
 
 
 def _is_version(name: str) -> bool:

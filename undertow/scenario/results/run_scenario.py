@@ -13,7 +13,7 @@ from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.consistency import record_period
 from undertow.scenario.reading import Text
 from undertow.scenario.results.run_result import MetricsSettings, Origin, ScenarioResult, make_result
-from undertow.scenario.schema import Initial, Loop
+from undertow.scenario.schema import ClosedLoopSettings, Initial
 from undertow.scenario.step_size import step_failure
 from undertow.simulation.loop import continuous, sampled, simd_batch
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -70,7 +70,7 @@ def finished(built: Built, outcome: Outcome, left_to_xla: str, gathered: Gathere
 
 def run_loop(
     loop: ClosedLoop,
-    settings: Loop,
+    settings: ClosedLoopSettings,
     start: Initial,
     seed: int,
     accumulators: tuple[sampled.AbstractAccumulator, ...] = (),

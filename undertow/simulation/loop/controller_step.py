@@ -12,7 +12,7 @@ from undertow.core.contracts import AbstractController, Inputs, Measurement, Tar
 from undertow.core.expected_measurement import Expected, at_start
 
 
-class Memory(NamedTuple):
+class ControllerMemory(NamedTuple):
     """What a controller remembers of a step.
 
     Attributes:
@@ -36,14 +36,14 @@ class Answer(NamedTuple):
     signals: dict[str, Any]
 
 
-def first_step(law: AbstractController, y: Measurement, r: Target) -> tuple[Memory, Answer]:
+def first_step(law: AbstractController, y: Measurement, r: Target) -> tuple[ControllerMemory, Answer]:
     """The step with which control begins; every entry of the measurement is finite."""
     return _decided(law, law.init(y, r), y, r, at_start(law.model.coordinates, y, y))
 
 
 def next_step(
-    law: AbstractController, memory: Memory, y: Measurement, r: Target, applied: Inputs, dt: Time
-) -> tuple[Memory, Answer]:
+    law: AbstractController, memory: ControllerMemory, y: Measurement, r: Target, applied: Inputs, dt: Time
+) -> tuple[ControllerMemory, Answer]:
     """The step `dt` after the last one, since when `applied` was applied.
 
     Entries of the measurement that are not finite are replaced by those that the law's model expects, unless the law
@@ -59,4 +59,4 @@ def next_step(
 
 def _decided(law: AbstractController, state: PyTree, y: Measurement, r: Target, expected: Expected):
     command, signals = law.command(state, y, r)
-    return Memory(state, y, r, signals.get("estimate", ()), expected), Answer(command, signals)
+    return ControllerMemory(state, y, r, signals.get("estimate", ()), expected), Answer(command, signals)

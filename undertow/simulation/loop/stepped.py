@@ -31,7 +31,7 @@ class Uncopied:
         self.__copy__()
 
 
-class Step(Uncopied):
+class CompiledStep(Uncopied):
     """A function (numbers, state, inputs) -> (state, outputs), compiled for one run.
 
     Write into the arrays of `inputs`, call, and read those of `outputs`. Two threads may not call the same step.
@@ -62,10 +62,10 @@ class Step(Uncopied):
         self._step()
 
 
-def step_of(function: Callable, part: Any, state: Any, inputs: Any) -> Step:
+def step_of(function: Callable, part: Any, state: Any, inputs: Any) -> CompiledStep:
     """A compiled step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
     of_part, rest = eqx.partition(part, eqx.is_array)
-    return Step(
+    return CompiledStep(
         lambda of_part, state, inputs: function(eqx.combine(of_part, rest), state, inputs), of_part, state, inputs
     )
 

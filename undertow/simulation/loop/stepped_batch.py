@@ -37,7 +37,7 @@ class Starter:
         return self._begin(numbers)
 
 
-class BatchStep:
+class CompiledBatchStep:
     """A function (numbers, state, inputs) -> (state, outputs) of many runs, which keeps numbers and states.
 
     Args:

@@ -12,7 +12,7 @@ from undertow.core.json_text import to_json
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.studies.arena.tasks import CELLS, VERSION, Keys, scenarios
-from undertow.studies.arena.tuned_gains import Gains, controller_of
+from undertow.studies.arena.tuned_gains import TunedGains, controller_of
 from undertow.studies.campaign.campaign_schema import validate
 from undertow.studies.campaign.prepare import Prepared, prepare_campaign
 from undertow.studies.comparison.candidates import Candidate, in_letters
@@ -48,7 +48,7 @@ def folder_of(out: Path, name: str) -> Path:
 
 
 def prepare_entry(
-    law: Candidate, trials: int, cells: Sequence[Cell] = CELLS, gains: Gains | None = None
+    law: Candidate, trials: int, cells: Sequence[Cell] = CELLS, gains: TunedGains | None = None
 ) -> tuple[Entry, Prepared]:
     """The campaign of a law: variants for every task and vehicle that it accepts.
 
@@ -78,7 +78,7 @@ def prepare_entry(
     return Entry(law.name, VERSION, law.changes["controller"], tuple(cells), refused, sentences), prepared
 
 
-def with_law(cell: Cell, law: Candidate, gains: Gains | None) -> dict[str, Keys]:
+def with_law(cell: Cell, law: Candidate, gains: TunedGains | None) -> dict[str, Keys]:
     """The scenarios of a task on a vehicle with a law, by their names."""
     controller = controller_of(law, cell[1], gains)
     return {name: keys | {"controller": controller} for name, keys in scenarios(*cell).items()}

@@ -11,14 +11,14 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.studies.arena.entry import ENTRY, LAWS, Cell, Entry, read_entry
-from undertow.studies.arena.robustness import FOLDER, PARAMETERS, Curve, curves
+from undertow.studies.arena.robustness import FOLDER, PARAMETERS, RobustnessCurve, curves
 from undertow.studies.arena.scores import Score, geometric_mean, score_of
 from undertow.studies.arena.tasks import TASKS, VERSION
 from undertow.studies.arena.vehicles import VEHICLES
 from undertow.studies.campaign.run_campaign import STORE
 from undertow.studies.comparison.sentences import digits
 from undertow.studies.comparison.step_time import StepTime
-from undertow.studies.comparison.tables import Rows
+from undertow.studies.comparison.tables import TextTable
 
 STEP = "step_time.json"  # in the folder of a law
 BASELINE = "robust"  # ratios are to its errors
@@ -36,7 +36,7 @@ class Standing(NamedTuple):
 
     entry: Entry
     score: Score
-    robustness: dict[str, Curve]
+    robustness: dict[str, RobustnessCurve]
     step: StepTime | None
 
 
@@ -99,7 +99,7 @@ def ranked(standings: Sequence[Standing]) -> list[Standing]:
 _HEAD = ("law", "error / tolerance", "within tolerance", "lost", "against robust", "input variation (%/s)", "step (us)")
 
 
-def leader_rows(board: Board) -> Rows:
+def leader_rows(board: Board) -> TextTable:
     """The board, a row for each law."""
     baseline = next((one.score for one in board.standings if one.entry.name == BASELINE), None)
     rows = []
@@ -110,49 +110,49 @@ def leader_rows(board: Board) -> Rows:
         error = f"{digits(score.error)} [{digits(score.low)}, {digits(score.high)}]"
         shares = (f"{100 * score.within:.1f} %", f"{100 * score.lost:.1f} %")
         rows.append((one.entry.name, error, *shares, against, digits(100 * score.activity), step))
-    return Rows(_HEAD, rows)
+    return TextTable(_HEAD, rows)
 
 
-def task_rows(board: Board) -> Rows:
+def task_rows(board: Board) -> TextTable:
     """Error of every law in every task, in tolerances: the geometric mean over the vehicles."""
     rows = [
         (one.entry.name, *(digits(one.score.mean(board.of_task(task))) for task in board.tasks))
         for one in board.standings
     ]
-    return Rows(("law", *(task.replace("_", " ") for task in board.tasks)), rows)
+    return TextTable(("law", *(task.replace("_", " ") for task in board.tasks)), rows)
 
 
-def vehicle_rows(board: Board) -> Rows:
+def vehicle_rows(board: Board) -> TextTable:
     """Error of every law on every vehicle, in tolerances: the geometric mean over the tasks."""
     rows = [
         (one.entry.name, *(digits(one.score.mean(board.of_vehicle(vehicle))) for vehicle in board.vehicles))
         for one in board.standings
     ]
-    return Rows(("law", *board.vehicles), rows)
+    return TextTable(("law", *board.vehicles), rows)
 
 
-def ratio_rows(board: Board) -> Rows:
+def ratio_rows(board: Board) -> TextTable:
     """Error of every law in every task / that of the baseline, as means over the vehicles; no rows without it."""
     scores = {one.entry.name: one.score for one in board.standings}
     head = ("law", *(task.replace("_", " ") for task in board.tasks), "largest on one vehicle")
     if BASELINE not in scores:
-        return Rows(head, [])
+        return TextTable(head, [])
     rows = []
     for name, score in scores.items():
         ratios = {cell: score.cells[cell].error / scores[BASELINE].cells[cell].error for cell in board.cells}
         means = (geometric_mean([ratios[cell] for cell in board.of_task(task)]) for task in board.tasks)
         rows.append((name, *map(digits, means), digits(max(ratios.values()))))
-    return Rows(head, rows)
+    return TextTable(head, rows)
 
 
-def margin_rows(board: Board) -> Rows:
+def margin_rows(board: Board) -> TextTable:
     """The hardest level of every parameter up to which a law is within its tolerances."""
     shown = [one for one in board.standings if one.robustness]
     rows = [(one.entry.name, *(_level(one.robustness[name]) for name in PARAMETERS)) for one in shown]
-    return Rows(("law", *(one.label for one in PARAMETERS.values())), rows)
+    return TextTable(("law", *(one.label for one in PARAMETERS.values())), rows)
 
 
-def failures(board: Board) -> Rows:
+def failures(board: Board) -> TextTable:
     """Every task and vehicle in which trials of a law failed or were refused."""
     rows = [
         (one.entry.name, *cell, ", ".join(f"{word.replace('_', ' ')} {count}" for word, count in result.failed.items()))
@@ -160,7 +160,7 @@ def failures(board: Board) -> Rows:
         for cell, result in one.score.cells.items()
         if result.failed
     ]
-    return Rows(("law", "task", "vehicle", "failed trials"), rows)
+    return TextTable(("law", "task", "vehicle", "failed trials"), rows)
 
 
 def as_csv(board: Board) -> str:
@@ -178,7 +178,7 @@ def as_csv(board: Board) -> str:
     return text.getvalue()
 
 
-def as_markdown(rows: Rows) -> str:
+def as_markdown(rows: TextTable) -> str:
     """A table in Markdown."""
     lines = [rows.head, ["---"] * len(rows.head), *rows.rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
@@ -189,7 +189,7 @@ def _median(column: np.ndarray) -> str:
     return repr(float(np.nanmedian(column))) if np.isfinite(column).any() else ""
 
 
-def _level(curve: Curve) -> str:
+def _level(curve: RobustnessCurve) -> str:
     return "none" if curve.last != curve.last else f"{curve.last:g}{'+' * (curve.last == curve.levels[-1])}"
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from undertow.studies.arena.entry import campaign_of
 from undertow.studies.arena.scores import trial_errors
 from undertow.studies.arena.tasks import METRICS, Keys, motion_keys
-from undertow.studies.arena.tuned_gains import Gains, controller_of
+from undertow.studies.arena.tuned_gains import TunedGains, controller_of
 from undertow.studies.arena.vehicles import VEHICLES
 from undertow.studies.campaign.prepare import Prepared
 from undertow.studies.campaign.store_results import load
@@ -24,7 +24,7 @@ VEHICLE = "bluerov2_heavy"
 FOLDER = "robustness"  # inside that of a law
 
 
-class Parameter(NamedTuple):
+class ConditionParameter(NamedTuple):
     """A parameter of the conditions.
 
     Attributes:
@@ -67,44 +67,46 @@ def _supply(supply: float) -> Keys:
 
 
 PARAMETERS = {
-    "waves": Parameter(
+    "waves": ConditionParameter(
         "significant wave height, m",
         (0.2, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0),
         lambda height: _load({"kind": "waves", "height": height, "period": 5, "depth": 3}),
     ),
-    "current": Parameter("speed of the current, m/s", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8), _current),
-    "speed": Parameter(
+    "current": ConditionParameter("speed of the current, m/s", (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8), _current),
+    "speed": ConditionParameter(
         "largest speed of the motion, m/s",
         (0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9),
         lambda speed: motion_keys(VEHICLE, speed / VEHICLES[VEHICLE].speed),
     ),
-    "delay": Parameter("delay of the measurements, s", (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5), _delay),
-    "noise": Parameter("noise of the velocities, m/s and rad/s", (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2), _noise),
-    "mass": Parameter(
+    "delay": ConditionParameter("delay of the measurements, s", (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5), _delay),
+    "noise": ConditionParameter(
+        "noise of the velocities, m/s and rad/s", (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2), _noise
+    ),
+    "mass": ConditionParameter(
         "mass of the vehicle / that of the model",
         (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         lambda factor: _load(_error(mass=factor)),
     ),
-    "damping": Parameter(
+    "damping": ConditionParameter(
         "drag of the vehicle / that of the model",
         (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         lambda factor: _load(_error(damping=factor)),
     ),
-    "strong": Parameter(
+    "strong": ConditionParameter(
         "thrust above that of the model, as a ratio",
         (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0),
         lambda factor: _load(_error(thrust=factor)),
     ),
-    "weak": Parameter(
+    "weak": ConditionParameter(
         "thrust below that of the model, as a ratio",
         (1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3),
         lambda factor: _load(_error(thrust=factor)),
     ),
-    "supply": Parameter("supply, V (the model has 16 V)", (16, 14, 12, 11, 10, 9, 8), _supply),
+    "supply": ConditionParameter("supply, V (the model has 16 V)", (16, 14, 12, 11, 10, 9, 8), _supply),
 }
 
 
-class Curve(NamedTuple):
+class RobustnessCurve(NamedTuple):
     """Error of a law over a parameter.
 
     Attributes:
@@ -129,7 +131,7 @@ class Curve(NamedTuple):
         return {name: list(map(float, column)) for name, column in self._asdict().items()}
 
 
-def prepare_robustness(law: Candidate, trials: int, gains: Gains | None) -> Prepared:
+def prepare_robustness(law: Candidate, trials: int, gains: TunedGains | None) -> Prepared:
     """The campaign of a law: a variant for every level of every parameter.
 
     Args:
@@ -148,7 +150,7 @@ def prepare_robustness(law: Candidate, trials: int, gains: Gains | None) -> Prep
     return campaign_of(scenarios, trials)
 
 
-def curves(folder: Path) -> dict[str, Curve]:
+def curves(folder: Path) -> dict[str, RobustnessCurve]:
     """Error over every parameter, from the folder of the campaign.
 
     Raises:
@@ -163,9 +165,9 @@ def curves(folder: Path) -> dict[str, Curve]:
     return {name: _curve(one.levels, [at(name, level) for level in one.levels]) for name, one in PARAMETERS.items()}
 
 
-def _curve(levels: tuple[float, ...], errors: Sequence[np.ndarray]) -> Curve:
+def _curve(levels: tuple[float, ...], errors: Sequence[np.ndarray]) -> RobustnessCurve:
     of = lambda function: np.array([function(one) if len(one) else np.nan for one in errors])
-    return Curve(levels, of(np.median), of(np.min), of(np.max))
+    return RobustnessCurve(levels, of(np.median), of(np.min), of(np.max))
 
 
 def _variant(name: str, level: float) -> str:

@@ -10,7 +10,7 @@ from undertow.studies.comparison.candidates import Candidate
 from undertow.studies.comparison.equal_budgets import equal_budgets
 
 
-class Gains(NamedTuple):
+class TunedGains(NamedTuple):
     """Gains of a law.
 
     Attributes:
@@ -22,14 +22,14 @@ class Gains(NamedTuple):
     sentences: dict[str, str]
 
 
-def controller_of(law: Candidate, vehicle: str, gains: Gains | None) -> dict[str, Any]:
+def controller_of(law: Candidate, vehicle: str, gains: TunedGains | None) -> dict[str, Any]:
     """Part `controller` of a law on a vehicle, with its tuned gains if there are any."""
     return law.changes["controller"] | ({} if gains is None else gains.options.get(vehicle, {}))
 
 
 def tuned_gains(
     law: Candidate, vehicles: Sequence[str], budget: int, folder: Path, say: Callable[[str], None]
-) -> Gains:
+) -> TunedGains:
     """Tune a law for every vehicle on a motion in waves, with seeds, seas and parameter sets that no task has.
 
     Args:
@@ -48,4 +48,4 @@ def tuned_gains(
         stage = lambda words, vehicle=vehicle: say(f"{vehicle}: {words}")
         _, budgets = equal_budgets([law], scenario, budget, folder / vehicle, stage)
         options[vehicle], sentences[vehicle] = budgets.laws[0].gains, budgets.laws[0].sentence
-    return Gains(options, sentences)
+    return TunedGains(options, sentences)

@@ -40,14 +40,14 @@ _SEARCHED = 2048  # samples among which as many of a kind have to be
 _TRACED = ("plant", "model", "controller", "reference", "disturbance", "navigation", "metrics", "initial")
 
 
-class Kind(NamedTuple):
+class TrialSignature(NamedTuple):
     """What trials have to share in order to be built together."""
 
     combination: int  # of `cross`
     others: str  # values that are no fractions
 
 
-class Together(NamedTuple):
+class TrialBatch(NamedTuple):
     """Valid trials of a task that differ only in numbers."""
 
     places: np.ndarray  # in the task
@@ -86,8 +86,8 @@ def build_trials(
     part_cache: PartCache,
     trials: np.ndarray,
     sampled: Mapping[str, list[Any]],
-    traceable: dict[Kind, bool],
-) -> Iterator[Together]:
+    traceable: dict[TrialSignature, bool],
+) -> Iterator[TrialBatch]:
     """The valid trials among some: those whose numbers can be traced together, the others each by itself.
 
     Args:
@@ -107,7 +107,7 @@ def build_trials(
             yield found._replace(places=places[found.places])
             places = np.delete(places, found.places)
         for place, built in valid_trials(several, part_cache, trials[places].tolist()):
-            yield Together(places[[place]], built, batch_of(prepare_trial(built, recorded(several.campaign, built))))
+            yield TrialBatch(places[[place]], built, batch_of(prepare_trial(built, recorded(several.campaign, built))))
 
 
 def _fractions(several: Trials) -> list[str]:
@@ -118,17 +118,17 @@ def _fractions(several: Trials) -> list[str]:
 
 def _by_kind(
     several: Trials, trials: np.ndarray, sampled: Mapping[str, list[Any]], varied: list[str]
-) -> dict[Kind, np.ndarray]:
+) -> dict[TrialSignature, np.ndarray]:
     """Places of trials by kind: one combination of `cross`, and the same values where these are no fractions."""
     others = [column for key, column in sampled.items() if key not in varied]
-    groups: dict[Kind, list[int]] = {}
+    groups: dict[TrialSignature, list[int]] = {}
     for place, trial in enumerate(trials.tolist()):
-        kind = Kind(trial % len(several.combinations), repr([column[place] for column in others]))
+        kind = TrialSignature(trial % len(several.combinations), repr([column[place] for column in others]))
         groups.setdefault(kind, []).append(place)
     return {kind: np.array(places) for kind, places in groups.items()}
 
 
-def _traceable(several: Trials, part_cache: PartCache, kind: Kind, varied: list[str]) -> bool:
+def _traceable(several: Trials, part_cache: PartCache, kind: TrialSignature, varied: list[str]) -> bool:
     """Whether the first trials of a kind have the same bits when they are built together and alone."""
     if any(key_path(key)[0] not in _TRACED for key in varied):
         return False
@@ -144,7 +144,7 @@ def _traceable(several: Trials, part_cache: PartCache, kind: Kind, varied: list[
 
 def _together(
     several: Trials, part_cache: PartCache, trials: np.ndarray, varied: Mapping[str, np.ndarray], compared: int = 1
-) -> Together | None:
+) -> TrialBatch | None:
     """Those of some trials that meet all conditions; None where their numbers cannot be traced.
 
     Args:
@@ -171,7 +171,7 @@ def _together(
             return None
     places = np.flatnonzero(good)
     own = [None if number is None else number[places] for number in numbers]
-    return Together(places, first, batch._replace(numbers=own, size=len(places)))
+    return TrialBatch(places, first, batch._replace(numbers=own, size=len(places)))
 
 
 def _same(first: Any, numbers: list[np.ndarray | None], place: int, alone: Any) -> bool:

@@ -56,7 +56,7 @@ class Distribution(Strict):
         return self
 
 
-class Requirement(RunRequirement):
+class CampaignRequirement(RunRequirement, title="Requirement"):
     """A bound on a metric, or a temporal formula, that a share of all trials must keep."""
 
     share: float = Field(0.95, gt=0, description="smallest share of the trials that must keep the bound")
@@ -69,7 +69,7 @@ class Requirement(RunRequirement):
         return given
 
 
-class Series(Strict):
+class RecordedSignals(Strict, title="Series"):
     """Signals to record for every trial."""
 
     signals: list[str] = Field(
@@ -105,11 +105,11 @@ class Campaign(Strict):
         default_factory=dict,
         description="name -> key paths and their values: whatever changes together; an axis after those of `cross`",
     )
-    requirements: dict[str, Requirement] = Field(
+    requirements: dict[str, CampaignRequirement] = Field(
         default_factory=dict,
         description="metric -> bound that it must keep; or any name -> formula that the run must keep",
     )
-    series: Series | None = Field(None, description="signals to record; none by default")
+    series: RecordedSignals | None = Field(None, description="signals to record; none by default")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
     chunk: int | None = Field(
         None,
@@ -162,7 +162,11 @@ class Campaign(Strict):
 
 
 # Keys of the sections that a campaign has several times, or not at all by default.
-SECTIONS = {"each distribution in `vary`": Distribution, "each requirement": Requirement, "`series`": Series}
+SECTIONS = {
+    "each distribution in `vary`": Distribution,
+    "each requirement": CampaignRequirement,
+    "`series`": RecordedSignals,
+}
 
 
 def campaign_json_schema() -> dict[str, Any]:

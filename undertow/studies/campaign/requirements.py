@@ -12,7 +12,7 @@ from undertow.core.errors import BadInput, within
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import record_period
-from undertow.studies.campaign.campaign_schema import Campaign, Requirement, Series
+from undertow.studies.campaign.campaign_schema import Campaign, CampaignRequirement, RecordedSignals
 
 _CONFIDENCE = 0.95
 
@@ -51,13 +51,13 @@ def check_formulas(campaign: Campaign, built: Built) -> None:
         raise BadInput("series.every", must, f"{campaign.series.every:g} s")
 
 
-def recorded(campaign: Campaign, built: Built) -> Series | None:
+def recorded(campaign: Campaign, built: Built) -> RecordedSignals | None:
     """Series that a trial records: those that were asked for, and those that formulas need."""
     needed = temporal.needed_signals(formulas_of(campaign, built))
     if not needed:
         return campaign.series
     asked = campaign.series.signals if campaign.series is not None else []
-    return Series(signals=list(dict.fromkeys([*asked, *needed])), every=built.scenario.loop.record)
+    return RecordedSignals(signals=list(dict.fromkeys([*asked, *needed])), every=built.scenario.loop.record)
 
 
 def formula_metrics(campaign: Campaign) -> dict[str, Metric]:
@@ -92,7 +92,7 @@ def robustness(
     return found
 
 
-def verdict(rows: xr.Dataset, name: str, required: Requirement) -> dict[str, Any]:
+def verdict(rows: xr.Dataset, name: str, required: CampaignRequirement) -> dict[str, Any]:
     """Share of the trials that ran that keep a requirement, with the interval of Clopper and Pearson (1934).
 
     A formula is kept where its robustness is positive. The interval is exact for random samples. Failed trials do not

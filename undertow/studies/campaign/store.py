@@ -21,7 +21,7 @@ from undertow.core.errors import BadInput
 from undertow.core.file_lock import file_lock
 from undertow.studies.campaign.columns import DONE, FLAGS, Label
 from undertow.studies.campaign.fingerprint import Identity, samples
-from undertow.studies.campaign.store_layout import Layout
+from undertow.studies.campaign.store_layout import StoreLayout
 
 # The checksum reveals a chunk that was written only in part.
 _CODEC = ZstdCodec(level=3, checksum=True)
@@ -135,7 +135,7 @@ class Store:
     def __init__(
         self,
         path: Path,
-        layout: Layout,
+        layout: StoreLayout,
         identity: Identity,
         labels: Mapping[str, Label],
         coordinates: Mapping[str, xr.Variable],

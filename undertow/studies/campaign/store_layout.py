@@ -11,7 +11,7 @@ from undertow.studies.campaign.campaign_schema import Campaign
 SAMPLES = "sample"
 
 
-class Layout(NamedTuple):
+class StoreLayout(NamedTuple):
     """Axes of the store, cut into blocks."""
 
     swept: tuple[int, ...]  # number of values of every key of `cross`
@@ -60,10 +60,10 @@ class Layout(NamedTuple):
         return range(self.samples // self.chunk[-1] * beside, self.tasks)
 
 
-def layout(campaign: Campaign) -> Layout:
+def layout(campaign: Campaign) -> StoreLayout:
     """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples."""
     swept, most = tuple(len(entries) for entries in campaign.axes.values()), campaign.trials_per_task
     chunk = [min(most, max(campaign.trials, most // math.prod(swept)))]
     for count in reversed(swept):
         chunk.insert(0, min(count, most // math.prod(chunk)) or 1)
-    return Layout(swept, campaign.trials, tuple(chunk))
+    return StoreLayout(swept, campaign.trials, tuple(chunk))

@@ -16,7 +16,7 @@ from undertow.studies.campaign.campaign_schema import Campaign, read_text
 from undertow.studies.campaign.columns import DONE, FLAGS, METRICS, trial_labels
 from undertow.studies.campaign.run_campaign import STORE
 from undertow.studies.campaign.store import check_array, chunk_file, flags, to_be_read
-from undertow.studies.campaign.store_layout import SAMPLES, Layout, layout
+from undertow.studies.campaign.store_layout import SAMPLES, StoreLayout, layout
 from undertow.studies.campaign.task import INVALID
 
 
@@ -114,7 +114,7 @@ def load(folder: Path) -> Results:
         raise OSError(f"{path} is damaged ({error}); `undertow campaign --resume` repairs it where possible") from error
 
 
-def _rows(group: Any, campaign: Campaign, stored: Layout, names: Iterable[str]) -> xr.Dataset:
+def _rows(group: Any, campaign: Campaign, stored: StoreLayout, names: Iterable[str]) -> xr.Dataset:
     """All rows of the store by trial, without series.
 
     Arrays may be longer while a process makes room for more samples.
@@ -127,7 +127,7 @@ def _rows(group: Any, campaign: Campaign, stored: Layout, names: Iterable[str]) 
     return rows.assign_coords(trial=np.arange(campaign.number)).assign_attrs(group.attrs)
 
 
-def _done(group: Any, campaign: Campaign, stored: Layout, path: Path, names: Iterable[str]) -> np.ndarray:
+def _done(group: Any, campaign: Campaign, stored: StoreLayout, path: Path, names: Iterable[str]) -> np.ndarray:
     """Which trials belong to finished tasks."""
     done = np.zeros(campaign.number, dtype=bool)
     for task in np.flatnonzero(flags(group[DONE], stored.tasks)).tolist() if DONE in group else ():

@@ -17,10 +17,10 @@ from undertow.scenario.build import Built
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.prepared_run import RunBatch
 from undertow.simulation.programs import ProgramCache
-from undertow.studies.campaign.build_trials import Kind, build_data, build_trial, build_trials, valid_trials
+from undertow.studies.campaign.build_trials import TrialSignature, build_data, build_trial, build_trials, valid_trials
 from undertow.studies.campaign.campaign_schema import read_text
 from undertow.studies.campaign.requirements import formula_metrics, recorded, robustness
-from undertow.studies.campaign.store_layout import Layout
+from undertow.studies.campaign.store_layout import StoreLayout
 from undertow.studies.campaign.trial_results import prepare_trial, run_prepared
 from undertow.studies.campaign.trials import Trials, trials, varied_keys
 
@@ -37,7 +37,7 @@ class Site(NamedTuple):
     trials: Trials
     part_cache: PartCache
     programs: ProgramCache
-    traceable: dict[Kind, bool]  # see `build_trials`
+    traceable: dict[TrialSignature, bool]  # see `build_trials`
     probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
     alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
 
@@ -60,7 +60,7 @@ def site(text: str, folder: str) -> Site:
     return Site(several, part_cache, programs, {}, probes, others)
 
 
-def run_block(text: str, folder: str, layout: Layout, task: int) -> dict[str, np.ndarray]:
+def run_block(text: str, folder: str, layout: StoreLayout, task: int) -> dict[str, np.ndarray]:
     """Columns of the trials of a task."""
     return run_trials(text, folder, layout.trials(task).tolist())
 

@@ -13,7 +13,7 @@ from undertow.scenario.prepare import prepare
 from undertow.simulation.prepared_run import PreparedRun, RunBatch
 from undertow.simulation.programs import ProgramCache
 from undertow.simulation.run_many import BatchResult, in_order, run_many
-from undertow.studies.campaign.campaign_schema import Series
+from undertow.studies.campaign.campaign_schema import RecordedSignals
 
 # Codes of the backends. XLA is slower, and a single run repeats such a trial only up to rounding.
 SIMD, XLA = 0, 1
@@ -30,7 +30,7 @@ class TrialResults(NamedTuple):
     series: dict[str, np.ndarray]  # (trials, records, ...)
 
 
-def prepare_trial(built: Built, series: Series | None) -> PreparedRun:
+def prepare_trial(built: Built, series: RecordedSignals | None) -> PreparedRun:
     """A trial, ready to run, with the series that are recorded of it."""
     return prepare(built) if series is None else prepare(built, series.signals, series.every)
 

@@ -2,7 +2,7 @@
 
 from undertow.studies.comparison.equal_budgets import EqualBudgets, Runs, TunedLaw
 from undertow.studies.comparison.sentences import digits
-from undertow.studies.comparison.tables import Rows
+from undertow.studies.comparison.tables import TextTable
 
 _HEAD = (
     "controller",
@@ -16,9 +16,9 @@ _HEAD = (
 )
 
 
-def budget_rows(budgets: EqualBudgets) -> Rows:
+def budget_rows(budgets: EqualBudgets) -> TextTable:
     """A row for each law."""
-    return Rows(_HEAD, [_row(law) for law in budgets.laws])
+    return TextTable(_HEAD, [_row(law) for law in budgets.laws])
 
 
 def _row(law: TunedLaw) -> tuple[str, ...]:

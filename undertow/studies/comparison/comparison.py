@@ -19,7 +19,7 @@ from undertow.studies.campaign.run_campaign import STORE, run_campaign
 from undertow.studies.campaign.store_results import Results, load
 from undertow.studies.comparison.equal_budgets import equal_budgets
 from undertow.studies.comparison.findings import Findings, find
-from undertow.studies.comparison.paired import Difference
+from undertow.studies.comparison.paired import PairedDifference
 from undertow.studies.comparison.prepare import PreparedComparison, prepare_comparison
 from undertow.studies.comparison.sentences import sentences
 from undertow.studies.comparison.tables import STYLES, table
@@ -51,7 +51,7 @@ class Comparison:
     findings: Findings
 
     @property
-    def differences(self) -> tuple[Difference, ...]:
+    def differences(self) -> tuple[PairedDifference, ...]:
         """Every two candidates in every metric."""
         return self.findings.differences
 

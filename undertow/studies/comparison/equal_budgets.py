@@ -22,7 +22,7 @@ from undertow.scenario.schema import validate
 from undertow.studies.comparison.candidates import Candidate, file_stem, part_of
 from undertow.studies.tuning.problem import is_tunable
 from undertow.studies.tuning.stability import NoCertificate
-from undertow.studies.tuning.training_runs import Trials
+from undertow.studies.tuning.training_runs import PlantVariants
 from undertow.studies.tuning.tune import INITIAL_DESIGN, Tuned, tune
 
 METHOD = "evolution"
@@ -219,7 +219,7 @@ def _entry(name: str, run: Tuned) -> dict[str, Any]:
     }
 
 
-def _runs(trials: Trials) -> dict[str, Any]:
+def _runs(trials: PlantVariants) -> dict[str, Any]:
     sets = list(dict.fromkeys(name for name in trials.variants if name))
     sizes = list(dict.fromkeys(np.asarray(trials.sizes).tolist()))
     return {"seeds": trials.number // max(1, len(sets)), "sizes": sizes, "sets": sets, "runs": trials.number}

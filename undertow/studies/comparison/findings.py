@@ -12,7 +12,7 @@ from undertow.core.status import Status
 from undertow.studies.campaign.campaign_summary import median_interval
 from undertow.studies.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.studies.campaign.store_layout import SAMPLES
-from undertow.studies.comparison.paired import FEWEST, Completion, Difference, completions, differences
+from undertow.studies.comparison.paired import FEWEST, Completion, PairedDifference, completions, differences
 from undertow.studies.comparison.pareto import Front, fronts
 
 COMPLETED = Status.OK.word
@@ -60,7 +60,7 @@ class Findings(NamedTuple):
     all_equal: bool
     units: dict[str, str]
     medians: dict[str, dict[str, Median]]
-    differences: tuple[Difference, ...]
+    differences: tuple[PairedDifference, ...]
     completions: tuple[Completion, ...]
     endings: dict[str, dict[str, int]]
     failed_at: dict[str, float]
@@ -78,7 +78,7 @@ class Findings(NamedTuple):
         """Every two candidates, the later one first."""
         return [(second, first) for first, second in itertools.combinations(self.names, 2)]
 
-    def against(self, candidate: str, baseline: str) -> list[Difference]:
+    def against(self, candidate: str, baseline: str) -> list[PairedDifference]:
         """Differences between two candidates, one per metric."""
         return [one for one in self.differences if (one.candidate, one.baseline) == (candidate, baseline)]
 

@@ -17,7 +17,7 @@ _RESAMPLES, _SEED = 2000, 0
 _AT_ONCE = 1_000_000  # numbers that the bootstrap keeps in memory
 
 
-class Difference(NamedTuple):
+class PairedDifference(NamedTuple):
     """One metric of a candidate less that of another, over the trials that both completed.
 
     Attributes:
@@ -84,7 +84,7 @@ def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
     return [one._replace(p_holm=p) for one, p in zip(found, holm([one.p for one in found]), strict=True)]
 
 
-def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Difference]:
+def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[PairedDifference]:
     """Differences of every metric between every two candidates.
 
     Args:
@@ -101,12 +101,12 @@ def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[Differen
     return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
 
 
-def _difference(metric: str, candidate: str, baseline: str, first: np.ndarray, second: np.ndarray) -> Difference:
+def _difference(metric: str, candidate: str, baseline: str, first: np.ndarray, second: np.ndarray) -> PairedDifference:
     both = np.isfinite(first) & np.isfinite(second)
     first, second = first[both], second[both]
     apart = first - second
     low, high = median_interval(apart)
-    return Difference(
+    return PairedDifference(
         metric=metric,
         candidate=candidate,
         baseline=baseline,

@@ -4,7 +4,7 @@ import math
 
 from undertow.analysis.metrics import for_people
 from undertow.studies.comparison.findings import COMPLETED, Findings
-from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, Difference
+from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, PairedDifference
 from undertow.studies.comparison.pareto import Front
 
 HOW = (
@@ -71,7 +71,7 @@ def digits(value: float) -> str:
     return f"{value:.3g}" if not 1000 <= abs(value) < math.inf else f"{value:.0f}"
 
 
-def relative(one: Difference, unit: str) -> str:
+def relative(one: PairedDifference, unit: str) -> str:
     """Median difference in percent of the baseline; in the unit of the metric where the baseline has zeros."""
     if math.isnan(one.relative):
         return f"{'+' if one.median > 0 else ''}{shown(one.median, unit)}"
@@ -108,5 +108,5 @@ def _needed(found: Findings) -> int:
     return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)
 
 
-def _counted(found: Findings, one: Difference, number: int) -> str:
+def _counted(found: Findings, one: PairedDifference, number: int) -> str:
     return f"{metric_name(one.metric)} ({relative(one, found.units[one.metric])}, in {number} of {one.pairs})"

@@ -13,7 +13,7 @@ import numpy as np
 from undertow.core.contracts import Target
 from undertow.scenario.build import Built, in_its_precision
 from undertow.simulation.loop.controller_step import first_step, next_step
-from undertow.simulation.loop.stepped import Step
+from undertow.simulation.loop.stepped import CompiledStep
 
 HOW_LONG = (
     "Computing time is the median over the calls of one compiled step of the law alone, on this machine; it differs "
@@ -29,7 +29,7 @@ class StepTime(NamedTuple):
 
     Attributes:
         median: s.
-        backend: `simd` or `xla`, see `undertow.simulation.loop.stepped.Step`.
+        backend: `simd` or `xla`, see `undertow.simulation.loop.stepped.CompiledStep`.
     """
 
     median: float
@@ -59,7 +59,7 @@ def step_time(built: Built) -> StepTime:
         measured, desired, was_applied, elapsed = inputs
         return next_step(eqx.combine(numbers, rest), memory, measured, desired, was_applied, elapsed)
 
-    compiled = Step(step, own(numbers), own(memory), own((y, target, applied, interval)))
+    compiled = CompiledStep(step, own(numbers), own(memory), own((y, target, applied, interval)))
     taken, begun = [], time.perf_counter()
     for _ in range(_BEFORE):
         compiled()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from undertow.analysis.metrics import for_people, infinite, titled_name
 from undertow.studies.comparison.findings import Findings, Median
-from undertow.studies.comparison.paired import Difference
+from undertow.studies.comparison.paired import PairedDifference
 from undertow.studies.comparison.sentences import digits, relative
 from undertow.studies.comparison.step_time import StepTime
 
@@ -21,7 +21,7 @@ STEP = "computing time per step (\u00b5s)"
 _NOTHING = "-"
 
 
-class Rows(NamedTuple):
+class TextTable(NamedTuple):
     """A table of text: column titles and rows, of which the first entry names the row."""
 
     head: tuple[str, ...]
@@ -30,7 +30,7 @@ class Rows(NamedTuple):
 
 def medians(
     found: Findings, times: Mapping[str, StepTime] | None = None, number: Callable[[float], str] = digits
-) -> Rows:
+) -> TextTable:
     """Metrics by candidate, below the number of completed trials.
 
     Args:
@@ -50,7 +50,7 @@ def medians(
         rows.append((titled(found, metric), *cells))
     if times:
         rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
-    return Rows(("metric", *found.names), rows)
+    return TextTable(("metric", *found.names), rows)
 
 
 def _time(one: StepTime | None) -> str:
@@ -60,7 +60,7 @@ def _time(one: StepTime | None) -> str:
     return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
 
 
-def paired(found: Findings, number: Callable[[float], str] = digits) -> Rows:
+def paired(found: Findings, number: Callable[[float], str] = digits) -> TextTable:
     """Differences of every two candidates in every metric."""
     rows = []
     for one in found.differences:
@@ -78,7 +78,7 @@ def paired(found: Findings, number: Callable[[float], str] = digits) -> Rows:
             )
         )
     head = ("pair", "metric", "median difference", "relative", "smaller in", "p (Holm)", "established")
-    return Rows(head, rows)
+    return TextTable(head, rows)
 
 
 def median(one: Median, unit: str, number: Callable[[float], str] = digits) -> str:
@@ -100,7 +100,7 @@ def titled(found: Findings, metric: str) -> str:
     return f"{titled_name(metric)} ({unit})" if unit else titled_name(metric)
 
 
-def _is(one: Difference, metric: str) -> bool:
+def _is(one: PairedDifference, metric: str) -> bool:
     return one.metric == metric and one.established
 
 
@@ -114,7 +114,7 @@ def _markdown(found: Findings) -> str:
     return "\n".join(parts)
 
 
-def _markdown_rows(rows: Rows) -> str:
+def _markdown_rows(rows: TextTable) -> str:
     line = lambda cells: f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
     ruler = f"|{'---|' * len(rows.head)}\n"
     return "".join([line(rows.head), ruler, *map(line, rows.rows)])
@@ -134,7 +134,7 @@ def even_digits(value: float) -> str:
     return f"{value:#.3g}".rstrip(".")
 
 
-def _floating(rows: Rows, caption: str, label: str) -> list[str]:
+def _floating(rows: TextTable, caption: str, label: str) -> list[str]:
     """A table as wide as the text, whose first column takes what the others leave."""
     line = lambda cells: f"{' & '.join(map(_escaped, cells))} \\\\"
     columns = "X" + "r" * (len(rows.head) - 1)
@@ -170,7 +170,7 @@ def _escaped(cell: str) -> str:
 
 def _csv(found: Findings) -> str:
     stream = io.StringIO()
-    fields = [name for name in Difference._fields if name != "metric"]
+    fields = [name for name in PairedDifference._fields if name != "metric"]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["metric", "unit", "candidate_median", "baseline_median", *fields, "established"])
     for one in found.differences:

@@ -26,7 +26,7 @@ _SECTIONS = (
 )
 
 
-class Axis(NamedTuple):
+class SearchDimension(NamedTuple):
     """One number that varies.
 
     Attributes:
@@ -50,7 +50,7 @@ class Axis(NamedTuple):
 class Box(NamedTuple):
     """Departures from the nominal scenario: one coordinate per number that varies, 0 at its nominal value."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SearchDimension, ...]
 
     @property
     def lower(self) -> Float[np.ndarray, " k"]:
@@ -105,7 +105,7 @@ def box_of(vary: Mapping[str, Bounds], built: Built) -> Box:
     return Box(tuple(_axis(key, bounds, built) for key, bounds in vary.items()))
 
 
-def _axis(key: str, bounds: Bounds, built: Built) -> Axis:
+def _axis(key: str, bounds: Bounds, built: Built) -> SearchDimension:
     low, high = bounds.between
     nominal, name = bounds.nominal, f"falsify.vary.{key}"
     section = next(iter(key_path(key)), "")
@@ -120,7 +120,7 @@ def _axis(key: str, bounds: Bounds, built: Built) -> Axis:
     if not low <= nominal <= high:
         hint = "The bounds have to include the value of the scenario"
         raise BadInput(name, f"be around the nominal value {nominal:g}", f"{low:g} to {high:g}", hint=hint)
-    return Axis(key, low, float(nominal), high, bounds.integer)
+    return SearchDimension(key, low, float(nominal), high, bounds.integer)
 
 
 def _number_at(node: Any, path: Sequence[str | int]) -> float | None:

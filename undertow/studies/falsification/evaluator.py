@@ -14,7 +14,7 @@ from undertow.scenario.part_cache import PartCache
 from undertow.scenario.reading import Text
 from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.programs import ProgramCache
-from undertow.studies.campaign.campaign_schema import Series
+from undertow.studies.campaign.campaign_schema import RecordedSignals
 from undertow.studies.campaign.trial_results import prepare_trial, run_prepared
 from undertow.studies.falsification.box import Box, scenario_at
 
@@ -42,7 +42,7 @@ class Evaluator:
         loop = built.scenario.loop
         self.period = record_period(loop)
         self._names = needed_signals(requirements)
-        self._series = Series(signals=list(self._names), every=loop.record) if self._names else None
+        self._series = RecordedSignals(signals=list(self._names), every=loop.record) if self._names else None
         self._programs = ProgramCache(lambda: self._probes(), gpu=True)
 
     def _probes(self) -> list[PreparedRun]:

@@ -22,7 +22,7 @@ from undertow.studies.campaign.varied_scenario import nominal_model_sentence
 from undertow.studies.falsification.box import Box, box_of, scenario_at
 from undertow.studies.falsification.evaluator import Evaluator
 from undertow.studies.falsification.gradient import Gradient
-from undertow.studies.falsification.objective import Broken, BudgetSpent, Objective, ToBreak, Violation, Watch
+from undertow.studies.falsification.objective import Broken, BudgetSpent, RobustnessObjective, ToBreak, Violation, Watch
 from undertow.studies.falsification.shrink import corners, shrink
 from undertow.studies.tuning.search import descend, search, spread_points
 
@@ -56,7 +56,7 @@ class Falsified(NamedTuple):
     """
 
     evaluator: Evaluator
-    objective: Objective
+    objective: RobustnessObjective
     violation: Violation | None
     broken: dict[str, float]
     single_runs: tuple[ScenarioResult, ...]
@@ -113,7 +113,7 @@ def falsify(
     checks.choice("--method", method, METHODS)
     evaluator = evaluator_of(text)
     compute = evaluator.robustness if checkpoint is None else _kept(evaluator, checkpoint, resume, (method, seed))
-    objective = Objective(compute, evaluator.box, evaluator.seeds, budget, watch)
+    objective = RobustnessObjective(compute, evaluator.box, evaluator.seeds, budget, watch)
     say("nominal run")
     _check_nominal(evaluator)
     gradient = Gradient(evaluator, objective.robustness, method == "gradient")
@@ -218,7 +218,11 @@ def _check_nominal(evaluator: Evaluator) -> None:
 
 
 def _break(
-    objective: Objective, gradient: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, method: str, seed: int
+    objective: RobustnessObjective,
+    gradient: Callable[[np.ndarray], np.ndarray],
+    ends: np.ndarray,
+    method: str,
+    seed: int,
 ) -> None:
     """Run the initial design, then descend in the robustness until a requirement breaks."""
     to_break = ToBreak(objective, gradient)

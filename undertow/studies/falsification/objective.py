@@ -32,7 +32,7 @@ class Violation(NamedTuple):
 Watch = Callable[[int, float, Violation | None], None]  # runs so far, least robustness so far, smallest violation
 
 
-class Objective:
+class RobustnessObjective:
     """Robustness of departures, with a budget of runs.
 
     Until a requirement is broken, the runs have all seeds in turn: which realization of noise and sea breaks it is part
@@ -110,7 +110,7 @@ _WORST = 1e6  # cost of a departure whose scenario cannot be built
 class ToBreak:
     """The cost of the first phase, over the unit cube: the robustness. The first violation ends it."""
 
-    def __init__(self, objective: Objective, slope: Callable[[np.ndarray], np.ndarray]):
+    def __init__(self, objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray]):
         self._objective, self._slope = objective, slope
 
     def costs(self, points: np.ndarray) -> np.ndarray:
@@ -144,7 +144,7 @@ class ToShrink:
     Deb (2000): of two points that break nothing the one with less robustness is better.
     """
 
-    def __init__(self, objective: Objective):
+    def __init__(self, objective: RobustnessObjective):
         self._objective = objective
 
     def costs(self, points: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.studies.falsification.box import Box
-from undertow.studies.falsification.objective import Departures, Objective, ToShrink, Violation
+from undertow.studies.falsification.objective import Departures, RobustnessObjective, ToShrink, Violation
 from undertow.studies.tuning.search import search
 
 _SCALES = 16  # points of a ray
@@ -31,7 +31,7 @@ _GENERATIONS = 1000
 _REFINED = 0.01  # relative improvement by the global search that is worth another descent
 
 
-def corners(objective: Objective, chance: np.random.Generator) -> Departures:
+def corners(objective: RobustnessObjective, chance: np.random.Generator) -> Departures:
     """The ends of all axes and the corners of the box, or as many of these at random as are tried."""
     lower, upper = objective.box.lower, objective.box.upper
     numbers = len(lower)
@@ -44,7 +44,9 @@ def corners(objective: Objective, chance: np.random.Generator) -> Departures:
     return found[objective.box.size(found) > 0]
 
 
-def shrink(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], first: Departures, seed: int) -> None:
+def shrink(
+    objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray], first: Departures, seed: int
+) -> None:
     """Look for smaller and smaller violations; the objective keeps them.
 
     Args:
@@ -70,7 +72,9 @@ def shrink(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], firs
         _descend(objective, slope, chance)
 
 
-def _other_seeds(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator) -> None:
+def _other_seeds(
+    objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator
+) -> None:
     """Try other seeds a little nearer to the nominal scenario, and go on with one that breaks a requirement there."""
     for _ in range(_SWITCHES if len(objective.seeds) > 1 else 0):
         best = _smallest(objective)
@@ -82,7 +86,7 @@ def _other_seeds(objective: Objective, slope: Callable[[np.ndarray], np.ndarray]
         _descend(objective, slope, chance)
 
 
-def _along(objective: Objective, ends: Departures) -> None:
+def _along(objective: RobustnessObjective, ends: Departures) -> None:
     """Find where rays from the nominal scenario to some departures, not beyond the best, first break a requirement."""
     sizes = objective.box.size(ends)
     ends = ends * np.minimum(1.0, _smallest(objective).size / sizes)[:, None]
@@ -96,7 +100,7 @@ def _along(objective: Objective, ends: Departures) -> None:
             _bisect(objective, ends[ray], firsts[ray] / _SCALES, (firsts[ray] + 1) / _SCALES)
 
 
-def _bisect(objective: Objective, end: Float[np.ndarray, " k"], kept: float, broken: float) -> None:
+def _bisect(objective: RobustnessObjective, end: Float[np.ndarray, " k"], kept: float, broken: float) -> None:
     """Narrow the bracket of the distance along a ray at which a requirement breaks."""
     while broken - kept > _PRECISION:
         scales = np.linspace(kept, broken, _NARROWED + 1)[1:-1]
@@ -108,7 +112,9 @@ def _bisect(objective: Objective, end: Float[np.ndarray, " k"], kept: float, bro
             kept = scales[-1]
 
 
-def _descend(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator) -> None:
+def _descend(
+    objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator
+) -> None:
     """Improve the direction of the smallest violation until no candidate is better."""
     spread, gradient, at = _WIDE, None, None
     for _ in range(_ROUNDS):
@@ -127,7 +133,7 @@ def _descend(objective: Objective, slope: Callable[[np.ndarray], np.ndarray], ch
             return
 
 
-def _smallest(objective: Objective) -> Violation:
+def _smallest(objective: RobustnessObjective) -> Violation:
     """The smallest violation of an objective that has one."""
     assert objective.smallest is not None
     return objective.smallest

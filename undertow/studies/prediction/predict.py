@@ -28,7 +28,7 @@ _DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and 
 Progress = Callable[[str, float], None]  # called with a message and the share done
 
 
-class Point(NamedTuple):
+class LinearizedPoint(NamedTuple):
     """One operating point."""
 
     where: str
@@ -44,7 +44,7 @@ class Point(NamedTuple):
         return self.at.found
 
 
-class Noise(NamedTuple):
+class VelocityNoise(NamedTuple):
     """White noise on the measured velocities, independent at every control step."""
 
     of_input: np.ndarray  # standard deviation per m/s or rad/s of noise
@@ -56,9 +56,9 @@ class Prediction(NamedTuple):
     """Result of `undertow analyze`."""
 
     operating_point: OperatingPoint
-    points: tuple[Point, ...]
+    points: tuple[LinearizedPoint, ...]
     margins: dict[str, float]  # at the point closest to instability
-    noise: Noise
+    noise: VelocityNoise
     frequency: np.ndarray  # rad/s
     error: np.ndarray  # |e / d| of each axis, (frequencies, axes); s^2
     estimation: np.ndarray  # |d_hat - d| / |d|, likewise
@@ -109,14 +109,16 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     )
 
 
-def _point(known: OperatingPoint, acting: OperatingConditions) -> Point:
+def _point(known: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
     loop, settings = known.built.closed_loop, known.built.scenario.loop
     at = equilibrium(loop, settings.dt, known.mean.parts.target.position, acting.load, acting.flow)
     linear = margins.closed(at, settings.dt, settings.kind)
     low, high = input_limits(known.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
-    return Point(acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear))
+    return LinearizedPoint(
+        acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear)
+    )
 
 
 def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
@@ -130,7 +132,7 @@ def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
     }
 
 
-def _noise(known: OperatingPoint) -> Noise:
+def _noise(known: OperatingPoint) -> VelocityNoise:
     dt, axes = known.linear.dt, known.around.load.shape[1]
     sampled = margins.closed(known.mean, dt)
     one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
@@ -140,7 +142,7 @@ def _noise(known: OperatingPoint) -> Noise:
     room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
     with np.errstate(divide="ignore", invalid="ignore"):
         largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
-    return Noise(of_input, of_estimate, largest)
+    return VelocityNoise(of_input, of_estimate, largest)
 
 
 def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,14 +22,14 @@ from undertow.core.contracts import (
     Water,
 )
 from undertow.core.param import Param, param
-from undertow.scenario.schema import Loop, Weights
+from undertow.scenario.schema import ClosedLoopSettings, Weights
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
 from undertow.simulation.prepared_run import PreparedRun, RunBatch
 from undertow.simulation.programs import ProgramCache
 from undertow.simulation.run_many import BatchResult, in_order, run_many
 from undertow.studies.tuning.cost import CostSums, Shares, shares
-from undertow.studies.tuning.training_runs import Trials, joined
+from undertow.studies.tuning.training_runs import PlantVariants, joined
 
 
 class Scaled(AbstractDisturbance):
@@ -69,7 +69,7 @@ class TrainingLoop(NamedTuple):
     """Everything that stays the same while the gains change."""
 
     loop: ClosedLoop  # reference, disturbance and navigation; plant and controller are replaced
-    settings: Loop
+    settings: ClosedLoopSettings
     duration: float  # of every run, s
     start: tuple[Any, Any]  # outputs at t = 0, and their rates
     sums: CostSums
@@ -109,7 +109,7 @@ class Evaluation:
         training_loop: TrainingLoop,
         make: Callable[[Any], AbstractController],
         examples: Sequence[AbstractController],
-        trials: Sequence[Trials],
+        trials: Sequence[PlantVariants],
     ):
         self._training_loop, self._training = training_loop, trials[0]
         self._law_numbers, self._law_rest = eqx.partition(examples[0], eqx.is_array)
@@ -130,7 +130,7 @@ class Evaluation:
         """Mean cost of each point over the training runs."""
         return self.total(self.shares([self.law(point) for point in points], self._training)).mean(axis=1)
 
-    def shares(self, laws: Sequence[AbstractController], trials: Trials) -> Shares:
+    def shares(self, laws: Sequence[AbstractController], trials: PlantVariants) -> Shares:
         """Parts of the cost, arrays (laws, trials), on both cores."""
         batch = self._batch(laws, trials)
         results = list(run_many([batch], programs=self._programs, workers=_WORKERS, at_once=self._width))
@@ -163,7 +163,7 @@ class Evaluation:
         parts = shares(result.outcome.accumulated[0], ended, self._training_loop.duration)
         return jax.tree.map(np.asarray, parts)
 
-    def _batch(self, laws: Sequence[AbstractController], trials: Trials) -> RunBatch:
+    def _batch(self, laws: Sequence[AbstractController], trials: PlantVariants) -> RunBatch:
         """Runs of every law on every trial."""
         runs = len(laws) * trials.number
         of_laws = lambda *leaves: np.repeat(np.stack(leaves), trials.number, axis=0)

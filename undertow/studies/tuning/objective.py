@@ -24,7 +24,7 @@ class Computes(Protocol):
         ...
 
 
-class Step(NamedTuple):
+class Improvement(NamedTuple):
     """An improvement."""
 
     evaluations: int
@@ -34,7 +34,7 @@ class Step(NamedTuple):
     radius: float  # spectral
 
 
-Watch = Callable[[Step, int], None]  # called after every batch with the best so far, evaluations so far
+Watch = Callable[[Improvement, int], None]  # called after every batch with the best so far, evaluations so far
 
 
 _SAME = 12  # decimals to which the coordinates of equal points agree
@@ -64,11 +64,11 @@ class Objective:
         self._most = most
         self._known: dict[bytes, float] = {}
         self.evaluations = 0
-        self.steps: list[Step] = []
+        self.steps: list[Improvement] = []
         self.rejected = 0
 
     @property
-    def best(self) -> Step | None:
+    def best(self) -> Improvement | None:
         """The best certified point so far."""
         return self.steps[-1] if self.steps else None
 
@@ -88,7 +88,9 @@ class Objective:
                 break
             radius = self.radius(points[i])
             if radius < 1:
-                step = Step(self.evaluations, self._checkpoint.elapsed, float(found[i]), points[i].tolist(), radius)
+                step = Improvement(
+                    self.evaluations, self._checkpoint.elapsed, float(found[i]), points[i].tolist(), radius
+                )
                 self.steps.append(step)
                 break
             self.rejected += 1

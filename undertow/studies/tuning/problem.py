@@ -17,8 +17,8 @@ from undertow.scenario.reading import Text
 from undertow.studies.tuning import tunable_parameters as tunable_parameters
 from undertow.studies.tuning.cost import CostSums
 from undertow.studies.tuning.evaluator import TrainingLoop
-from undertow.studies.tuning.training_runs import Trials, training_and_held_out
-from undertow.studies.tuning.tunable_parameters import SHARED, Law, TunableParameter, law_of
+from undertow.studies.tuning.training_runs import PlantVariants, training_and_held_out
+from undertow.studies.tuning.tunable_parameters import SHARED, TunableParameter, TunableParameters, law_of
 
 _LONGEST = 20.0  # s, default limit of the duration of a run
 _DIGITS = 5  # of a tuned gain
@@ -33,8 +33,8 @@ class Problem(NamedTuple):
     law: Callable[[Mapping[str, Any]], AbstractController]  # from tuned options
     start: np.ndarray  # the given gains as a point, moved to the nearest bound where they are outside
     training_loop: TrainingLoop
-    train: Trials
-    held_out: Trials
+    train: PlantVariants
+    held_out: PlantVariants
 
     def options(self, point: Any) -> dict[str, Any]:
         """Options at a point."""
@@ -104,7 +104,7 @@ def _problem(text: Text, built: Built) -> Problem:
     return found
 
 
-def _law_of(built: Built) -> Law:
+def _law_of(built: Built) -> TunableParameters:
     description = built.resolved["controller"]
     return law_of(description["kind"], description.get("preset"), built.closed_loop.controller)
 
@@ -118,7 +118,12 @@ def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractControl
 
 
 def _parameters(
-    known: Law, function: Callable[..., Any], given: Mapping[str, Any], tune: Any, dt: float, angles: tuple[bool, ...]
+    known: TunableParameters,
+    function: Callable[..., Any],
+    given: Mapping[str, Any],
+    tune: Any,
+    dt: float,
+    angles: tuple[bool, ...],
 ) -> list[TunableParameter]:
     ranges, options = tune.parameters or known.ranges(dt), list(inspect.signature(function).parameters)[1:]
     if not ranges:
@@ -148,12 +153,14 @@ def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
     return [(i,) for i in axes]
 
 
-def _left_out(known: Law, options: Mapping[str, Any]) -> dict[str, None]:
+def _left_out(known: TunableParameters, options: Mapping[str, Any]) -> dict[str, None]:
     """Options that are equivalent to tuned ones, set to None."""
     return {other: None for option in options for other in known.instead.get(option, ())}
 
 
-def _mean(known: Law, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter) -> float:
+def _mean(
+    known: TunableParameters, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter
+) -> float:
     """Value of a parameter in a controller: geometric mean over its axes, or of its bounds where unknown."""
     name = parameter.option if parameter.entry is None else f"{parameter.option}[{parameter.entry}]"
     value = known.now[name](law) if name in known.now else given.get(parameter.option)

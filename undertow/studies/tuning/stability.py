@@ -15,7 +15,7 @@ from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.core.contracts import AbstractController
 from undertow.core.errors import BadInput
 from undertow.studies.tuning.evaluator import TrainingLoop
-from undertow.studies.tuning.training_runs import Trials
+from undertow.studies.tuning.training_runs import PlantVariants
 
 # Quantiles of the loads of a run at which the loop is linearised: the time constant of a motor depends on its speed.
 _SHARES = (0.1, 0.5, 0.9)
@@ -52,7 +52,7 @@ class Certifier:
         first: controller with which the operating points are computed.
     """
 
-    def __init__(self, training_loop: TrainingLoop, trials: Trials, first: AbstractController):
+    def __init__(self, training_loop: TrainingLoop, trials: PlantVariants, first: AbstractController):
         self._training_loop = training_loop
         self._position = np.asarray(training_loop.loop.reference.at(jnp.asarray(training_loop.duration / 2)).position)
         self._variants = tuple(dict.fromkeys(trials.variants))
@@ -86,7 +86,7 @@ class Certifier:
         return around.operating_points(_SHARES)
 
 
-def _plant(trials: Trials, number: int) -> Any:
+def _plant(trials: PlantVariants, number: int) -> Any:
     return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, trials.plants)
 
 

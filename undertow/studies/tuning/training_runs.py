@@ -22,7 +22,7 @@ from undertow.scenario.schema import TrainingRuns
 _HELD_OUT_SEEDS = 1_000_000  # far from the training seeds
 
 
-class Trials(NamedTuple):
+class PlantVariants(NamedTuple):
     """Runs that differ in what the nominal model does not include; leaves of `plants` have one entry per trial."""
 
     plants: AbstractPlant
@@ -35,14 +35,14 @@ class Trials(NamedTuple):
         """Number of trials."""
         return len(self.variants)
 
-    def part(self, chosen: Any) -> "Trials":
+    def part(self, chosen: Any) -> "PlantVariants":
         """The trials with the given numbers, which may repeat."""
         pick = lambda tree: jax.tree.map(lambda leaf: leaf[chosen], eqx.filter(tree, eqx.is_array))
         plants = eqx.combine(pick(self.plants), eqx.filter(self.plants, eqx.is_array, inverse=True))
-        return Trials(plants, self.keys[chosen], self.sizes[chosen], tuple(self.variants[i] for i in chosen))
+        return PlantVariants(plants, self.keys[chosen], self.sizes[chosen], tuple(self.variants[i] for i in chosen))
 
 
-def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
+def training_and_held_out(text: Text, built: Built) -> tuple[PlantVariants, PlantVariants]:
     """Both sets of trials of a scenario, with different seeds and, where there are several, different parameter sets.
 
     The nominal model stays the same. Published sets, starting with the nominal one, alternate between the training and
@@ -57,7 +57,9 @@ def training_and_held_out(text: Text, built: Built) -> tuple[Trials, Trials]:
     return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
 
 
-def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str], key: str, first_seed: int) -> Trials:
+def trials(
+    text: Text, built: Built, runs: TrainingRuns, default: Sequence[str], key: str, first_seed: int
+) -> PlantVariants:
     """Every set with every seed; sizes of the disturbance take turns with the seeds.
 
     Args:
@@ -81,7 +83,7 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
         names = known[:1] if known else ("",)
     plants = {name: _plant(text, built, name) for name in names}
     each = [(name, seed) for seed in range(runs.seeds) for name in names]
-    return Trials(
+    return PlantVariants(
         plants=stacked([plants[name] for name, _ in each]),
         keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in each]),
         sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in each], dtype=float),
@@ -89,12 +91,12 @@ def trials(text: Text, built: Built, runs: TrainingRuns, default: Sequence[str],
     )
 
 
-def joined(several: Sequence[Trials]) -> Trials:
+def joined(several: Sequence[PlantVariants]) -> PlantVariants:
     """All trials of several sets."""
     numbers = [(eqx.filter(one.plants, eqx.is_array), one.keys, one.sizes) for one in several]
     arrays, keys, sizes = jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *numbers)
     plants = eqx.combine(arrays, eqx.filter(several[0].plants, eqx.is_array, inverse=True))
-    return Trials(plants, keys, sizes, tuple(name for one in several for name in one.variants))
+    return PlantVariants(plants, keys, sizes, tuple(name for one in several for name in one.variants))
 
 
 def parameter_sets(built: Built) -> tuple[str, ...]:

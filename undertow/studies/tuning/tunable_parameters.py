@@ -120,7 +120,7 @@ def _bounds(name: str, bounds: Sequence[float]) -> tuple[float, float]:
 Range = tuple[float, float]
 
 
-class Law(NamedTuple):
+class TunableParameters(NamedTuple):
     """Tunable parameters of one controller."""
 
     ranges: Callable[[float], Mapping[str, Range]]  # for a sampling time, s
@@ -160,7 +160,7 @@ def _observed(dt: float) -> Mapping[str, Range]:
     return {"bandwidth": (0.3, 0.5 / dt), "damping": (0.5, 3.0), "tracking": (0.1, 0.25 / dt)}
 
 
-_OBSERVED = Law(
+_OBSERVED = TunableParameters(
     ranges=_observed,
     now={
         "bandwidth": lambda law: law.bandwidth,
@@ -170,7 +170,7 @@ _OBSERVED = Law(
     instead={"tracking": ("feedback",)},
 )
 
-_ROBUST = Law(
+_ROBUST = TunableParameters(
     ranges=_robust,
     now={
         "bandwidth": lambda law: law.estimator.bandwidth,
@@ -186,7 +186,7 @@ _LAWS = {
     ("indi", None): _OBSERVED,
     ("rcaf", "robust"): _ROBUST,
     ("rcaf", "learning"): _ROBUST._replace(instead={"tracking": ("feedback",)}),
-    ("rcaf", "paper"): Law(
+    ("rcaf", "paper"): TunableParameters(
         ranges=_paper,
         now={
             "feedback[0]": lambda law: law.feedback[..., 0],
@@ -198,7 +198,7 @@ _LAWS = {
         },
         instead={},
     ),
-    ("pid", None): Law(
+    ("pid", None): TunableParameters(
         ranges=_pid,
         now={
             "frequency": lambda law: jnp.sqrt(law.proportional),
@@ -210,8 +210,8 @@ _LAWS = {
 }
 
 
-def law_of(kind: str, preset: str | None, law: AbstractController) -> Law:
+def law_of(kind: str, preset: str | None, law: AbstractController) -> TunableParameters:
     """Tunable parameters of a controller: the known ones, else the parameters that declare a `range`."""
     declared = tuning_ranges(law)
-    own = Law(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
+    own = TunableParameters(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
     return _LAWS.get((kind, preset), own)

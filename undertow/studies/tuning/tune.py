@@ -18,7 +18,7 @@ from undertow.scenario.reading import Text, dump
 from undertow.simulation.checkpoint import Checkpoint, OutOfTime
 from undertow.studies.tuning.cost import Shares
 from undertow.studies.tuning.evaluator import AT_ONCE, Evaluation
-from undertow.studies.tuning.objective import Objective, Step, Watch
+from undertow.studies.tuning.objective import Improvement, Objective, Watch
 from undertow.studies.tuning.problem import Problem, problem
 from undertow.studies.tuning.search import descend, evolve, search, spread_points
 from undertow.studies.tuning.stability import Certificate, Certifier, no_certificate
@@ -49,7 +49,7 @@ class Tuned(NamedTuple):
     problem: Problem
     method: str
     evaluated: tuple[Evaluated, ...]  # given, ..., start, tuned
-    steps: list[Step]
+    steps: list[Improvement]
     evaluations: int
     rejected: int  # points that would have been better, but have no certificate
     elapsed: float  # s

@@ -24,7 +24,7 @@ class EstimatorState(NamedTuple):
     weights: Float[Array, "n rules"]  # theta, m/s^2, rad/s^2
 
 
-class Estimate(NamedTuple):
+class UncertaintyEstimate(NamedTuple):
     """d_hat, and the error and basis it comes from."""
 
     error: PerAxis  # eps, m/s, rad/s
@@ -66,11 +66,11 @@ class Estimator(eqx.Module):
         """State with zero weights."""
         return EstimatorState(rates, jnp.zeros((rates.shape[0], self.fuzzy.rules)))
 
-    def estimate(self, state: EstimatorState, rates: PerAxis) -> Estimate:
+    def estimate(self, state: EstimatorState, rates: PerAxis) -> UncertaintyEstimate:
         """Modelling error and estimate at measured rates."""
         error = state.rates - rates
         basis = self.fuzzy.basis(error[:, None])
-        return Estimate(error, basis, self.fuzzy.output(state.weights, basis))
+        return UncertaintyEstimate(error, basis, self.fuzzy.output(state.weights, basis))
 
     @eqx.filter_jit
     def gains(self, dt: Float[Array, ""]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
@@ -79,7 +79,9 @@ class Estimator(eqx.Module):
         both = 2 * decay * _cosine_of_root((self.bandwidth * dt) ** 2 * (1 - self.damping**2))  # sum of the poles
         return 2 - both, (1 + decay**2 - both) / dt
 
-    def advance(self, state: EstimatorState, seen: Estimate, known: PerAxis, tracking: PerAxis, dt) -> EstimatorState:
+    def advance(
+        self, state: EstimatorState, seen: UncertaintyEstimate, known: PerAxis, tracking: PerAxis, dt
+    ) -> EstimatorState:
         """State one sampling time later.
 
         Args:

@@ -10,7 +10,7 @@ from undertow.control.controllers.bandwidths import largest_forces
 from undertow.control.controllers.law_signals import ADAPTIVE_LAW, INERTIA, MEMORY, lyapunov_signals, weight_signals
 from undertow.control.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.control.controllers.robust import evidence
-from undertow.control.controllers.robust.estimator import Estimate, Estimator, EstimatorState
+from undertow.control.controllers.robust.estimator import Estimator, EstimatorState, UncertaintyEstimate
 from undertow.control.controllers.robust.memory import Memory, MemoryState, Observed
 from undertow.control.controllers.thruster_allocation import allocate, attained
 from undertow.control.controllers.tracking_error import Tracking, check_gains, tracking
@@ -47,11 +47,11 @@ class Recalled(NamedTuple):
     value: PerAxis  # what is known besides the observer, m/s^2, rad/s^2
 
 
-class Plan(NamedTuple):
+class RobustDecisions(NamedTuple):
     """Decisions of one instant."""
 
     actuators: Any
-    seen: Estimate
+    seen: UncertaintyEstimate
     off: Tracking  # error from the target, filtered if there is a filter
     robust: PerAxis  # u_r
     desired: PerAxis  # acceleration, m/s^2, rad/s^2
@@ -199,7 +199,7 @@ class RobustRCAF(AbstractController):
         dynamics, given = self.model.dynamics, self.model.actuators.force(actuators, u_applied)
         return dynamics.drift(y) + matvec(dynamics.gain(y), given)
 
-    def _plan(self, z: RobustState, y: Measurement, r: Target) -> Plan:
+    def _plan(self, z: RobustState, y: Measurement, r: Target) -> RobustDecisions:
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
@@ -217,4 +217,4 @@ class RobustRCAF(AbstractController):
             seen = seen._replace(uncertainty=seen.uncertainty + recalled.value)
         compensated = seen.uncertainty + self.model.drift_at_target_velocity(y, off.rate)
         forces = dynamics.invert(y, desired - compensated)
-        return Plan(reported, seen, off, u_r, desired, forces, recalled)
+        return RobustDecisions(reported, seen, off, u_r, desired, forces, recalled)

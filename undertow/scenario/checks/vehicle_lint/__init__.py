@@ -17,7 +17,7 @@ from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import Advice, advice, within
 from undertow.physics.vehicles.facts import Facts as Facts
 from undertow.physics.vehicles.facts import facts_of as facts_of
-from undertow.physics.vehicles.vehicle import Vehicle
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.build import Built
 from undertow.scenario.checks.finding import Finding
 from undertow.scenario.checks.vehicle_lint import hydrodynamics, layout, mass, statics, transcription
@@ -76,7 +76,7 @@ def vehicle_facts(plant: AbstractPlant, description: Mapping[str, Any]) -> Facts
         description: key `plant` of the scenario with all defaults filled in.
     """
     vehicle = getattr(plant, "vehicle", None)
-    if not isinstance(vehicle, Vehicle):
+    if not isinstance(vehicle, VehicleModel):
         return None
     file = description.get("vehicle", {}).get("contents", {})
     known: dict[str, Any] = {
