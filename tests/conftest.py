@@ -34,7 +34,18 @@ MARK_OF_A_FILE = re.compile(r"^pytestmark = pytest\.mark\.(\w+)$", re.MULTILINE)
 
 # Annotations of arrays are checked at every call of the rooms that compute. `process` comes before JAX; the models of
 # `scenario` and the commands of `cli` are checked by pydantic and typer.
-CHECKED = ("core", "physics", "control", "simulation.loop", "analysis")
+CHECKED = (
+    "core",
+    "physics.sensors",
+    "physics.vehicles",
+    "physics.thrusters",
+    "physics.power",
+    "physics.disturbances",
+    "physics.plants",
+    "control",
+    "simulation.loop",
+    "analysis",
+)
 # Folders of tests where they are: together they trace every part and both loops. Elsewhere the same code runs again, and
 # checking it once more would cost time and find nothing. Arrays of different rank are an error everywhere.
 STRICT = ("numerics", "physics", "conformance")

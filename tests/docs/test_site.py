@@ -81,9 +81,9 @@ def test_formulas_are_mathml(monkeypatch):
 
 def test_layers_are_those_of_the_import_contract(monkeypatch):
     layers = extension("layers", monkeypatch)
-    assert (layers.layers()[0], layers.layers()[-1]) == (["cli"], ["numerics"])
-    assert ["plants", "controllers", "faults"] in layers.layers()
-    assert layers.purpose("report") == "Figures and self-contained HTML pages."
+    assert (layers.layers()[0], layers.layers()[-1]) == (["cli"], ["core"])
+    assert ["control", "simulation"] in layers.layers()
+    assert layers.purpose("report") == "Self-contained HTML pages, tables, figures and the replay."
     assert layers.purpose("run").startswith("One closed loop from Python")
 
 

@@ -12,7 +12,7 @@ import pytest
 pytestmark = pytest.mark.docs
 
 ROOT = Path(__file__).parents[2]
-SEARCHED = ("undertow", "docs", "examples", "benchmarks", "README.md", "CONTRIBUTING.md")
+SEARCHED = ("undertow", "soak", "docs", "examples", "benchmarks", "README.md", "CONTRIBUTING.md")
 SUFFIXES = {".py", ".md", ".yaml", ".css", ".html", ".cff"}
 
 # Retired word (a regular expression) -> the field's word.
@@ -73,6 +73,7 @@ RETIRED = {
 ALLOWED = {
     "docs/explanation/simd.md": {r"lanes?"},  # vector lanes of a processor
     "undertow/report/figures": {r"ticks?"},  # matplotlib's axes
+    "undertow/paper/figures": {r"ticks?"},
     # The health of thrusters, which fault-tolerant control calls so.
     "undertow/core/contracts.py": {r"health"},
     "undertow/core/measurement.py": {r"health"},

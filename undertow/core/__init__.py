@@ -1,1 +1,1 @@
-"""Contracts, parameters, status codes, errors and the catalogue: the base of every other folder."""
+"""Contracts, parameters, status codes, errors, the catalogue and numerics: the base of every other room."""

@@ -1,1 +1,1 @@
-"""Other people's software around undertow's parts; each package needs the extra of its name."""
+"""undertow in other people's programs: stepped or timed by them, exported, and linked; most packages need an extra."""

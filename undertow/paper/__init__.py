@@ -1,1 +1,1 @@
-"""Reproduction of the paper: its examples, figures, tables and claims."""
+"""Ghavidel and Kalat 2017: examples, figures, claims, ablations, and what the robust variant changes."""

@@ -1,1 +1,1 @@
-"""Figures and self-contained HTML pages."""
+"""Self-contained HTML pages, tables, figures and the replay."""

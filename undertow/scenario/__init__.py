@@ -1,1 +1,1 @@
-"""Scenario files: schema, reading, building and running."""
+"""A scenario: its file read, checked and built, its run and the result of it."""

@@ -1,1 +1,1 @@
-"""A scenario or a closed loop run once: what is known of the run, its result file, and repetitions of it."""
+"""The closed loop, and many of them: loops by the batch compiler or XLA, groups that share a program, executors."""
