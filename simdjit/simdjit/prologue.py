@@ -11,7 +11,7 @@ from simdjit.graph import Graph, Nodes, Unsupported, filled
 from simdjit.lowering import evaluate, nodes_of
 from simdjit.tracing import Traced
 
-# Operations; what needs more of them (a spectrum of waves) is left to XLA.
+# Operations; what needs more of them (a spectrum of random waves) is left to XLA.
 _MOST = 15_000
 
 

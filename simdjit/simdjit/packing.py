@@ -17,8 +17,8 @@ from simdjit.graph import BOOL, COMMUTATIVE, Graph, Node
 _FEWEST = 2
 
 # Cost, in operations, of putting one number into a lane or of taking it out of one, of a truth, which lies in another
-# kind of register, and of a region's test and jump. The shortest times of `undertow bench` (W1 and W2, one run) on a
-# processor with eight lanes; from 1 to 2 and 3 to 6 they differ by a few per cent.
+# kind of register, and of a region's test and jump. They gave the shortest times of one run of two large
+# simulations on a processor with eight lanes; from 1 to 2 and 3 to 6 these differ by a few per cent.
 _MOVE, _MOVE_TRUTH, _REGION = 1.5, 4.0, 3
 
 # Nodes that are never packed: they stand for memory, or for what exists once.

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.emulated_gpu import EmulatedGpu
+from emulated_gpu import EmulatedGpu
 
 import simdjit
 from simdjit import Driver, Loop, matrix_loop, nvidia

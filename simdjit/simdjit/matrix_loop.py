@@ -5,7 +5,7 @@ from typing import NamedTuple
 from simdjit.graph import Graph, Node, Operation
 from simdjit.instructions import Emitter, Table
 
-# Products of two numbers from which on a loop is quicker than what is written out (benchmarks/compiler_scale.py).
+# Products of two numbers from which on a loop is quicker than what is written out (benchmarks/against_xla.py).
 FROM = 4000
 
 # Rows and columns of the result that are summed side by side, where their number divides by it: 8 times 2 sums fit the

@@ -1,8 +1,8 @@
 """What a program would cost, compiled here and by XLA: from numbers of operations, mostly to within a factor of two.
 
-The constants are fits to what `python benchmarks/compiler_estimates.py` measures on one core of an Intel Xeon (Sapphire
-Rapids, eight lanes), beside which it prints the estimates. They are the same on every machine, so that the choice
-between the two, and with it the bits of a result, depends on the program only.
+The constants are fits to what `python benchmarks/estimates.py` measures, beside which it prints the estimates, and to
+the same figures of large simulations, on one core of an Intel Xeon (Sapphire Rapids, eight lanes). They are the same on
+every machine, so that the choice between the two, and with it the bits of a result, depends on the program only.
 """
 
 from typing import Any, NamedTuple

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.programs import LARGE, SIZE, STEPS, number, program
+from programs import LARGE, SIZE, STEPS, number, program
 
 from simdjit.graph import Graph, flat
 from simdjit.lowering import evaluate, nodes_of

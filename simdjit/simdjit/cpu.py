@@ -95,7 +95,7 @@ def _object(assembly: str, cache: Path | None, sparing: bool) -> bytes:
 
 
 # LLVM's list scheduling that reduces registers, bottom up. In long programs most numbers lie in memory, and this order
-# leaves fewer of them there: a step with 100 fuzzy sets takes a sixth to a third less (benchmarks/compiler_scale.py).
+# leaves fewer of them there: a step of 25 000 operations takes a sixth to a third less.
 # LLVM ends the process at a switch that it does not know, so a later one is left as it is.
 _SPARING, _USUAL = "-pre-RA-sched=list-burr", "-pre-RA-sched=default"
 _LAST_KNOWN = 22

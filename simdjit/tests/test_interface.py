@@ -2,8 +2,8 @@
 
 import ast
 import re
-import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import jax
@@ -15,7 +15,7 @@ import simdjit
 
 pytestmark = pytest.mark.compiler
 
-PACKAGE = Path(simdjit.__file__).parent
+PROJECT = Path(__file__).parents[1]
 
 
 def damped(x, p):
@@ -89,7 +89,7 @@ def test_precision_is_that_of_jax():
 
 
 def test_the_readme_runs():
-    shown = re.findall(r"^```python\n(.*?)^```", (PACKAGE / "README.md").read_text(), re.S | re.M)
+    shown = re.findall(r"^```python\n(.*?)^```", (PROJECT / "README.md").read_text(encoding="utf-8"), re.S | re.M)
     assert len(shown) == 2
     spaces = [{} for _ in shown]
     for code, space in zip(shown, spaces, strict=True):
@@ -99,19 +99,32 @@ def test_the_readme_runs():
     assert spaces[1]["angles"].shape == (16, 11)
 
 
-def test_it_stands_by_itself():
-    """Neither the package nor these tests import anything of undertow, and it is imported without that."""
-    for path in (*PACKAGE.glob("*.py"), *Path(__file__).parent.glob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            assert not any(name.split(".")[0] == "undertow" for name in names), path.name
-    code = "import sys, simdjit; print([name for name in sys.modules if name.startswith('undertow')])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+def imported(path):
+    """Packages that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module.split(".")[0]
+
+
+def test_it_imports_what_it_depends_on():
+    """The package imports what pyproject.toml names; tests and benchmarks pytest and SciPy, which JAX needs, and each other."""
+    project = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    dependencies = {line.split(">=")[0] for line in project["dependencies"]}
+    known = sys.stdlib_module_names | {"simdjit"}
+    package = {name for path in (PROJECT / "simdjit").rglob("*.py") for name in imported(path)}
+    assert package - known == dependencies
+    others = [*(PROJECT / "tests").rglob("*.py"), *(PROJECT / "benchmarks").rglob("*.py")]
+    beside = {"pytest", "scipy"} | {path.stem for path in others}
+    assert {name for path in others for name in imported(path)} <= known | dependencies | beside
 
 
 def test_its_words():
     """Those of compiler engineers; a package for JAX users knows no ships."""
-    retired = re.compile(r"\b(fly|flies|flown|flying|drawn|told|looked|marine|vehicle|thruster)\b", re.I)
-    for path in (*PACKAGE.glob("*.py"), PACKAGE / "README.md"):
-        assert not retired.findall(path.read_text()), path.name
+    foreign = re.compile(
+        r"\b(fly|flies|flown|flying|drawn|told|looked|marine|vehicles?|thrusters?|ships?|hulls?|undertow|w1|w2)\b", re.I
+    )
+    for path in (*PROJECT.rglob("*.py"), PROJECT / "README.md"):
+        if path != Path(__file__):
+            assert not foreign.findall(path.read_text(encoding="utf-8")), path.name

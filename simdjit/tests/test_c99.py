@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.programs import SIZE, number, program
-from batch_compiler.test_differential import bits, with_zeros
+from programs import SIZE, number, program
+from test_differential import bits, with_zeros
 
 import simdjit
 from simdjit import c99

@@ -6,6 +6,8 @@ import pytest
 
 import simdjit
 
+pytestmark = pytest.mark.quick
+
 
 def swing(x, rate):
     """Functions, sums in order, choices and a matrix, all of one run."""

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.programs import SIZE, number, program
+from programs import SIZE, number, program
 
 from simdjit import Loop
 from simdjit.graph import F64, Graph

@@ -26,8 +26,8 @@ def made():
     return []
 
 
-def keep(made, told="a program", code=CODE):
-    return cache.cached(told, ".o", lambda: made.append(told) or code)
+def keep(made, program="a program", code=CODE):
+    return cache.cached(program, ".o", lambda: made.append(program) or code)
 
 
 def entry(folder):

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.emulated_gpu import EmulatedGpu
+from emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, Loop, Unsupported, nvidia
 

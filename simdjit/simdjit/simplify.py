@@ -78,7 +78,7 @@ def simpler(graph: Any, name: str, nodes: tuple[int, ...], values: list[Any]) ->
     """A node that is the same as an operation on others, None where it has to be done.
 
     For numbers that are finite: a product with a constant zero is zero, and a sum with one is the other number. So
-    neither the sign of a zero is kept nor what infinity or no number times a constant zero becomes: vehicles are full
+    neither the sign of a zero is kept nor what infinity or no number times a constant zero becomes: models are full
     of such zeros (a fifth of all operations), and a run that overflows is at its end anyway.
     """
     rule = _RULES.get(name)
