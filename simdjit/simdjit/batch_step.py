@@ -40,23 +40,23 @@ class BatchStep:
         constant: Sequence[bool] | None = None,
         cache: Path | None = None,
     ):
-        given, nothing = (numbers, state, inputs), np.zeros(())
-        sizes = [len(jax.tree.leaves(part)) for part in given]
+        example, nothing = (numbers, state, inputs), np.zeros(())
+        sizes = [len(jax.tree.leaves(part)) for part in example]
         same = [*(constant or [False] * sizes[0]), *[False] * (sizes[1] + sizes[2])]
         record = lambda arguments, carry, k: function(*arguments)
-        loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, given, same, cache=cache)
-        after, outputs = jax.eval_shape(function, *given)
+        loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, example, same, cache=cache)
+        after, outputs = jax.eval_shape(function, *example)
         if not same_types(state, after):
             raise Unsupported("a state that changes its type")
-        self._call, taken, found = loop.kept_runs(runs)
+        self._call, taken, recorded = loop.kept_runs(runs)
         self._lanes = taken[0].shape[1]
-        varying = [leaf for leaf, fixed in zip(jax.tree.leaves(given), same, strict=True) if not fixed]
-        for place, value in zip(taken, varying, strict=True):
-            place[...] = value
+        varying = [leaf for leaf, fixed in zip(jax.tree.leaves(example), same, strict=True) if not fixed]
+        for array, value in zip(taken, varying, strict=True):
+            array[...] = value
         first = len(taken) - sizes[1] - sizes[2]
         self._places = {"numbers": taken[:first], "state": taken[first : first + sizes[1]]}
         self._places["inputs"] = taken[first + sizes[1] :]
-        self._after, self._found = found[: sizes[1]], found[sizes[1] :]
+        self._after, self._found = recorded[: sizes[1]], recorded[sizes[1] :]
         self._form, self._all = jax.tree.structure(outputs), np.arange(runs)
 
     def put(self, what: str, values: Any, runs: np.ndarray | None = None) -> None:
@@ -68,13 +68,13 @@ class BatchStep:
             runs: their numbers; None for all.
         """
         at = divmod(self._all if runs is None else runs, self._lanes)
-        for place, value in zip(self._places[what], jax.tree.leaves(values), strict=True):
-            place[at] = value
+        for array, value in zip(self._places[what], jax.tree.leaves(values), strict=True):
+            array[at] = value
 
     def __call__(self) -> Any:
         """Take a step of every run; returns the outputs, with a leading axis over runs."""
         self._call()
-        for place, value in zip(self._places["state"], self._after, strict=True):
-            place[...] = value
+        for array, value in zip(self._places["state"], self._after, strict=True):
+            array[...] = value
         at = divmod(self._all, self._lanes)
-        return jax.tree.unflatten(self._form, [place[at] for place in self._found])
+        return jax.tree.unflatten(self._form, [array[at] for array in self._found])

@@ -106,16 +106,16 @@ class Source:
 
     def called(self, name: str, dtype: str) -> str:
         """The name of a function of `calls`."""
-        whole = f"{name}_{dtype}"
-        if whole not in self._known:
-            self._known.add(whole)
+        function_name = f"{name}_{dtype}"
+        if function_name not in self._known:
+            self._known.add(function_name)
             graph, kind = Graph(), TYPES[dtype]
             result = FORMULAS[name](Scalar(graph, graph.input(ARGUMENT, dtype))).node
             body = _Body(self, graph, lambda _: "x")
             body.do([node for node, wanted in enumerate(graph.needed([result])) if wanted], None)
             lines = _indented([*body.lines, f"return {body.value(result)};"])
-            self.functions.append("\n".join([f"static {kind} {whole}({kind} x) {{", *lines, "}"]))
-        return whole
+            self.functions.append("\n".join([f"static {kind} {function_name}({kind} x) {{", *lines, "}"]))
+        return function_name
 
     def table(self, dtype: str, entries: Sequence[str]) -> str:
         """The name of an array of constants."""
@@ -172,63 +172,63 @@ class _Body:
         graph = self._graph
         name, operands, detail = graph.operations[node]
         dtype, before = graph.types[node], graph.types[operands[-1]]
-        given = [self.value(operand) for operand in operands]
+        arguments = [self.value(operand) for operand in operands]
         floating, kind = before.startswith("float"), TYPES[dtype]
         if name == "call":
-            return f"{self._source.called(detail, dtype)}({given[0]})"
+            return f"{self._source.called(detail, dtype)}({arguments[0]})"
         if name == "select":
-            return f"{given[0]} ? {given[1]} : {given[2]}"
+            return f"{arguments[0]} ? {arguments[1]} : {arguments[2]}"
         if name == "entry":
-            return f"{given[0]}[{given[1]}]"
+            return f"{arguments[0]}[{arguments[1]}]"
         if name == "bits":
-            return f"{self._bits(before, dtype)}({given[0]})"
+            return f"{self._bits(before, dtype)}({arguments[0]})"
         if name == "convert":
-            return self._converted(before, dtype, given[0])
+            return self._converted(before, dtype, arguments[0])
         if name in _COMPARED:
-            return self._comparison(name, operands, given, before)
+            return self._comparison(name, operands, arguments, before)
         if name == "fma":
-            return f"{self._source.helper(f'fused_{before}', lambda: FUSED[before])}({', '.join(given)})"
+            return f"{self._source.helper(f'fused_{before}', lambda: FUSED[before])}({', '.join(arguments)})"
         if floating and name in _LIBM:
-            return f"{_LIBM[name]}{'f' if before == 'float32' else ''}({', '.join(given)})"
+            return f"{_LIBM[name]}{'f' if before == 'float32' else ''}({', '.join(arguments)})"
         if name == "neg":
             return (
-                f"-{given[0]}"
+                f"-{arguments[0]}"
                 if floating
-                else f"({kind})({_unsigned(before)}0 - ({_unsigned(before, cast=True)}){given[0]})"
+                else f"({kind})({_unsigned(before)}0 - ({_unsigned(before, cast=True)}){arguments[0]})"
             )
         if name in ("shift_left", "shift_right"):
-            return f"{self._shift(name, before)}({', '.join(given)})"
+            return f"{self._shift(name, before)}({', '.join(arguments)})"
         if name not in _OPERATORS:
             raise Unsupported(f"{name} of type {before} in C99")
         if floating or before == BOOL or name in ("div", "rem", "and", "or", "xor") or before.startswith("u"):
-            whole = f"{given[0]} {_OPERATORS[name]} {given[1]}"
-            return whole if floating else f"({kind})({whole})"
+            expression = f"{arguments[0]} {_OPERATORS[name]} {arguments[1]}"
+            return expression if floating else f"({kind})({expression})"
         word = _unsigned(before, cast=True)  # signed numbers must not overflow in C
-        return f"({kind})(({word}){given[0]} {_OPERATORS[name]} ({word}){given[1]})"
+        return f"({kind})(({word}){arguments[0]} {_OPERATORS[name]} ({word}){arguments[1]})"
 
-    def _comparison(self, name: str, operands: Sequence[Node], given: Sequence[str], dtype: str) -> str:
+    def _comparison(self, name: str, operands: Sequence[Node], arguments: Sequence[str], dtype: str) -> str:
         """A comparison, without those that compilers warn of because their result is known."""
         if operands[0] == operands[1] and dtype.startswith("float") and name not in ("lt", "gt"):
-            return f"{'' if name == 'ne' else '!'}isnan({given[0]})"
+            return f"{'' if name == 'ne' else '!'}isnan({arguments[0]})"
         if operands[0] == operands[1]:
-            return f"((void){given[0]}, {str(name in ('le', 'ge', 'eq')).lower()})"
+            return f"((void){arguments[0]}, {str(name in ('le', 'ge', 'eq')).lower()})"
         values = [self._graph.value(node) for node in operands]
         if dtype not in (BOOL, "float64", "float32") and any(value is not None for value in values):
             turned = values[0] is not None
             bound, seen = int(values[0] if turned else values[1]), _TURNED.get(name, name) if turned else name
             limits = np.iinfo(dtype)
-            known = {("lt", limits.min): "false", ("ge", limits.min): "true", ("gt", limits.max): "false"}
-            known[("le", limits.max)] = "true"
-            if (seen, bound) in known:
-                return f"((void){given[turned]}, {known[seen, bound]})"
-        return f"{given[0]} {_COMPARED[name]} {given[1]}"
+            constant_results = {("lt", limits.min): "false", ("ge", limits.min): "true", ("gt", limits.max): "false"}
+            constant_results[("le", limits.max)] = "true"
+            if (seen, bound) in constant_results:
+                return f"((void){arguments[turned]}, {constant_results[seen, bound]})"
+        return f"{arguments[0]} {_COMPARED[name]} {arguments[1]}"
 
-    def _converted(self, before: str, dtype: str, given: str) -> str:
+    def _converted(self, before: str, dtype: str, argument: str) -> str:
         kind = TYPES[dtype]
         if dtype == BOOL:
-            return f"{given} != 0"
+            return f"{argument} != 0"
         if not before.startswith("float") or dtype.startswith("float"):
-            return f"({kind}){given}"
+            return f"({kind}){argument}"
         low, high = (int(limit) for limit in (np.iinfo(dtype).min, np.iinfo(dtype).max))
         least, beyond = (
             literal(np.dtype(before).type(low), before),
@@ -249,7 +249,7 @@ static {kind} whole_{before}_{dtype}({TYPES[before]} x) {{
     }}
     return y;
 }}"""
-        return f"{self._source.helper(f'whole_{before}_{dtype}', lambda: text)}({given})"
+        return f"{self._source.helper(f'whole_{before}_{dtype}', lambda: text)}({argument})"
 
     def _bits(self, before: str, dtype: str) -> str:
         name, kind = f"bits_{before}_{dtype}", TYPES[dtype]
@@ -308,12 +308,12 @@ static {kind} {whole}({kind} x, {kind} n) {{
 
     def _region(self, node: Node, operands: Sequence[Node], number: int) -> None:
         graph, region = self._graph, self._graph.regions[number]
-        given = [self.value(operand) for operand in operands[: len(region.inputs)]]
+        initial = [self.value(operand) for operand in operands[: len(region.inputs)]]
         names = [f"v{node}r{i}" for i in range(len(region.results))]
         kinds = [TYPES[graph.types[result]] for result in region.results]
         inner = _Body(self._source, graph, self._place, dict(self._names))
         if region.repeats:
-            self.lines += [f"{kind} {name} = {value};" for kind, name, value in zip(kinds, names, given, strict=True)]
+            self.lines += [f"{kind} {name} = {value};" for kind, name, value in zip(kinds, names, initial, strict=True)]
             inner._names |= zip(region.inputs, names, strict=True)
             inner.do(graph.needed_inside(number, [region.test]), number)
             inner.lines += [f"if (!({inner.value(region.test)})) {{", "    break;", "}"]
@@ -328,7 +328,7 @@ static {kind} {whole}({kind} x, {kind} n) {{
             self.lines += ["for (;;) {", *_indented(inner.lines), "}", *(f"(void){n};" for n in names if n not in read)]
         else:
             self.lines += [f"{kind} {name} = 0;" for kind, name in zip(kinds, names, strict=True)]
-            inner._names |= zip(region.inputs, given, strict=True)
+            inner._names |= zip(region.inputs, initial, strict=True)
             inner.do(graph.needed_inside(number, region.results), number)
             inner.lines += [
                 f"{name} = {inner.value(result)};" for name, result in zip(names, region.results, strict=True)

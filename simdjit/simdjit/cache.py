@@ -18,8 +18,8 @@ _DIGEST = hashlib.sha256().digest_size
 
 def default_folder() -> Path:
     """SIMDJIT_CACHE, or `simdjit` in the user's folder of caches."""
-    given = os.environ.get("SIMDJIT_CACHE")
-    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "simdjit"
+    folder = os.environ.get("SIMDJIT_CACHE")
+    return Path(folder) if folder else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "simdjit"
 
 
 def cached(key: object, suffix: str, make: Callable[[], bytes], folder: Path | None = None) -> bytes:
@@ -82,8 +82,8 @@ def _checksum(name: str, made: bytes) -> bytes:
     return hashlib.sha256(name.encode() + made).digest()
 
 
-def _insist_on_private(found: os.stat_result, kind: Callable[[int], bool]) -> None:
+def _insist_on_private(status: os.stat_result, kind: Callable[[int], bool]) -> None:
     """As far as the system knows of users."""
-    somebody = hasattr(os, "geteuid") and (found.st_uid != os.geteuid() or found.st_mode & _OTHERS_MAY_WRITE)
-    if somebody or not kind(found.st_mode):
+    somebody = hasattr(os, "geteuid") and (status.st_uid != os.geteuid() or status.st_mode & _OTHERS_MAY_WRITE)
+    if somebody or not kind(status.st_mode):
         raise OSError("somebody else may have written this")

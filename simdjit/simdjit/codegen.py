@@ -6,7 +6,7 @@ from typing import NamedTuple
 from simdjit.calls import ARGUMENT, FORMULAS
 from simdjit.graph import Graph, Node, Operation
 from simdjit.instructions import SLOT, Emitter
-from simdjit.packing import Packs, found, width_of
+from simdjit.packing import Packs, find_packs, width_of
 from simdjit.scalar import Scalar
 from simdjit.section import Section
 
@@ -113,21 +113,21 @@ def assembly(graph: Graph, sections: Sections, lanes: int, head: Head = VECTORS,
     start = Section(emitter, "s", step="0")
     start.do([node for node, same in enumerate(fixed) if same and needed[node]])
     start.store(sections.start, "%carry")
-    packs = found(graph, sections.step, fixed, beside) if beside > 1 else Packs()
+    packs = find_packs(graph, sections.step, fixed, beside) if beside > 1 else Packs()
     for group in packs.before:
         start.together(group, width_of(group))
     texts = {"start": emitter.taken()}
     parts = {"record": (sections.record, "l", "%first", "%row"), "step": (sections.step, "t", "%k", "%carry")}
-    for name, (wanted, letter, step, base) in parts.items():
+    for name, (outputs, letter, step, base) in parts.items():
         emitter.block = name
-        section, needed = start.after(letter, step), graph.needed(wanted)
+        section, needed = start.after(letter, step), graph.needed(outputs)
         if name == "step":
             section.pack(packs)
         section.do([node for node, same in enumerate(fixed) if needed[node] and not same])
-        section.store(wanted, base)
+        section.store(outputs, base)
         texts[name] = emitter.taken()
     row = len(sections.record) * SLOT * lanes
-    called = [_function(*one, emitter) for one in sorted(emitter.called)]
+    called = [_function(*function, emitter) for function in sorted(emitter.called)]
     further = {
         "constants": emitter.constants,
         "rooms": emitter.rooms,
@@ -145,7 +145,7 @@ def _function(name: str, dtype: str, width: int, emitter: Emitter) -> str:
     within.constants = emitter.constants
     section = Section(within, "f", step="0")
     needed = graph.needed([result])
-    section.do([node for node, wanted in enumerate(needed) if wanted])
+    section.do([node for node, is_needed in enumerate(needed) if is_needed])
     kind, body = within.vector(dtype), within.taken()
     emitter.functions |= within.functions
     lines = [
@@ -169,7 +169,7 @@ def operations(graph: Graph, sections: Sections, written: bool = False) -> int:
     # What happens inside a region is done in every step where the region is, though its own inputs are no carry.
     outermost = {detail: node for node, (name, _, detail) in enumerate(graph.operations) if name == "region"}
     same = lambda node: fixed[node if graph.homes[node] is None else outermost[graph.around(graph.homes[node])]]
-    done = (graph.operations[node] for node, wanted in enumerate(needed) if wanted and not same(node))
+    done = (graph.operations[node] for node, is_needed in enumerate(needed) if is_needed and not same(node))
     return sum(_work(operation, written) for operation in done)
 
 

@@ -26,29 +26,29 @@ def _shaped(nodes: Sequence[Node], like: Sequence[Any]) -> list[Nodes]:
 
 
 @rule("cond", reads="branches", idle="branches_platforms")
-def _cond(equation: Equation, which: Nodes, *rest: Nodes) -> list[Nodes]:
+def _cond(equation: Equation, which: Nodes, *operands: Nodes) -> list[Nodes]:
     """All branches that any lane needs, and the choice between their results."""
     graph, branches, index = equation.graph, equation.params["branches"], int(which)
-    known = graph.value(index)
-    if known is not None:
-        return equation.evaluate(branches[min(max(int(known), 0), len(branches) - 1)], rest)
-    cases = [_case(equation, index, i, branch, rest) for i, branch in enumerate(branches)]
+    constant_index = graph.value(index)
+    if constant_index is not None:
+        return equation.evaluate(branches[min(max(int(constant_index), 0), len(branches) - 1)], operands)
+    cases = [_case(equation, index, i, branch, operands) for i, branch in enumerate(branches)]
     choose = partial(elementwise.on(graph, "select_n"), index)
     return _shaped([choose(*row) for row in zip(*map(flat, cases), strict=True)], cases[0])
 
 
-def _case(equation: Equation, index: Node, number: int, branch: Any, rest: Sequence[Nodes]) -> list[Nodes]:
+def _case(equation: Equation, index: Node, number: int, branch: Any, operands: Sequence[Nodes]) -> list[Nodes]:
     graph = equation.graph
     before, loops = len(graph.operations), graph.endless
-    plain = equation.evaluate(branch, rest)
+    plain = equation.evaluate(branch, operands)
     if len(graph.operations) - before < _WORTH and graph.endless == loops:
         return plain
     if graph.types[index] == BOOL:
-        here = index if number else graph.apply("xor", index, graph.constant(True, BOOL))
+        chosen = index if number else graph.apply("xor", index, graph.constant(True, BOOL))
     else:
-        here = graph.apply("eq", index, graph.like(number, index))
-    body = lambda inner: flat(equation.evaluate(branch, _shaped(inner, rest)))
-    return _shaped(regions.branch(graph, here, flat(rest), body), plain)
+        chosen = graph.apply("eq", index, graph.like(number, index))
+    body = lambda inner: flat(equation.evaluate(branch, _shaped(inner, operands)))
+    return _shaped(regions.branch(graph, chosen, flat(operands), body), plain)
 
 
 @rule("platform_index", reads="platforms")
@@ -60,10 +60,10 @@ def _platform(equation: Equation) -> Nodes:
 
 
 @rule("while", reads="cond_nconsts cond_jaxpr body_nconsts body_jaxpr")
-def _while(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _while(equation: Equation, *operands: Nodes) -> list[Nodes]:
     params = equation.params
     tested, stepped = params["cond_nconsts"], params["body_nconsts"]
-    of_test, of_body, carry = given[:tested], given[tested:][:stepped], given[tested + stepped :]
+    of_test, of_body, carry = operands[:tested], operands[tested:][:stepped], operands[tested + stepped :]
 
     def test(inner: list[Node]) -> Node:
         (going,) = equation.evaluate(params["cond_jaxpr"], [*of_test, *_shaped(inner, carry)])
@@ -83,11 +83,11 @@ def _repeated(
 
 
 @rule("scan", reads="reverse length jaxpr num_consts num_carry ft_in ft_out", idle="linear unroll")
-def _scan(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _scan(equation: Equation, *operands: Nodes) -> list[Nodes]:
     """Written out; where it is long and keeps nothing of its rounds, a loop."""
     params = equation.params
     constants, carried = _counts(params)
-    fixed, carry, rows = given[:constants], given[constants:][:carried], given[constants + carried :]
+    fixed, carry, rows = operands[:constants], operands[constants:][:carried], operands[constants + carried :]
     rounds, body = params["length"], params["jaxpr"]
     if rounds > _ROUNDS:
         if len(body.out_avals) > carried:
@@ -99,8 +99,8 @@ def _scan(equation: Equation, *given: Nodes) -> list[Nodes]:
         carry = results[:carried]
         stacks.append(results[carried:])
     stacks = stacks[::-1] if params["reverse"] else stacks
-    kept = [np.stack(column) for column in zip(*stacks, strict=True)]
-    return [*carry, *(kept if rounds else [np.zeros(out.shape, dtype=np.int64) for out in equation.outs[carried:]])]
+    recorded = [np.stack(column) for column in zip(*stacks, strict=True)]
+    return [*carry, *(recorded if rounds else [np.zeros(out.shape, dtype=np.int64) for out in equation.outs[carried:]])]
 
 
 def _long_scan(

@@ -66,8 +66,8 @@ class Driver:
 
     def launch(self, kernel: ctypes.c_void_p, blocks: int, threads: int, arguments: Sequence[int]) -> None:
         """Start a kernel whose arguments are numbers of 64 bits and addresses; `threads` in each block."""
-        given = [ctypes.c_uint64(argument) for argument in arguments]
-        pointers = (ctypes.c_void_p * len(given))(*(ctypes.addressof(one) for one in given))
+        words = [ctypes.c_uint64(argument) for argument in arguments]
+        pointers = (ctypes.c_void_p * len(words))(*(ctypes.addressof(word) for word in words))
         shape = [ctypes.c_uint(number) for number in (blocks, 1, 1, threads, 1, 1, 0)]
         self._call("cuLaunchKernel", kernel, *shape, _STREAM, pointers, None)
 
@@ -76,9 +76,9 @@ class Driver:
 
     def _answer(self, function: str, kind: Any, *arguments: Any) -> Any:
         """What a function of the driver puts into its first argument."""
-        found = kind()
-        self._call(function, ctypes.byref(found), *arguments)
-        return found
+        answer = kind()
+        self._call(function, ctypes.byref(answer), *arguments)
+        return answer
 
     def _call(self, function: str, *arguments: Any) -> None:
         code = getattr(self._library, function)(*arguments)

@@ -17,9 +17,9 @@ def _entrywise(name: str, formula: Callable[..., Scalar], reads: str = "", idle:
     """Register a formula of scalars; it is given by name the parameters that it reads."""
 
     @rule(name, reads=reads, idle=idle)
-    def entries(equation: Equation, *given: Nodes) -> Nodes:
+    def entries(equation: Equation, *operands: Nodes) -> Nodes:
         chosen = partial(formula, **{key: equation.params[key] for key in reads.split()})
-        rows = zip(*(np.broadcast_to(nodes, equation.shape).ravel().tolist() for nodes in given), strict=True)
+        rows = zip(*(np.broadcast_to(nodes, equation.shape).ravel().tolist() for nodes in operands), strict=True)
         scalars = ((Scalar(equation.graph, node) for node in row) for row in rows)
         return filled(equation.shape, [chosen(*row).node for row in scalars])
 
@@ -30,14 +30,14 @@ def on(graph: Graph, name: str) -> Callable[..., Node]:
 
 
 def _operation(name: str) -> Callable[..., Scalar]:
-    return lambda one, *others: one.apply(name, *others)
+    return lambda first, *others: first.apply(name, *others)
 
 
 def _arithmetic(name: str) -> Callable[..., Scalar]:
-    def formula(*given: Scalar) -> Scalar:
-        if given[0].type == BOOL:
+    def formula(*operands: Scalar) -> Scalar:
+        if operands[0].type == BOOL:
             raise Unsupported(f"`{name}` of truths")
-        return given[0].apply(name, *given[1:])
+        return operands[0].apply(name, *operands[1:])
 
     return formula
 
@@ -46,15 +46,15 @@ def _quotient(a: Scalar, b: Scalar) -> Scalar:
     """Of whole numbers as XLA has it, where a processor would stop: all bits by zero; the least by -1 itself."""
     if b.type.startswith("float"):
         return a.apply("div", b)
-    found = where(b.equal(0), b.constant(-1), a // _divisor(b))
-    return where(b.equal(-1), -a, found) if b.type.startswith("int") else found
+    quotient = where(b.equal(0), b.constant(-1), a // _divisor(b))
+    return where(b.equal(-1), -a, quotient) if b.type.startswith("int") else quotient
 
 
 def _remainder(a: Scalar, b: Scalar) -> Scalar:
     if b.type.startswith("float"):
         return a.apply("rem", b)
-    found = where(b.equal(0), a, a.apply("rem", _divisor(b)))
-    return where(b.equal(-1), 0, found) if b.type.startswith("int") else found
+    remainder = where(b.equal(0), a, a.apply("rem", _divisor(b)))
+    return where(b.equal(-1), 0, remainder) if b.type.startswith("int") else remainder
 
 
 def _divisor(b: Scalar) -> Scalar:

@@ -59,7 +59,7 @@ def _counted(jaxpr: Jaxpr) -> tuple[int, float]:
     """Equations, and nanoseconds; a loop whose end is not known is done once, and all branches are."""
     equations, nanoseconds = 0, 0.0
     for equation in jaxpr.eqns:
-        inner = [_counted(one) for value in equation.params.values() for one in _jaxprs(value)]
+        inner = [_counted(jaxpr_inside) for value in equation.params.values() for jaxpr_inside in _jaxprs(value)]
         rounds = equation.params["length"] if equation.primitive.name == "scan" else 1
         equations += sum(count for count, _ in inner) if inner else 1
         nanoseconds += rounds * sum(each for _, each in inner) if inner else _nanoseconds(equation)
@@ -67,16 +67,16 @@ def _counted(jaxpr: Jaxpr) -> tuple[int, float]:
 
 
 def _jaxprs(value: Any) -> list[Jaxpr]:
-    several = value if isinstance(value, tuple | list) else (value,)
-    closed = (one.jaxpr if isinstance(one, ClosedJaxpr) else one for one in several)
-    return [one for one in closed if isinstance(one, Jaxpr)]
+    values = value if isinstance(value, tuple | list) else (value,)
+    closed = (jaxpr.jaxpr if isinstance(jaxpr, ClosedJaxpr) else jaxpr for jaxpr in values)
+    return [jaxpr for jaxpr in closed if isinstance(jaxpr, Jaxpr)]
 
 
 def _nanoseconds(equation: Any) -> float:
     name = equation.primitive.name
     made, used = (
-        sum(int(np.prod(getattr(one.aval, "shape", ()))) for one in several)
-        for several in (equation.outvars, equation.invars[:1])
+        sum(int(np.prod(getattr(variable.aval, "shape", ()))) for variable in variables)
+        for variables in (equation.outvars, equation.invars[:1])
     )
     if name == "dot_general":
         (axes, _), _ = equation.params["dimension_numbers"]
@@ -90,11 +90,11 @@ def _nanoseconds(equation: Any) -> float:
 
 def reason_for_xla(operations: int, step: ClosedJaxpr, steps: int) -> str:
     """Why XLA is the better choice for so many steps of all runs together; empty where it is not."""
-    here, there = compiled_here(operations), compiled_by_xla(step)
-    if here.total(steps) <= there.total(steps):
+    cost_here, cost_by_xla = compiled_here(operations), compiled_by_xla(step)
+    if cost_here.total(steps) <= cost_by_xla.total(steps):
         return ""
-    by_xla = f"XLA takes less time by estimate: {_words(there)} and run"
-    return f"{by_xla}; batch code of {spaced(operations)} operations takes {_words(here)}"
+    by_xla = f"XLA takes less time by estimate: {_words(cost_by_xla)} and run"
+    return f"{by_xla}; batch code of {spaced(operations)} operations takes {_words(cost_here)}"
 
 
 def spaced(count: int) -> str:

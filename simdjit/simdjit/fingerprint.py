@@ -95,7 +95,7 @@ class _Names:
             self._kept[id(jaxpr)] = (jaxpr, self.equations(jaxpr, jaxpr.invars, jaxpr.outvars))
         return self._kept[id(jaxpr)][1]
 
-    def equations(self, jaxpr: Jaxpr, arguments: Sequence[Any], wanted: Sequence[Any]) -> bytes:
+    def equations(self, jaxpr: Jaxpr, arguments: Sequence[Any], results: Sequence[Any]) -> bytes:
         """All equations of a function, of these arguments and for these results."""
         numbers: dict[Any, int] = {}
 
@@ -104,7 +104,10 @@ class _Names:
             return ", ".join(str(variable.aval) for variable in variables)
 
         def used(variables: Sequence[Any]) -> list[str | bytes]:
-            return [_literal(one) if isinstance(one, Literal) else str(numbers[one]) for one in variables]
+            return [
+                _literal(variable) if isinstance(variable, Literal) else str(numbers[variable])
+                for variable in variables
+            ]
 
         parts: list[str | bytes] = [new(arguments), new(jaxpr.constvars)]
         for equation in jaxpr.eqns:
@@ -117,7 +120,7 @@ class _Names:
             parts += [part for key in params if key in read for part in (key, self.of(params[key]))]
             parts += [key for key in params if params[key] is not None]
             parts.append(new(equation.outvars))
-        return _digest("jaxpr", *parts, *used(wanted))
+        return _digest("jaxpr", *parts, *used(results))
 
 
 def _literal(literal: Literal) -> bytes:
@@ -134,8 +137,8 @@ def _array(value: Any) -> bytes:
 
 def _digest(kind: str, *parts: str | bytes) -> bytes:
     """Of parts in order; the length of each stands before it, so that no two lists of parts give the same bytes."""
-    whole = hashlib.sha256(kind.encode() + b"\0")
+    digest = hashlib.sha256(kind.encode() + b"\0")
     for part in parts:
         text = part.encode() if isinstance(part, str) else part
-        whole.update(len(text).to_bytes(8, "little") + text)
-    return whole.digest()
+        digest.update(len(text).to_bytes(8, "little") + text)
+    return digest.digest()

@@ -135,26 +135,26 @@ class Graph:
         same = simpler(self, name, nodes, values)
         return self.node(Operation(name, nodes), dtype) if same is None else same
 
-    def entry(self, table: Sequence[Node], place: Node) -> Node:
+    def entry(self, table: Sequence[Node], index: Node) -> Node:
         """The entry of a table at a place within it, a number of type int64; the table lies in memory."""
-        known = self.value(place)
-        if known is not None:
-            return table[int(known)]
+        constant_index = self.value(index)
+        if constant_index is not None:
+            return table[int(constant_index)]
         held = self.node(Operation("table", tuple(table)), self.types[table[0]])
-        return self.node(Operation("entry", (held, place)), self.types[held])
+        return self.node(Operation("entry", (held, index)), self.types[held])
 
     def node(self, operation: Operation, dtype: str, home: int | None = None, key: Any = None) -> Node:
         """The node of an operation, the same for the same one."""
         key = (operation, dtype) if key is None else key
-        known = self._known.get(key)
-        if known is None:
-            known = self._known[key] = len(self.operations)
+        number = self._known.get(key)
+        if number is None:
+            number = self._known[key] = len(self.operations)
             self.operations.append(operation)
             self.types.append(dtype)
             self._values.append(operation.detail if operation.name == "constant" else None)
             inner = self.innermost(*operation.operands)
             self.homes.append(max(home, inner, key=self._depth))
-        return known
+        return number
 
     def innermost(self, *nodes: Node) -> int | None:
         """The home of what is made of some nodes."""
@@ -173,10 +173,10 @@ class Graph:
             home = self.parents[home]
         return home == region
 
-    def needed(self, wanted: Iterable[Node]) -> list[bool]:
+    def needed(self, results: Iterable[Node]) -> list[bool]:
         """Which nodes the wanted ones are made from, themselves included."""
         needed = [False] * len(self.operations)
-        for node in wanted:
+        for node in results:
             needed[node] = True
         for node in reversed(range(len(needed))):
             if needed[node]:
@@ -184,15 +184,15 @@ class Graph:
                     needed[operand] = True
         return needed
 
-    def needed_inside(self, region: int, wanted: Iterable[Node]) -> list[Node]:
+    def needed_inside(self, region: int, results: Iterable[Node]) -> list[Node]:
         """The nodes of a region that the wanted ones are made from, in order; with no look at the rest of the graph."""
-        found, stack = set(), list(wanted)
+        inside_nodes, stack = set(), list(results)
         while stack:
             node = stack.pop()
-            if node not in found and self.inside(node, region):
-                found.add(node)
+            if node not in inside_nodes and self.inside(node, region):
+                inside_nodes.add(node)
                 stack += self.uses(node)
-        return sorted(found)
+        return sorted(inside_nodes)
 
     def uses(self, node: Node) -> tuple[Node, ...]:
         """What a node is made from, and what a region does inside."""
@@ -211,9 +211,9 @@ def filled(shape: Sequence[int], nodes: Sequence[Node]) -> Nodes:
     return np.array(nodes, dtype=np.int64).reshape(shape)
 
 
-def flat(several: Sequence[Nodes]) -> list[Node]:
+def flat(arrays: Sequence[Nodes]) -> list[Node]:
     """All nodes of some arrays, one after another."""
-    return [node for nodes in several for node in nodes.ravel().tolist()]
+    return [node for nodes in arrays for node in nodes.ravel().tolist()]
 
 
 def _supported(dtype: str) -> str:

@@ -19,16 +19,16 @@ _FEW = 24
 _CHOICES = 2_000
 
 
-def _choice(graph: Graph, which: Node, one: Nodes, other: Nodes) -> Nodes:
-    pairs = zip(one.ravel().tolist(), np.broadcast_to(other, one.shape).ravel().tolist(), strict=True)
-    return filled(one.shape, [graph.apply("select", which, a, b) for a, b in pairs])
+def _choice(graph: Graph, which: Node, chosen: Nodes, otherwise: Nodes) -> Nodes:
+    pairs = zip(chosen.ravel().tolist(), np.broadcast_to(otherwise, chosen.shape).ravel().tolist(), strict=True)
+    return filled(chosen.shape, [graph.apply("select", which, a, b) for a, b in pairs])
 
 
 def window(graph: Graph, array: Nodes, starts: Sequence[Node], sizes: Sequence[int]) -> Nodes:
     """Part of an array; where it would stick out it is moved inside."""
     if not int(np.prod(sizes)):
         return np.zeros(sizes, dtype=np.int64)
-    lasts = [whole - size for whole, size in zip(array.shape, sizes, strict=True)]
+    lasts = [length - size for length, size in zip(array.shape, sizes, strict=True)]
     open_axes = [axis for axis, start in enumerate(starts) if graph.value(start) is None and lasts[axis]]
     for axis, (start, size, last) in enumerate(zip(starts, sizes, lasts, strict=True)):
         if axis not in open_axes:
@@ -39,11 +39,11 @@ def window(graph: Graph, array: Nodes, starts: Sequence[Node], sizes: Sequence[i
         return _from_memory(graph, array, [(axis, starts[axis], lasts[axis]) for axis in open_axes], sizes)
     for axis in open_axes:
         cut = lambda first, array=array, axis=axis: array.take(range(first, first + sizes[axis]), axis)
-        found = cut(0)
+        selected = cut(0)
         for first in range(1, lasts[axis] + 1):
             start = starts[axis]
-            found = _choice(graph, graph.apply("ge", start, graph.like(first, start)), cut(first), found)
-        array = found
+            selected = _choice(graph, graph.apply("ge", start, graph.like(first, start)), cut(first), selected)
+        array = selected
     return array
 
 
@@ -52,19 +52,19 @@ def _from_memory(graph: Graph, array: Nodes, starts: Sequence[tuple[int, Node, i
     strides = [int(np.prod(array.shape[axis + 1 :])) for axis in range(array.ndim)]
     place = graph.constant(0, I64)
     for axis, start, last in starts:
-        whole = graph.apply("convert", start, dtype=I64) if graph.types[start] != I64 else start
-        inside = elementwise.on(graph, "clamp")(graph.constant(0, I64), whole, graph.constant(last, I64))
+        start_index = graph.apply("convert", start, dtype=I64) if graph.types[start] != I64 else start
+        inside = elementwise.on(graph, "clamp")(graph.constant(0, I64), start_index, graph.constant(last, I64))
         place = graph.apply("add", place, graph.apply("mul", inside, graph.constant(strides[axis], I64)))
-    table, found = array.ravel().tolist(), []
+    table, entries = array.ravel().tolist(), []
     truths = graph.types[table[0]] == BOOL
     if truths:  # memory holds numbers
         table = [graph.apply("convert", node, dtype=I64) for node in table]
     for offsets in product(*map(range, sizes)):
         beyond = sum(offset * stride for offset, stride in zip(offsets, strides, strict=True))
-        found.append(graph.entry(table, graph.apply("add", place, graph.constant(beyond, I64))))
+        entries.append(graph.entry(table, graph.apply("add", place, graph.constant(beyond, I64))))
     if truths:
-        found = [graph.apply("ne", node, graph.constant(0, I64)) for node in found]
-    return filled(sizes, found)
+        entries = [graph.apply("ne", node, graph.constant(0, I64)) for node in entries]
+    return filled(sizes, entries)
 
 
 def replaced(
@@ -80,7 +80,7 @@ def replaced(
         inside: whether a part that would stick out is moved inside, or left out.
         merged: of what stands there and what is put in, what stands there afterwards.
     """
-    lasts = [whole - size for whole, size in zip(array.shape, part.shape, strict=True)]
+    lasts = [length - size for length, size in zip(array.shape, part.shape, strict=True)]
     options = []
     for start, last in zip(starts, lasts, strict=True):
         value = graph.value(start)
@@ -92,17 +92,17 @@ def replaced(
         len(option) == 1 for option in options
     ):
         raise Unsupported(f"{part.size} entries set at one of {np.prod([len(option) for option in options])} places")
-    found = array.copy()
+    result = array.copy()
     for firsts in product(*options):
-        here = graph.constant(True, BOOL)
+        hit = graph.constant(True, BOOL)
         for start, first, last in zip(starts, firsts, lasts, strict=True):
             if graph.value(start) is None:
-                here = graph.apply("and", here, _at(graph, start, first, last, inside))
+                hit = graph.apply("and", hit, _at(graph, start, first, last, inside))
         places = tuple(slice(first, first + size) for first, size in zip(firsts, part.shape, strict=True))
         pairs = zip(array[places].ravel().tolist(), part.ravel().tolist(), strict=True)
         put = filled(part.shape, [merged(old, new) for old, new in pairs])
-        found[places] = _choice(graph, here, put, found[places])
-    return found
+        result[places] = _choice(graph, hit, put, result[places])
+    return result
 
 
 def _at(graph: Graph, start: Node, first: int, last: int, inside: bool) -> Node:
@@ -128,14 +128,14 @@ def _gather(equation: Equation, array: Nodes, indices: Nodes) -> Nodes:
     left_out = (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
     drop = _drops(params["mode"])
     batch, rows = indices.shape[:-1], []
-    for place in np.ndindex(batch):
-        starts = _starts(graph, array, numbers.start_index_map, indices[place].tolist())
+    for batch_index in np.ndindex(batch):
+        starts = _starts(graph, array, numbers.start_index_map, indices[batch_index].tolist())
         for axis, along in zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True):
-            starts[axis] = graph.constant(place[along], I64)
+            starts[axis] = graph.constant(batch_index[along], I64)
         part = window(graph, array, starts, sizes)
         if drop:
             fill = np.full(part.shape, equation.constant(_fill(params["fill_value"], equation.out.dtype)))
-            lasts = [whole - size for whole, size in zip(array.shape, sizes, strict=True)]
+            lasts = [length - size for length, size in zip(array.shape, sizes, strict=True)]
             part = _choice(graph, _within(graph, starts, lasts), part, fill)
         rows.append(part.reshape([size for axis, size in enumerate(sizes) if axis not in left_out]))
     if not rows:
@@ -192,11 +192,11 @@ def _scatter(primitive: str, merging: str | None) -> None:
         shape = list(windows.shape[len(batch) :])
         for axis in sorted((*numbers.inserted_window_dims, *numbers.operand_batching_dims)):
             shape.insert(axis, 1)
-        for place in np.ndindex(batch):
-            starts = _starts(graph, array, numbers.scatter_dims_to_operand_dims, indices[place].tolist())
+        for batch_index in np.ndindex(batch):
+            starts = _starts(graph, array, numbers.scatter_dims_to_operand_dims, indices[batch_index].tolist())
             for axis, along in zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True):
-                starts[axis] = graph.constant(place[along], I64)
-            array = replaced(graph, array, starts, windows[place].reshape(shape), inside, merged)
+                starts[axis] = graph.constant(batch_index[along], I64)
+            array = replaced(graph, array, starts, windows[batch_index].reshape(shape), inside, merged)
         return array
 
 

@@ -128,10 +128,10 @@ class Emitter:
         pairs = ", ".join(f"[ {value}, %{block} ]" for block, value in ways.items())
         return self.line(f"phi {self.vector(dtype)} {pairs}", name)
 
-    def choice(self, test: str, one: str, other: str, dtype: str, name: str) -> str:
+    def choice(self, test: str, if_true: str, if_false: str, dtype: str, name: str) -> str:
         """One or the other, lane by lane."""
         kind = self.vector(dtype)
-        return self.line(f"select {self.vector(BOOL)} {test}, {kind} {one}, {kind} {other}", name)
+        return self.line(f"select {self.vector(BOOL)} {test}, {kind} {if_true}, {kind} {if_false}", name)
 
     def line(self, text: str, name: str) -> str:
         """A line that gives a value its name."""
@@ -141,18 +141,20 @@ class Emitter:
     def load(self, base: str, slot: int, dtype: str, name: str) -> str:
         """What lies in a slot."""
         stored = I64 if dtype == BOOL else dtype
-        place = self._place(base, slot, stored, name)
-        kept = name if stored == dtype else f"{name}w"
-        self.line(f"load {self.vector(stored)}, {place}", kept)
-        return kept if kept == name else self.line(f"trunc {self.vector(I64)} {kept} to {self.vector(BOOL)}", name)
+        address = self._place(base, slot, stored, name)
+        loaded = name if stored == dtype else f"{name}w"
+        self.line(f"load {self.vector(stored)}, {address}", loaded)
+        return (
+            loaded if loaded == name else self.line(f"trunc {self.vector(I64)} {loaded} to {self.vector(BOOL)}", name)
+        )
 
     def store(self, value: str, dtype: str, base: str, slot: int, name: str) -> None:
         """Put a value into a slot."""
         stored = I64 if dtype == BOOL else dtype
         if stored != dtype:
             value = self.line(f"zext {self.vector(dtype)} {value} to {self.vector(stored)}", f"{name}w")
-        place = self._place(base, slot, stored, name)
-        self.lines.append(f"  store {self.vector(stored)} {value}, {place}")
+        address = self._place(base, slot, stored, name)
+        self.lines.append(f"  store {self.vector(stored)} {value}, {address}")
 
     def _place(self, base: str, slot: int, dtype: str, name: str) -> str:
         """Where the numbers of a slot lie; a thread finds its own beyond a base of its own."""
@@ -208,16 +210,16 @@ class Emitter:
         self.rooms.append(f"  {name}room = alloca [{entries} x {self.vector(dtype)}], align {size * self.width}")
         return Table(f"{name}room", 0, size * self.width, size)
 
-    def put(self, value: str, table: Table, place: str, dtype: str, name: str) -> None:
+    def put(self, value: str, table: Table, index: str, dtype: str, name: str) -> None:
         """Put a value into a room, at a place that is the same for all lanes."""
-        self.line(f"mul i64 {place}, {table.step}", f"{name}m")
+        self.line(f"mul i64 {index}, {table.step}", f"{name}m")
         self.line(f"getelementptr i8, ptr {table.base}, i64 {name}m", f"{name}a")
         self.lines.append(f"  store {self.vector(dtype)} {value}, ptr {name}a, align {table.step}")
 
-    def at(self, table: Table, place: str, dtype: str, name: str) -> None:
+    def at(self, table: Table, index: str, dtype: str, name: str) -> None:
         """What stands in a table at a place that is the same for all lanes."""
         kind, size = self.vector(dtype), np.dtype(dtype).itemsize
-        self.line(f"mul i64 {place}, {table.step}", f"{name}m")
+        self.line(f"mul i64 {index}, {table.step}", f"{name}m")
         self.line(f"add i64 {name}m, {table.first}", f"{name}f")
         self.line(f"getelementptr i8, ptr {table.base}, i64 {name}f", f"{name}a")
         if table.apart:
@@ -235,26 +237,26 @@ class Emitter:
 
         Only the slots of a vector are aligned like one; a thread finds its own number in each.
         """
-        found = [self.graph.operations[node] for node in entries]
-        if any(one.name != "input" or one.detail[0] not in ("number", "carry") for one in found):
+        operations = [self.graph.operations[node] for node in entries]
+        if any(operation.name != "input" or operation.detail[0] not in ("number", "carry") for operation in operations):
             return None
-        kind, first = found[0].detail
-        if [one.detail for one in found] != [(kind, first + i) for i in range(len(found))]:
+        kind, first = operations[0].detail
+        if [operation.detail for operation in operations] != [(kind, first + i) for i in range(len(operations))]:
             return None
         size = np.dtype(self.graph.types[entries[0]]).itemsize
         base = "%numbers" if kind == "number" else "%carry"
         base = base if self.width == self._lanes else f"{base}{size}"
         return Table(base, first * SLOT * self._lanes, SLOT * self._lanes, size)
 
-    def entry(self, table: Table, place: str, dtype: str, name: str) -> None:
+    def entry(self, table: Table, index: str, dtype: str, name: str) -> None:
         """What stands in a table at a place of each lane's own."""
-        whole, kind = self.vector(I64), self.vector(dtype)
+        integers, kind = self.vector(I64), self.vector(dtype)
         before = ", ".join(f"i64 {table.first + lane * table.apart}" for lane in range(self.width))
-        self.line(f"mul {whole} {place}, splat (i64 {table.step})", f"{name}m")
-        self.line(f"add {whole} {name}m, <{before}>", f"{name}a")
+        self.line(f"mul {integers} {index}, splat (i64 {table.step})", f"{name}m")
+        self.line(f"add {integers} {name}m, <{before}>", f"{name}a")
         value = "poison"
         for lane in range(self.width):
-            self.line(f"extractelement {whole} {name}a, i64 {lane}", f"{name}i{lane}")
+            self.line(f"extractelement {integers} {name}a, i64 {lane}", f"{name}i{lane}")
             self.line(f"getelementptr i8, ptr {table.base}, i64 {name}i{lane}", f"{name}q{lane}")
             self.line(f"load {_TYPES[dtype]}, ptr {name}q{lane}, align {np.dtype(dtype).itemsize}", f"{name}v{lane}")
             last = name if lane == self.width - 1 else f"{name}w{lane}"
@@ -297,12 +299,12 @@ class Emitter:
 
     def gathered(self, values: Sequence[str], dtype: str, width: int, name: str) -> str:
         """Numbers of a single run, one per lane; the last one fills what is left."""
-        one, kind = _TYPES[dtype], f"<{width} x {_TYPES[dtype]}>"
+        scalar, kind = _TYPES[dtype], f"<{width} x {_TYPES[dtype]}>"
         vector = self.spread(values[-1], dtype, width, f"{name}s") if len(values) < width else "poison"
         for lane, value in enumerate(values):
-            self.line(f"extractelement <1 x {one}> {value}, i64 0", f"{name}e{lane}")
+            self.line(f"extractelement <1 x {scalar}> {value}, i64 0", f"{name}e{lane}")
             last = name if lane == len(values) - 1 else f"{name}i{lane}"
-            vector = self.line(f"insertelement {kind} {vector}, {one} {name}e{lane}, i64 {lane}", last)
+            vector = self.line(f"insertelement {kind} {vector}, {scalar} {name}e{lane}, i64 {lane}", last)
         return vector
 
     def taken_out(self, vector: str, lane: int, width: int, dtype: str, name: str) -> str:

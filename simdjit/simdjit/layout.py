@@ -44,12 +44,12 @@ class Layout:
 
     def unpacked(self, memory: np.ndarray, runs: int) -> list[np.ndarray]:
         """Arrays, axes over runs and rows first."""
-        found = []
+        arrays = []
         for i, (shape, kind) in enumerate(zip(self._shapes, self._types, strict=True)):
             lanes_last = self._slots(memory, i)
             rows = np.moveaxis(lanes_last, -1, 1).reshape(len(memory) * self._lanes, memory.shape[1], *shape)
-            found.append(rows[:runs].astype(kind, order="C"))
-        return found
+            arrays.append(rows[:runs].astype(kind, order="C"))
+        return arrays
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:
         """The arrays of the first run themselves, not copies: writing into them writes into the memory."""

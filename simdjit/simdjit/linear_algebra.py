@@ -15,15 +15,18 @@ _MOST = 20
 Matrix = list[list[Scalar]]
 
 
-def _of_each(equation: Equation, step: Callable[..., Sequence[Any]], *given: Nodes) -> list[Nodes]:
+def _of_each(equation: Equation, step: Callable[..., Sequence[Any]], *operands: Nodes) -> list[Nodes]:
     """Results of a step for every place of stacks of matrices."""
-    if max(given[0].shape[-2:], default=0) > _MOST:
-        raise Unsupported(f"a matrix of {given[0].shape[-2]} by {given[0].shape[-1]}, more than {_MOST}")
-    batch, found = given[0].shape[:-2], []
-    for place in np.ndindex(batch):
-        matrices = ([[Scalar(equation.graph, node) for node in row] for row in one[place].tolist()] for one in given)
-        found.append(step(*matrices))
-    stacks = zip(*found, strict=True) if found else [()] * len(equation.outs)
+    if max(operands[0].shape[-2:], default=0) > _MOST:
+        raise Unsupported(f"a matrix of {operands[0].shape[-2]} by {operands[0].shape[-1]}, more than {_MOST}")
+    batch, results = operands[0].shape[:-2], []
+    for index in np.ndindex(batch):
+        matrices = (
+            [[Scalar(equation.graph, node) for node in row] for row in stack_of_rows[index].tolist()]
+            for stack_of_rows in operands
+        )
+        results.append(step(*matrices))
+    stacks = zip(*results, strict=True) if results else [()] * len(equation.outs)
     node = np.vectorize(lambda scalar: scalar.node, otypes=[np.int64])
     return [
         node(np.array(stack, dtype=object)).reshape(out.shape) for stack, out in zip(stacks, equation.outs, strict=True)
@@ -31,8 +34,8 @@ def _of_each(equation: Equation, step: Callable[..., Sequence[Any]], *given: Nod
 
 
 @rule("lu")
-def _lu(equation: Equation, given: Nodes) -> list[Nodes]:
-    return _of_each(equation, _factors, given)
+def _lu(equation: Equation, matrices: Nodes) -> list[Nodes]:
+    return _of_each(equation, _factors, matrices)
 
 
 def _factors(rows: Matrix) -> tuple[Matrix, list[Scalar], list[Scalar]]:
@@ -58,8 +61,8 @@ def _factors(rows: Matrix) -> tuple[Matrix, list[Scalar], list[Scalar]]:
 
 
 @rule("cholesky")
-def _cholesky(equation: Equation, given: Nodes) -> Nodes:
-    return _of_each(equation, lambda rows: [_root(rows)], given)[0]
+def _cholesky(equation: Equation, matrices: Nodes) -> Nodes:
+    return _of_each(equation, lambda rows: [_root(rows)], matrices)[0]
 
 
 def _root(rows: Matrix) -> Matrix:
@@ -68,16 +71,16 @@ def _root(rows: Matrix) -> Matrix:
     factor = [[zero] * size for _ in rows]
     sound = zero.equal(0.0)
     for j in range(size):
-        rest = rows[j][j]
+        difference = rows[j][j]
         for k in range(j):
-            rest = rest - factor[j][k] * factor[j][k]
-        sound = sound & (rest > 0.0)
-        factor[j][j] = rest.apply("sqrt")
+            difference = difference - factor[j][k] * factor[j][k]
+        sound = sound & (difference > 0.0)
+        factor[j][j] = difference.apply("sqrt")
         for i in range(j + 1, size):
-            rest = rows[i][j]
+            difference = rows[i][j]
             for k in range(j):
-                rest = rest - factor[i][k] * factor[j][k]
-            factor[i][j] = rest / factor[j][j]
+                difference = difference - factor[i][k] * factor[j][k]
+            factor[i][j] = difference / factor[j][j]
     return [
         [where(sound, entry, float("nan")) if j <= i else zero for j, entry in enumerate(row)]
         for i, row in enumerate(factor)
@@ -107,9 +110,9 @@ def _triangular_solve(equation: Equation, matrix: Nodes, right: Nodes) -> Nodes:
 
 
 @rule("custom_linear_solve", reads="const_lengths jaxprs")
-def _solve(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _solve(equation: Equation, *operands: Nodes) -> list[Nodes]:
     """By the function that came along for it."""
     lengths, called = equation.params["const_lengths"], equation.params["jaxprs"]
     before = lengths.matvec + lengths.vecmat
-    constants = given[before:][: lengths.solve]
-    return equation.evaluate(called.solve, [*constants, *given[sum(lengths) :]])
+    constants = operands[before:][: lengths.solve]
+    return equation.evaluate(called.solve, [*constants, *operands[sum(lengths) :]])

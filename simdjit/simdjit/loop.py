@@ -79,7 +79,7 @@ class Loop:
         beside = simd_width(64) if lanes == 1 and not driver else 1
         made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside, planned)
         name = fingerprint(
-            [one.closed for one in traced], self._prologue.constants, lanes, beside, bool(driver), planned
+            [function.closed for function in traced], self._prologue.constants, lanes, beside, bool(driver), planned
         )
         program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
         if program.prologue_lacks and not self._prologue.lacking:
@@ -88,9 +88,9 @@ class Loop:
         self._code = (
             nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache, lanes > 1)
         )
-        several = (self._prologue.inputs, begun.leaves, self._record.leaves)
+        trees = (self._prologue.inputs, begun.leaves, self._record.leaves)
         self._lanes = lanes
-        self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in several)
+        self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in trees)
 
     def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
         """Run the loop for a batch.
@@ -105,10 +105,10 @@ class Loop:
             over runs.
         """
         runs = len(jax.tree.leaves(numbers)[0])
-        given = self._numbers_layout.packed(self._prologue.packed(numbers), runs)
-        carry = self._carry_layout.memory(len(given))
-        series = self._record_layout.memory(len(given), steps // every + 1 if every else 0)
-        self._code.run(given, carry, series, steps, every)
+        memory = self._numbers_layout.packed(self._prologue.packed(numbers), runs)
+        carry = self._carry_layout.memory(len(memory))
+        series = self._record_layout.memory(len(memory), steps // every + 1 if every else 0)
+        self._code.run(memory, carry, series, steps, every)
         final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
         return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
 
@@ -118,21 +118,21 @@ class Loop:
         Raises:
             Unsupported: XLA computes what comes before the first step, or a GPU the steps.
         """
-        call, given, series = self._kept(1)
-        views = self._numbers_layout.views(given), self._record_layout.views(series)
-        return Kept(call, *views, given[0, 0], series[0, 0])
+        call, memory, series = self._kept(1)
+        views = self._numbers_layout.views(memory), self._record_layout.views(series)
+        return Kept(call, *views, memory[0, 0], series[0, 0])
 
     def kept_runs(self, runs: int) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
         """`kept` of many runs: arrays of shape (groups, runs of a group, ...), the last runs of which may be idle."""
-        call, given, series = self._kept(-(-runs // self._lanes))
-        return call, self._numbers_layout.views_of_groups(given), self._record_layout.views_of_groups(series)
+        call, memory, series = self._kept(-(-runs // self._lanes))
+        return call, self._numbers_layout.views_of_groups(memory), self._record_layout.views_of_groups(series)
 
     def _kept(self, groups: int) -> tuple[Callable[[], None], np.ndarray, np.ndarray]:
         if self._prologue.lacking or not isinstance(self._code, Code):
             raise Unsupported(self._prologue.lacking or "a GPU that computes one step at a time")
         layouts = self._numbers_layout, self._carry_layout, self._record_layout
-        given, carry, series = (layout.memory(groups) for layout in layouts)
-        return self._code.repeated(given, carry, series), given, series
+        memory, carry, series = (layout.memory(groups) for layout in layouts)
+        return self._code.repeated(memory, carry, series), memory, series
 
 
 class Kept(NamedTuple):
@@ -185,13 +185,13 @@ def _lowered(
 ) -> Program:
     """The program of traced functions: prepare, start, step and record."""
     _, begun, step, record = traced
-    graph, known = prologue.lowered()
+    graph, prepared = prologue.lowered()
     try:
-        first = evaluate(graph, begun.closed, known, _MOST)
+        first = evaluate(graph, begun.closed, prepared, _MOST)
         k = graph.input(STEP, I64)
         k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
-        given = [*known, *inputs(graph, "carry", begun.leaves), np.array(k)]
-        stepped, recorded = (evaluate(graph, one.closed, given, _MOST) for one in (step, record))
+        arguments = [*prepared, *inputs(graph, "carry", begun.leaves), np.array(k)]
+        stepped, recorded = (evaluate(graph, function.closed, arguments, _MOST) for function in (step, record))
     except TooLong as error:
         seconds = estimate.compiled_here(_MOST).compiling
         raise Unsupported(f"{error}, which would take more than {seconds:.0f} s to compile") from error

@@ -44,21 +44,21 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
         Unsupported: it has a primitive without a rule.
         TooLong: it has too many operations.
     """
-    known = dict(zip(closed.jaxpr.invars, arguments, strict=True))
+    values = dict(zip(closed.jaxpr.invars, arguments, strict=True))
     fixed = zip(closed.jaxpr.constvars, closed.consts, strict=True)
-    known |= {variable: nodes_of(graph, value) for variable, value in fixed}
+    values |= {variable: nodes_of(graph, value) for variable, value in fixed}
 
     def read(variable: Any) -> Nodes:
         if isinstance(variable, Literal):
             aval: Any = variable.aval
             return nodes_of(graph, np.asarray(variable.val, dtype=aval.dtype))
-        return known[variable]
+        return values[variable]
 
     within = partial(evaluate, graph, most=most)
     for equation in closed.jaxpr.eqns:
-        asked = Equation(graph, equation.params, [variable.aval for variable in equation.outvars], within)
-        found = results(equation.primitive.name, asked, [read(variable) for variable in equation.invars])
-        known |= zip(equation.outvars, found, strict=True)
+        equation_here = Equation(graph, equation.params, [variable.aval for variable in equation.outvars], within)
+        outputs = results(equation.primitive.name, equation_here, [read(variable) for variable in equation.invars])
+        values |= zip(equation.outvars, outputs, strict=True)
         if len(graph.operations) > most:
             raise TooLong(f"more than {spaced(int(most))} operations")
     return [read(variable) for variable in closed.jaxpr.outvars]
@@ -75,16 +75,16 @@ def evaluate(graph: Graph, closed: Any, arguments: Sequence[Nodes], most: float 
 @rule("checkpoint", reads="jaxpr", idle="prevent_cse differentiated policy")
 @rule("custom_jvp_call", reads="call_jaxpr", idle="jvp_jaxpr_fun num_consts symbolic_zeros")
 @rule("custom_vjp_call", reads="call_jaxpr fun_jaxpr", idle="fwd_jaxpr_thunk bwd num_consts out_trees symbolic_zeros")
-def _call(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _call(equation: Equation, *operands: Nodes) -> list[Nodes]:
     """Primitives that only call another function."""
     params = equation.params
     (called,) = (params[key] for key in ("jaxpr", "call_jaxpr", "fun_jaxpr") if key in params)
-    return equation.evaluate(called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ()), given)
+    return equation.evaluate(called if isinstance(called, ClosedJaxpr) else ClosedJaxpr(called, ()), operands)
 
 
 @rule("call_hi_primitive", reads="_prim")
-def _expanded(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _expanded(equation: Equation, *operands: Nodes) -> list[Nodes]:
     """What a primitive of primitives does; JAX has some since 0.12."""
     primitive = equation.params["_prim"]
-    whole = lambda *flat: primitive.expand(*jax.tree.unflatten(primitive.in_tree, flat))
-    return equation.evaluate(jax.make_jaxpr(whole)(*primitive.in_avals_flat), given)
+    expanded = lambda *flat: primitive.expand(*jax.tree.unflatten(primitive.in_tree, flat))
+    return equation.evaluate(jax.make_jaxpr(expanded)(*primitive.in_avals_flat), operands)

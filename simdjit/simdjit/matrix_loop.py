@@ -66,7 +66,7 @@ def _lies_turned(graph: Graph, lines: Matrix) -> bool:
     return first.name == "input" and below.detail == (first.detail[0], first.detail[1] + 1)
 
 
-def emit(emitter: Emitter, one: Table, other: Table, shape: Product, dtype: str, name: str) -> Table:
+def emit(emitter: Emitter, left: Table, right: Table, shape: Product, dtype: str, name: str) -> Table:
     """Write the loops of a product.
 
     Args:
@@ -99,13 +99,13 @@ def emit(emitter: Emitter, one: Table, other: Table, shape: Product, dtype: str,
         at = f"{a}x{b}"
         lines.append(f"  %{name}s{at} = phi {kind} [ {nothing}, %{name}column ], [ %{name}n{at}, %{name}sum ]")
     for letter, table, index, count, size, turned in (
-        ("x", one, "i", below, shape.rows, shape.turned[0]),
-        ("y", other, "j", beside, shape.columns, shape.turned[1]),
+        ("x", left, "i", below, shape.rows, shape.turned[0]),
+        ("y", right, "j", beside, shape.columns, shape.turned[1]),
     ):
         for a in range(count):
-            place = f"{name}{letter}{a}"
-            entry = _place(emitter, place, f"%{name}{index}{a}", f"%{name}k", size, shape.length, turned)
-            emitter.at(table, entry, dtype, f"%{place}")
+            prefix = f"{name}{letter}{a}"
+            entry = _place(emitter, prefix, f"%{name}{index}{a}", f"%{name}k", size, shape.length, turned)
+            emitter.at(table, entry, dtype, f"%{prefix}")
     for a, b in tile:
         at = f"{a}x{b}"
         lines.append(f"  %{name}p{at} = {times} {kind} %{name}x{a}, %{name}y{b}")

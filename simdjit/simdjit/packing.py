@@ -74,15 +74,15 @@ class Packs(NamedTuple):
         return order
 
     def _units(self, graph: Graph, nodes: Sequence[Node]) -> dict[Node, Node | Group]:
-        own, units = set(nodes), {}
+        home_nodes, units = set(nodes), {}
         is_result = lambda node: graph.operations[node].name == "result"
         for node in sorted(nodes, key=is_result):  # regions first: results are packed as theirs are
             group = self.groups.get(node, ())
-            whole = bool(group) and own.issuperset(group)
-            if whole and is_result(node):
+            complete = bool(group) and home_nodes.issuperset(group)
+            if complete and is_result(node):
                 regions = tuple(graph.operations[member].operands[0] for member in group)
-                whole = units[regions[0]] == regions
-            units[node] = group if whole else node
+                complete = units[regions[0]] == regions
+            units[node] = group if complete else node
         return units
 
 
@@ -99,7 +99,7 @@ def _kinds(graph: Graph) -> list[int]:
 
     Nodes of one kind are equally far from the leaves, so none of them depends on another one.
     """
-    known: dict[object, int] = defaultdict(count().__next__)
+    numbers: dict[object, int] = defaultdict(count().__next__)
     kinds: list[int] = []
     for node, (name, operands, detail) in enumerate(graph.operations):
         if name in ("constant", "input"):
@@ -113,19 +113,19 @@ def _kinds(graph: Graph) -> list[int]:
             made = _signature(graph, detail) if name == "region" else detail
             key = (name, graph.types[node], made, graph.homes[node], *of_operands)
             key = ("alone", node) if name == "region" and made is None else key
-        kinds.append(known[key])
+        kinds.append(numbers[key])
     return kinds
 
 
 def _signature(graph: Graph, number: int) -> object:
     """What a region does to its operands, line by line; None where it depends on more than those and constants."""
     region = graph.regions[number]
-    wanted = (region.test, *region.results)
+    outputs = (region.test, *region.results)
     names: dict[Node, object] = {node: f"given {i}" for i, node in enumerate(region.inputs)}
-    if any(not graph.inside(node, number) and not _constant(graph, node) for node in wanted):
+    if any(not graph.inside(node, number) and not _constant(graph, node) for node in outputs):
         return None
     lines = []
-    for node in graph.needed_inside(number, wanted):  # operands first
+    for node in graph.needed_inside(number, outputs):  # operands first
         name, operands, detail = graph.operations[node]
         if any(not graph.inside(operand, number) and not _constant(graph, operand) for operand in operands):
             return None
@@ -134,16 +134,18 @@ def _signature(graph: Graph, number: int) -> object:
                 return None
             lines.append((name, graph.types[node], detail, *(names.get(operand, -operand) for operand in operands)))
             names[node] = len(lines)
-    return region.repeats, tuple(lines), tuple(names.get(node, -node) for node in wanted)
+    return region.repeats, tuple(lines), tuple(names.get(node, -node) for node in outputs)
 
 
 def _constant(graph: Graph, node: Node) -> bool:
     """Whether a node is a constant or a table of constants."""
     name, operands, _ = graph.operations[node]
-    return graph.value(node) is not None or (name == "table" and all(graph.value(one) is not None for one in operands))
+    return graph.value(node) is not None or (
+        name == "table" and all(graph.value(operand) is not None for operand in operands)
+    )
 
 
-def found(graph: Graph, outputs: Sequence[Node], fixed: Sequence[bool], width: int) -> Packs:
+def find_packs(graph: Graph, outputs: Sequence[Node], fixed: Sequence[bool], width: int) -> Packs:
     """Packs of what is done in every step.
 
     Args:
@@ -156,10 +158,10 @@ def found(graph: Graph, outputs: Sequence[Node], fixed: Sequence[bool], width: i
     outside = [home is None for home in graph.homes]
     free = {node for node, wanted in enumerate(needed) if wanted and not (outside[node] and fixed[node])}
     packs = _grown(graph, kinds, {node for node in free if graph.operations[node].name not in _ALONE}, width)
-    kept = _Balance(graph, kinds, packs, outputs, needed, fixed).worthwhile()
-    groups = {group for pack in kept for group in _operands(graph, pack, kinds) if len(set(group)) > 1}
+    worthwhile = _Balance(graph, kinds, packs, outputs, needed, fixed).worthwhile()
+    groups = {group for pack in worthwhile for group in _operands(graph, pack, kinds) if len(set(group)) > 1}
     before = [group for group in sorted(groups) if all(fixed[node] and outside[node] for node in group)]
-    return Packs({node: pack for pack in kept for node in pack}, before, kinds)
+    return Packs({node: pack for pack in worthwhile for node in pack}, before, kinds)
 
 
 def _grown(graph: Graph, kinds: Sequence[int], free: set[Node], width: int) -> list[Group]:

@@ -48,11 +48,11 @@ def _by_vmap(function: Callable[[list[Any]], list[Any]], example: list[Any]) -> 
     stacked = [jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype) for leaf in example]
     program = jax.jit(jax.vmap(function)).lower(stacked).compile()
 
-    def run(given: list[np.ndarray]) -> list[np.ndarray]:
-        runs, pieces = len(given[0]), []
+    def run(leaves: list[np.ndarray]) -> list[np.ndarray]:
+        runs, pieces = len(leaves[0]), []
         for first in range(0, runs, width):
             which = np.minimum(np.arange(first, first + width), runs - 1)
-            results = program([np.asarray(leaf)[which] for leaf in given])
+            results = program([np.asarray(leaf)[which] for leaf in leaves])
             pieces.append([np.asarray(result) for result in results])
         return [np.concatenate(parts)[:runs] for parts in zip(*pieces, strict=True)]
 

@@ -29,52 +29,52 @@ def _reduction(primitive: str, name: str) -> None:
     """Entries along some axes."""
 
     @rule(primitive, reads="axes")
-    def reduction(equation: Equation, given: Nodes) -> Nodes:
+    def reduction(equation: Equation, operand: Nodes) -> Nodes:
         axes = equation.params["axes"]
-        kept = [axis for axis in range(given.ndim) if axis not in axes]
-        count = int(np.prod([given.shape[axis] for axis in axes]))
+        remaining_axes = [axis for axis in range(operand.ndim) if axis not in axes]
+        count = int(np.prod([operand.shape[axis] for axis in axes]))
         if not count:
             return np.full(equation.shape, equation.constant(_nothing(name, str(equation.out.dtype))))
-        rows = given.transpose([*kept, *axes]).reshape(-1, count).tolist()
+        rows = operand.transpose([*remaining_axes, *axes]).reshape(-1, count).tolist()
         return filled(equation.shape, [reduce(elementwise.on(equation.graph, name), row) for row in rows])
 
 
 def _running(primitive: str, name: str) -> None:
     @rule(primitive, reads="axis reverse")
-    def running(equation: Equation, given: Nodes) -> Nodes:
+    def running(equation: Equation, operand: Nodes) -> Nodes:
         axis = equation.params["axis"]
-        lines = np.moveaxis(given, axis, -1)
+        lines = np.moveaxis(operand, axis, -1)
         way = slice(None, None, -1) if equation.params["reverse"] else slice(None)
         rows = lines[..., way].reshape(-1, lines.shape[-1]).tolist()
         add = elementwise.on(equation.graph, name)
-        found = filled(lines.shape, [node for row in rows for node in accumulate(row, add)])
-        return np.moveaxis(found[..., way], -1, axis)
+        sums = filled(lines.shape, [node for row in rows for node in accumulate(row, add)])
+        return np.moveaxis(sums[..., way], -1, axis)
 
 
 def _place(primitive: str, name: str) -> None:
     """Where the extreme is; the first of several, and the first that is no number if there is one."""
 
     @rule(primitive, reads="axes index_dtype")
-    def place(equation: Equation, given: Nodes) -> Nodes:
+    def place(equation: Equation, operand: Nodes) -> Nodes:
         (axis,) = equation.params["axes"]
-        lines = np.moveaxis(given, axis, -1)
+        lines = np.moveaxis(operand, axis, -1)
         places = [Scalar(equation.graph, equation.constant(i)) for i in range(lines.shape[-1])]
         rows = ([Scalar(equation.graph, node) for node in row] for row in lines.reshape(-1, lines.shape[-1]).tolist())
         return filled(equation.shape, [_first(name, row, places).node for row in rows])
 
 
 def _first(name: str, row: Sequence[Scalar], places: Sequence[Scalar]) -> Scalar:
-    best, place = row[0], places[0]
-    for entry, here in zip(row[1:], places[1:], strict=True):
+    best, best_place = row[0], places[0]
+    for entry, entry_place in zip(row[1:], places[1:], strict=True):
         better = entry.apply(name, best)
         if entry.type.startswith("float"):
             better = better | (entry.apply("ne", entry) & best.equal(best))
-        best, place = where(better, entry, best), where(better, here, place)
-    return place
+        best, best_place = where(better, entry, best), where(better, entry_place, best_place)
+    return best_place
 
 
 @rule("dot_general", reads="dimension_numbers preferred_element_type", idle="precision")
-def _dot(equation: Equation, one: Nodes, other: Nodes) -> Nodes:
+def _dot(equation: Equation, left_operand: Nodes, right_operand: Nodes) -> Nodes:
     graph, dtype = equation.graph, str(equation.out.dtype)
     if dtype == BOOL:
         raise Unsupported("a product of matrices of truths")
@@ -85,7 +85,7 @@ def _dot(equation: Equation, one: Nodes, other: Nodes) -> Nodes:
         size = [int(np.prod([nodes.shape[axis] for axis in some])) for some in (batch, free, axes)]
         return _converted(graph, nodes, dtype).transpose([*batch, *free, *axes]).reshape(size).tolist()
 
-    left, right = rows(one, left_axes, left_batch), rows(other, right_axes, right_batch)
+    left, right = rows(left_operand, left_axes, left_batch), rows(right_operand, right_axes, right_batch)
     add, times = (partial(graph.apply, name) for name in ("add", "mul"))
     useful = lambda a, b: graph.value(a) != 0 and graph.value(b) != 0
     ones, others = left[0], right[0]
@@ -114,16 +114,16 @@ def _iota(equation: Equation) -> Nodes:
 
 
 @rule("pad", reads="padding_config")
-def _pad(equation: Equation, given: Nodes, value: Nodes) -> Nodes:
+def _pad(equation: Equation, operand: Nodes, value: Nodes) -> Nodes:
     """Entries may be spread, and cut off where the padding is negative."""
     for axis, (low, high, within) in enumerate(equation.params["padding_config"]):
-        lines = np.moveaxis(given, axis, 0)
+        lines = np.moveaxis(operand, axis, 0)
         size = max(len(lines) + within * (len(lines) - 1), 0)
-        whole = np.full((max(low, 0) + size + max(high, 0), *lines.shape[1:]), int(value), dtype=np.int64)
-        whole[max(low, 0) :][: size : within + 1] = lines
-        cut = whole[max(-low, 0) : len(whole) - max(-high, 0)]
-        given = np.moveaxis(cut, 0, axis)
-    return given
+        padded = np.full((max(low, 0) + size + max(high, 0), *lines.shape[1:]), int(value), dtype=np.int64)
+        padded[max(low, 0) :][: size : within + 1] = lines
+        cut = padded[max(-low, 0) : len(padded) - max(-high, 0)]
+        operand = np.moveaxis(cut, 0, axis)
+    return operand
 
 
 for _primitive, _name in (

@@ -27,44 +27,44 @@ def repeated(graph: Graph, initial: Sequence[Node], test: Callable[[list[Node]],
     return _closed(graph, number, Region(True, tuple(inputs), going, tuple(results)), initial)
 
 
-def branch(graph: Graph, which: Node, given: Sequence[Node], body: Step) -> list[Node]:
+def branch(graph: Graph, which: Node, arguments: Sequence[Node], body: Step) -> list[Node]:
     """Results of a body that is left out where no lane needs it.
 
     Args:
         graph: gets the region.
         which: the lanes that need it; results of the others mean nothing.
-        given: what the body is applied to; constants stay constants.
+        arguments: what the body is applied to; constants stay constants.
         body: of as many nodes.
     """
-    varying = [node for node in given if graph.value(node) is None]
+    varying = [node for node in arguments if graph.value(node) is None]
     number, inputs = _opened(graph, varying)
     inner = dict(zip(varying, inputs, strict=True))
     outer = graph.active
     graph.active = which if outer is None else graph.apply("and", which, outer)
     test = graph.active
-    results = body([inner.get(node, node) for node in given])
+    results = body([inner.get(node, node) for node in arguments])
     graph.active = outer
     graph.open = graph.parents[number]
     return _closed(graph, number, Region(False, tuple(inputs), test, tuple(results)), varying)
 
 
-def _opened(graph: Graph, given: Sequence[Node]) -> tuple[int, list[Node]]:
+def _opened(graph: Graph, outer: Sequence[Node]) -> tuple[int, list[Node]]:
     number = len(graph.parents)
     graph.parents.append(graph.open)
     graph.open = number
-    return number, [graph.input(("region", number, i), graph.types[node], number) for i, node in enumerate(given)]
+    return number, [graph.input(("region", number, i), graph.types[node], number) for i, node in enumerate(outer)]
 
 
-def _closed(graph: Graph, number: int, region: Region, given: Sequence[Node]) -> list[Node]:
+def _closed(graph: Graph, number: int, region: Region, initial: Sequence[Node]) -> list[Node]:
     graph.regions[number] = region
     captured = _captured(graph, number, [region.test, *region.results])
-    node = graph.node(Operation("region", (*given, *captured), number), BOOL)
+    node = graph.node(Operation("region", (*initial, *captured), number), BOOL)
     return [graph.node(Operation("result", (node,), i), graph.types[result]) for i, result in enumerate(region.results)]
 
 
-def _captured(graph: Graph, number: int, wanted: Sequence[Node]) -> list[Node]:
+def _captured(graph: Graph, number: int, results: Sequence[Node]) -> list[Node]:
     """What a region uses from outside."""
-    found, seen, stack = [], set(), list(wanted)
+    captured, seen, stack = [], set(), list(results)
     while stack:
         node = stack.pop()
         if node in seen:
@@ -73,5 +73,5 @@ def _captured(graph: Graph, number: int, wanted: Sequence[Node]) -> list[Node]:
         if graph.inside(node, number):
             stack += graph.operations[node].operands
         else:
-            found.append(node)
-    return sorted(found)
+            captured.append(node)
+    return sorted(captured)

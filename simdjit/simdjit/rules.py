@@ -81,7 +81,7 @@ def _asks_nothing(value: Any) -> bool:
     return value is None or (isinstance(value, jax.sharding.NamedSharding) and value.mesh.empty)
 
 
-def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes]:
+def results(name: str, equation: Equation, operands: Sequence[Nodes]) -> list[Nodes]:
     """What a primitive makes of its operands.
 
     Raises:
@@ -90,20 +90,20 @@ def results(name: str, equation: Equation, given: Sequence[Nodes]) -> list[Nodes
     if name not in _RULES:
         raise Unsupported(f"no rule for `{name}`")
     kinds = [_kind(out) for out in equation.outs]
-    found = _RULES[name]
+    primitive_rule = _RULES[name]
     for key, value in equation.params.items():
-        if key not in found.read and key not in found.idle and not _asks_nothing(value):
+        if key not in primitive_rule.read and key not in primitive_rule.idle and not _asks_nothing(value):
             raise Unsupported(f"no rule for `{name}` with {key} {value}")
     try:
-        made = found.make(equation, *given)
+        nodes = primitive_rule.make(equation, *operands)
     except Unsupported:
         raise
     except Exception as error:  # a case that nobody has thought of is left to XLA, too
         raise Unsupported(f"the rule for `{name}` failed ({type(error).__name__}: {error})") from error
-    made = made if isinstance(made, list) else [made]
-    if len(made) != len(kinds) or not all(map(partial(_is_of, equation.graph), made, kinds)):
+    nodes = nodes if isinstance(nodes, list) else [nodes]
+    if len(nodes) != len(kinds) or not all(map(partial(_is_of, equation.graph), nodes, kinds)):
         raise Unsupported(f"the rule for `{name}` gave something else than {', '.join(map(str, equation.outs))}")
-    return made
+    return nodes
 
 
 def _is_of(graph: Graph, nodes: Nodes, kind: tuple[tuple[int, ...], str]) -> bool:

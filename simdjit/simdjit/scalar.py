@@ -101,12 +101,12 @@ class Scalar:
         return self.apply("eq", other)
 
 
-def where(which: Scalar, one: Scalar | float, other: Scalar | float) -> Scalar:
+def where(which: Scalar, if_true: Scalar | float, if_false: Scalar | float) -> Scalar:
     """One or the other; one of the two is a `Scalar`."""
-    if not isinstance(one, Scalar):
-        assert isinstance(other, Scalar)
-        one = other.constant(one)
-    return which.apply("select", one, other if isinstance(other, Scalar) else one.constant(other))
+    if not isinstance(if_true, Scalar):
+        assert isinstance(if_false, Scalar)
+        if_true = if_false.constant(if_true)
+    return which.apply("select", if_true, if_false if isinstance(if_false, Scalar) else if_true.constant(if_false))
 
 
 def fused(a: Scalar, b: Scalar | float, c: Scalar | float) -> Scalar:
@@ -114,26 +114,26 @@ def fused(a: Scalar, b: Scalar | float, c: Scalar | float) -> Scalar:
     return a.apply("fma", b, c)
 
 
-def larger(one: Scalar, other: Scalar | float) -> Scalar:
+def larger(a: Scalar, b: Scalar | float) -> Scalar:
     """The larger of two; not a number where either is none."""
-    return _chosen(one, other, "gt")
+    return _chosen(a, b, "gt")
 
 
-def smaller(one: Scalar, other: Scalar | float) -> Scalar:
+def smaller(a: Scalar, b: Scalar | float) -> Scalar:
     """The smaller of two; not a number where either is none."""
-    return _chosen(one, other, "lt")
+    return _chosen(a, b, "lt")
 
 
-def _chosen(one: Scalar, other: Scalar | float, comparison: str) -> Scalar:
+def _chosen(a: Scalar, b: Scalar | float, comparison: str) -> Scalar:
     """A comparison with what is not a number is false, so the second operand is what is left: where one of them is a
     constant, it stands first, and otherwise the first one is tested again."""
-    if not isinstance(other, Scalar):
-        other = one.constant(other)
-    graph = one.graph
-    if graph.value(one.node) is None:
-        one, other = other, one
-    value = graph.value(one.node)
-    chosen = where(one.apply(comparison, other), one, other)
-    if not one.type.startswith("float") or (value is not None and value == value):
+    if not isinstance(b, Scalar):
+        b = a.constant(b)
+    graph = a.graph
+    if graph.value(a.node) is None:
+        a, b = b, a
+    value = graph.value(a.node)
+    chosen = where(a.apply(comparison, b), a, b)
+    if not a.type.startswith("float") or (value is not None and value == value):
         return chosen
-    return where(one.apply("ne", one), one, chosen)
+    return where(a.apply("ne", a), a, chosen)

@@ -68,16 +68,18 @@ class Section:
             node = unit
             name, operands, detail = graph.operations[node]
             if name == "region":
-                given = [self.value(operand) for operand in operands[: len(graph.regions[detail].inputs)]]
-                self._results[node] = self._region(f"{self._letter}r{node}", detail, given)
+                arguments = [self.value(operand) for operand in operands[: len(graph.regions[detail].inputs)]]
+                self._results[node] = self._region(f"{self._letter}r{node}", detail, arguments)
             elif name == "result" and operands[0] in self._lanes:  # of several regions, but wanted alone
                 _, lane, width = self._lanes[operands[0]]
                 self._lanes[node] = Lane(self._results[operands[0]][detail], lane, width)
             elif name == "result":
                 self._values[node] = self._results[operands[0]][detail]
             elif name == "product":
-                one, other = (self._tables[operand] for operand in operands)
-                self._tables[node] = emit(self._emitter, one, other, detail, graph.types[node], f"{self._letter}{node}")
+                left, right = (self._tables[operand] for operand in operands)
+                self._tables[node] = emit(
+                    self._emitter, left, right, detail, graph.types[node], f"{self._letter}{node}"
+                )
             elif name == "part":
                 self._values[node] = f"%{self._letter}{node}"
                 self._emitter.at(self._tables[operands[0]], str(detail), graph.types[node], self._values[node])
@@ -89,11 +91,11 @@ class Section:
                 self._tables[node] = table
             elif name == "entry":
                 self._values[node] = f"%{self._letter}{node}"
-                place = self.value(operands[1])
-                self._emitter.entry(self._tables[operands[0]], place, graph.types[node], self._values[node])
+                index = self.value(operands[1])
+                self._emitter.entry(self._tables[operands[0]], index, graph.types[node], self._values[node])
             elif name not in ("constant", "input"):
-                known = [self.value(operand) for operand in operands]
-                self._emitter.operation(node, known, f"%{self._letter}{node}")
+                operand_names = [self.value(operand) for operand in operands]
+                self._emitter.operation(node, operand_names, f"%{self._letter}{node}")
                 self._values[node] = f"%{self._letter}{node}"
         for node in nodes:
             if node not in self._lanes and graph.operations[node].name not in ("region", "table", "product"):
@@ -110,12 +112,12 @@ class Section:
             columns = self._packs.operands(graph, group)
             if name == "region":  # what it captures besides are constants
                 columns = columns[: len(graph.regions[detail].inputs)]
-            given = [self.together(column, width) for column in columns]
+            arguments = [self.together(column, width) for column in columns]
             emitter.width, outer = width, emitter.width
             if name == "region":
-                results = self._region(vector[1:], detail, given)
+                results = self._region(vector[1:], detail, arguments)
             else:
-                emitter.operation(group[0], given, vector)
+                emitter.operation(group[0], arguments, vector)
             emitter.width = outer
         self._vectors[group] = vector
         for lane, node in enumerate(group):
@@ -176,15 +178,15 @@ class Section:
         kind, slot = operation.detail
         return emitter.load("%numbers" if kind == "number" else "%carry", slot, emitter.graph.types[node], name)
 
-    def _region(self, name: str, number: int, given: list[str]) -> list[str]:
+    def _region(self, name: str, number: int, arguments: list[str]) -> list[str]:
         """Names of the results of a region."""
         graph = self._emitter.graph
         region, inner = graph.regions[number], self._further(name, self._step)
         if self._emitter.width > 1:  # lanes hold what is packed already
             inner.pack(Packs())
         if region.repeats:
-            return self._repeated(inner, region, number, given, name)
-        inner._values |= zip(region.inputs, given, strict=True)
+            return self._repeated(inner, region, number, arguments, name)
+        inner._values |= zip(region.inputs, arguments, strict=True)
         before = self._emitter.block
         self._emitter.fork(inner.value(region.test), f"{name}b", f"{name}x", f"{name}any")
         inner.do(graph.needed_inside(number, region.results), number)
@@ -196,20 +198,20 @@ class Section:
             for i, (result, value) in enumerate(zip(region.results, done, strict=True))
         ]
 
-    def _repeated(self, inner: "Section", region: Region, number: int, given: list[str], name: str) -> list[str]:
+    def _repeated(self, inner: "Section", region: Region, number: int, arguments: list[str], name: str) -> list[str]:
         emitter, graph = self._emitter, self._emitter.graph
         before = emitter.block
         emitter.enter(f"{name}h")
-        names = [f"%{name}y{i}" for i in range(len(given))]
-        for entry, value, result in zip(names, given, region.results, strict=True):
+        names = [f"%{name}y{i}" for i in range(len(arguments))]
+        for entry, value, result in zip(names, arguments, region.results, strict=True):
             emitter.joined(graph.types[result], {before: value, f"{name}e": f"{entry}n"}, entry)
         inner._values |= zip(region.inputs, names, strict=True)
         tested = graph.needed_inside(number, [region.test])
         inner.do(tested, number)
         test = inner.value(region.test)
         emitter.fork(test, f"{name}b", f"{name}x", f"{name}any")
-        known = set(tested)
-        inner.do([node for node in graph.needed_inside(number, region.results) if node not in known], number)
+        tested_nodes = set(tested)
+        inner.do([node for node in graph.needed_inside(number, region.results) if node not in tested_nodes], number)
         for entry, result in zip(names, region.results, strict=True):
             emitter.choice(test, inner.value(result), entry, graph.types[result], f"{entry}n")
         emitter.enter(f"{name}e")

@@ -96,10 +96,10 @@ def _negated(graph, node) -> int | None:
 
 
 def _add(graph, nodes, values):
-    for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
+    for value, operand, other in zip(values, nodes, reversed(nodes), strict=True):
         if _is(value, 0):
             return other
-        if (minus := _negated(graph, one)) is not None:
+        if (minus := _negated(graph, operand)) is not None:
             return graph.apply("sub", other, minus)
     return None
 
@@ -113,9 +113,9 @@ def _sub(graph, nodes, values):
 
 
 def _mul(graph, nodes, values):
-    for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
+    for value, operand, other in zip(values, nodes, reversed(nodes), strict=True):
         if _is(value, 0):
-            return one
+            return operand
         if _is(value, 1):
             return other
         if _is(value, -1):
@@ -159,9 +159,9 @@ def _decided_by(deciding: bool):
     """Of two truths, one of which may decide."""
 
     def rule(graph, nodes, values):
-        for value, one, other in zip(values, nodes, reversed(nodes), strict=True):
-            if value is not None and graph.types[one] == "bool":
-                return one if bool(value) is deciding else other
+        for value, operand, other in zip(values, nodes, reversed(nodes), strict=True):
+            if value is not None and graph.types[operand] == "bool":
+                return operand if bool(value) is deciding else other
         return nodes[0] if nodes[0] == nodes[1] else None
 
     return rule

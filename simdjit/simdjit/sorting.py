@@ -14,10 +14,10 @@ _MOST = 64
 
 
 @rule("sort", reads="dimension num_keys", idle="is_stable")
-def _sort(equation: Equation, *given: Nodes) -> list[Nodes]:
+def _sort(equation: Equation, *operands: Nodes) -> list[Nodes]:
     """By the first operands, the others along with them; equal ones stay in their order."""
     graph, axis = equation.graph, equation.params["dimension"]
-    lines = [np.moveaxis(nodes, axis, -1) for nodes in given]
+    lines = [np.moveaxis(nodes, axis, -1) for nodes in operands]
     shape = lines[0].shape
     if shape[-1] > _MOST:
         raise Unsupported(f"sorting of {shape[-1]} numbers, more than {_MOST}")
@@ -25,7 +25,7 @@ def _sort(equation: Equation, *given: Nodes) -> list[Nodes]:
     sorted_ = [_sorted(graph, row, equation.params["num_keys"]) for row in zip(*rows, strict=True)]
     return [
         np.moveaxis(np.array([row[i] for row in sorted_], dtype=np.int64).reshape(shape), -1, axis)
-        for i in range(len(given))
+        for i in range(len(operands))
     ]
 
 
@@ -35,9 +35,9 @@ def _sorted(graph: Graph, rows: Sequence[list[Node]], keys: int) -> list[list[No
     ordered = [[_key(Scalar(graph, node)).node for node in row] for row in rows[:keys]]
     columns = [list(column) for column in zip(*ordered, places, *rows, strict=True)]
     for low, high in _network(len(columns)):
-        one, other = columns[low], columns[high]
-        first = _before(graph, other[: keys + 1], one[: keys + 1])
-        pairs = list(zip(one, other, strict=True))
+        low_column, high_column = columns[low], columns[high]
+        first = _before(graph, high_column[: keys + 1], low_column[: keys + 1])
+        pairs = list(zip(low_column, high_column, strict=True))
         columns[low] = [graph.apply("select", first, b, a) for a, b in pairs]
         columns[high] = [graph.apply("select", first, a, b) for a, b in pairs]
     return [list(row) for row in zip(*columns, strict=True)][keys + 1 :]
@@ -51,13 +51,13 @@ def _key(x: Scalar) -> Scalar:
     return where(x.equal(x), x, float("nan"))
 
 
-def _before(graph: Graph, one: Sequence[Node], other: Sequence[Node]) -> Node:
+def _before(graph: Graph, row: Sequence[Node], other_row: Sequence[Node]) -> Node:
     """Whether one row comes before another."""
     less = elementwise.on(graph, "lt_to")
-    found = less(one[-1], other[-1])
-    for a, b in reversed(list(zip(one[:-1], other[:-1], strict=True))):
-        found = graph.apply("or", less(a, b), graph.apply("and", _same(graph, a, b), found))
-    return found
+    before = less(row[-1], other_row[-1])
+    for a, b in reversed(list(zip(row[:-1], other_row[:-1], strict=True))):
+        before = graph.apply("or", less(a, b), graph.apply("and", _same(graph, a, b), before))
+    return before
 
 
 def _same(graph: Graph, a: Node, b: Node) -> Node:

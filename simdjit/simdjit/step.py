@@ -33,22 +33,22 @@ class Step:
     """
 
     def __init__(self, function: Callable, numbers: Any, state: Any, inputs: Any, cache: Path | None = None):
-        given = (numbers, state, inputs)
+        example = (numbers, state, inputs)
         nothing = np.zeros(())
         record = lambda arguments, carry, k: function(*arguments)
-        loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, given, lanes=1, cache=cache)
-        results = jax.eval_shape(function, *given)
+        loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, example, lanes=1, cache=cache)
+        results = jax.eval_shape(function, *example)
         if not same_types(state, results[0]):
             raise Unsupported("a state that changes its type")
-        self._call, arguments, found, read, written = loop.kept()
-        self.numbers, self.state, self.inputs = jax.tree.unflatten(jax.tree.structure(given), arguments)
-        after, self.outputs = jax.tree.unflatten(jax.tree.structure(results), found)
+        self._call, arguments, recorded, read, written = loop.kept()
+        self.numbers, self.state, self.inputs = jax.tree.unflatten(jax.tree.structure(example), arguments)
+        after, self.outputs = jax.tree.unflatten(jax.tree.structure(results), recorded)
         # The numbers of the state stand together, before and after: they are copied at once.
         size = lambda tree: sum(leaf.size for leaf in jax.tree.leaves(tree))
         first, count = size(self.numbers), size(after)
         self._before, self._after = read[first : first + count], written[:count]
-        for place, value in zip(arguments, jax.tree.leaves(given), strict=True):
-            place[...] = value
+        for array, value in zip(arguments, jax.tree.leaves(example), strict=True):
+            array[...] = value
 
     def __call__(self) -> None:
         """Take the step: the outputs and the new state follow from the inputs, the numbers and the old state."""

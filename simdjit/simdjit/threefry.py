@@ -36,10 +36,10 @@ def _keys(graph: Graph, nodes: Nodes) -> list[tuple[Scalar, Scalar]]:
 
 
 @rule("random_wrap", "random_unwrap", reads="impl")
-def _same(equation: Equation, given: Nodes) -> Nodes:
+def _same(equation: Equation, key_nodes: Nodes) -> Nodes:
     if str(equation.params.get("impl", "fry")) != "fry":
         raise Unsupported(f"random numbers of kind {equation.params['impl']}")
-    return given
+    return key_nodes
 
 
 @rule("random_seed", reads="impl")
@@ -55,30 +55,30 @@ def _seed(equation: Equation, seeds: Nodes) -> Nodes:
 
 
 @rule("random_fold_in")
-def _fold_in(equation: Equation, given: Nodes, data: Nodes) -> Nodes:
+def _fold_in(equation: Equation, key_nodes: Nodes, data: Nodes) -> Nodes:
     graph = equation.graph
-    keys, numbers = _keys(graph, given), data.ravel().tolist()
+    keys, numbers = _keys(graph, key_nodes), data.ravel().tolist()
     zero = Scalar(graph, graph.constant(0, U32))
     words = [threefry(key, (zero, Scalar(graph, node))) for key, node in zip(keys, numbers, strict=True)]
-    return _nodes(words).reshape(given.shape)
+    return _nodes(words).reshape(key_nodes.shape)
 
 
-def _counted(graph: Graph, given: Nodes, shape: Sequence[int]) -> list[tuple[Scalar, Scalar]]:
+def _counted(graph: Graph, key_nodes: Nodes, shape: Sequence[int]) -> list[tuple[Scalar, Scalar]]:
     """Two words for each entry of an array, for each key."""
     count = [(graph.constant(i >> 32, U32), graph.constant(i & 0xFFFFFFFF, U32)) for i in range(int(np.prod(shape)))]
     pairs = [(Scalar(graph, high), Scalar(graph, low)) for high, low in count]
-    return [threefry(key, pair) for key in _keys(graph, given) for pair in pairs]
+    return [threefry(key, pair) for key in _keys(graph, key_nodes) for pair in pairs]
 
 
 @rule("random_split", reads="shape")
-def _split(equation: Equation, given: Nodes) -> Nodes:
-    words = _counted(equation.graph, given, equation.params["shape"])
-    return _nodes(words).reshape(*given.shape[:-1], *equation.params["shape"], 2)
+def _split(equation: Equation, key_nodes: Nodes) -> Nodes:
+    words = _counted(equation.graph, key_nodes, equation.params["shape"])
+    return _nodes(words).reshape(*key_nodes.shape[:-1], *equation.params["shape"], 2)
 
 
 @rule("random_bits", reads="shape bit_width")
-def _bits(equation: Equation, given: Nodes) -> Nodes:
-    words, width = _counted(equation.graph, given, equation.params["shape"]), equation.params["bit_width"]
+def _bits(equation: Equation, key_nodes: Nodes) -> Nodes:
+    words, width = _counted(equation.graph, key_nodes, equation.params["shape"]), equation.params["bit_width"]
     if width == 64:
         made = [(one.to("convert", U64) << 32) | other.to("convert", U64) for one, other in words]
     elif width == 32:

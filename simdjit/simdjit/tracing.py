@@ -23,16 +23,16 @@ class Traced:
     """
 
     def __init__(self, function: Callable, *arguments: Any):
-        kept = []
+        static_parts = []
 
         def arrays_only(*arguments):
             arrays, still = eqx.partition(function(*arguments), eqx.is_array)
-            kept.append(still)
+            static_parts.append(still)
             return arrays
 
         self._function = arrays_only
         self.closed, self.shapes = jax.make_jaxpr(arrays_only, return_shape=True)(*arguments)
-        self.still = kept[0]
+        self.still = static_parts[0]
 
     def whole(self, leaves: list[Any]) -> Any:
         """The tree of results, of its arrays."""
@@ -48,12 +48,12 @@ class Traced:
         read = {one for equation in self.closed.jaxpr.eqns for one in equation.invars if not isinstance(one, Literal)}
         return [i for i, variable in enumerate(self.closed.jaxpr.invars) if variable in read]
 
-    def only(self, wanted: list[bool]) -> Callable[..., list[jax.Array]]:
+    def only(self, used: list[bool]) -> Callable[..., list[jax.Array]]:
         """The function with some of its results."""
 
         def function(*arguments):
             leaves = jax.tree.leaves(self._function(*arguments))
-            return [leaf for leaf, asked in zip(leaves, wanted, strict=True) if asked]
+            return [leaf for leaf, is_used in zip(leaves, used, strict=True) if is_used]
 
         return function
 
@@ -68,8 +68,8 @@ class Traced:
         return [leaf.dtype for leaf in self.leaves]
 
 
-def same_types(given: Any, shapes: Any) -> bool:
+def same_types(values: Any, shapes: Any) -> bool:
     """Whether a tree of arrays has the structure of a tree of shapes, and their sizes and types."""
     alike = lambda a, b: np.shape(a) == b.shape and np.asarray(a).dtype == b.dtype
-    leaves = jax.tree.leaves(given), jax.tree.leaves(shapes)
-    return jax.tree.structure(given) == jax.tree.structure(shapes) and all(map(alike, *leaves))
+    leaves = jax.tree.leaves(values), jax.tree.leaves(shapes)
+    return jax.tree.structure(values) == jax.tree.structure(shapes) and all(map(alike, *leaves))

@@ -8,7 +8,7 @@ from programs import SIZE, number, program
 
 from simdjit import Loop
 from simdjit.graph import F64, Graph
-from simdjit.packing import found, width_of
+from simdjit.packing import find_packs, width_of
 from simdjit.scalar import Scalar
 
 pytestmark = pytest.mark.compiler
@@ -113,7 +113,7 @@ def packs(function, count):
     graph = Graph()
     given = [Scalar(graph, graph.input(("carry", i), F64)) for i in range(count)]
     outputs = [one.node for one in function(given)]
-    return graph, set(found(graph, outputs, [False] * len(graph.operations), WIDTH).groups.values())
+    return graph, set(find_packs(graph, outputs, [False] * len(graph.operations), WIDTH).groups.values())
 
 
 def test_what_is_alike_is_packed():
