@@ -129,7 +129,6 @@ LINES = (
     ("campaign", "status", "folder"),
     ("export", "s.yaml", "--c99", "folder", "--part", "wrong", "--precision", "float32"),
     ("simulate", "missing.yaml", "--out", "folder", "--no-prediction", "--pdf", "wide"),
-    ("simulate", "folder", "--video", "x.mp4"),
     ("campaign", "missing.yaml", "--workers", "2", "--resume", "--out", "folder"),
     ("compare", "missing.yaml", "--controllers", "robust,pid", "--trials", "2"),
     ("tune", "missing.yaml", "--method", "search", "--budget", "1"),

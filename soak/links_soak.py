@@ -17,7 +17,9 @@ from soak.links.ardupilot_run import ArdupilotRunner
 from soak.links.command_process import CommandProcess, end_with_parent
 from soak.links.driven_vehicle import DrivenVehicle
 from soak.links.link_run import LinkRun, LinkRunner
+from soak.links.mavlink_peer import MavlinkPeer
 from soak.links.plan import LINKS, Plan, plan
+from soak.links.ros2_peer import Ros2Peer
 from soak.links.scenario import SCENARIO
 from soak.links.udp_peer import UdpPeer
 from soak.trying import Run
@@ -159,13 +161,9 @@ def _runner(link: str, command: CommandProcess, folder: Path, seed: int) -> Runn
     if link == "run":
         peer, log = UdpPeer(str(folder / "out")), folder / "out" / "run.mcap"
     elif link == "ros2":
-        from soak.links.ros2_peer import Ros2Peer
-
         domain = random.Random(f"{seed}/{os.getpid()}").choice(_DOMAINS)
         peer, log = Ros2Peer(domain, str(folder / "bag")), folder / "bag"
     else:
-        from soak.links.mavlink_peer import MavlinkPeer
-
         peer = MavlinkPeer(vehicle.vehicle, _OUTPUTS[link])
     return LinkRunner(command, peer, vehicle, scenario, log, stops_itself=link == "ros2").run
 

@@ -1,6 +1,10 @@
 """Changes that somebody's keyboard, program or disk makes of a valid file: of its data, of its text, of its bytes.
 
 Every function takes its chance from a `random.Random`, so that a seed repeats an input.
+
+The tests of undertow use hypothesis; here it does not fit. An input is tried in a process that may run out of memory or
+be killed, which ends hypothesis with it. Its identity has to repeat it months later, but the examples of hypothesis
+change with its version. And it would replace the calls of `chance` only: what there is to read are the changes.
 """
 
 import copy

@@ -26,9 +26,13 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput, within
 from undertow.core.status import Status
+from undertow.logs.log import Log
+from undertow.logs.run_log import log_of_run
 from undertow.physics.disturbances.adding import Together
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault
+from undertow.report import figures
+from undertow.report.run_page import shown, write_run_page
 from undertow.scenario import factory
 from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
@@ -45,8 +49,6 @@ from undertow.simulation.loop.outcome import Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from undertow.logs.log import Log
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -100,9 +102,7 @@ class Run:
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
-        from undertow.report.figures import run_figures
-
-        return run_figures(self.result.series, self.result.facts)
+        return figures.run_figures(self.result.series, self.result.facts)
 
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
@@ -110,18 +110,13 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        from undertow.report.run_figures import plotted
-        from undertow.report.run_page import shown, write_run_page
-
-        parts = shown(self.result, lambda: plotted(self.result))
+        parts = shown(self.result, lambda: figures.plot_run(self.result))
         write_run_page(Path(path), self.result, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)
 
-    def log(self) -> "Log":
+    def log(self) -> Log:
         """The series as a log, which can be saved as .mcap or .csv, and scored."""
-        from undertow.logs.run_log import log_of_run
-
         return log_of_run(self.dataset)
 
     def save(self, path: str | Path) -> None:

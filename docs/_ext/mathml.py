@@ -1,5 +1,8 @@
 """Mathematics as MathML, which browsers typeset themselves: the pages load no script and no font.
 
+docutils translates, which Sphinx brings: unlike `latex2mathml`, which the pages of undertow use, it knows `\\arg`, and
+sets a minus sign closely before its term.
+
 `\\tag{23}` in a formula that stands on its own line is its number, at the right.
 """
 

@@ -16,6 +16,8 @@ from soak.links.peer import AbstractPeer, Measured, altered, measured_of
 from soak.links.plan import CODES, STATED, Event, Plan, signals_of
 from soak.links.scenario import MAX_AGE, PERIOD
 from soak.verdict import Failure
+from undertow.logs.read import read_log
+from undertow.outside.ros2.read_bag import read_rosbag2
 
 _BEGINS = 600.0  # s, longest wait for the first command: the law is compiled before
 _WATCHED = 1.5  # s after the stated time for which the vehicle must stay stopped
@@ -253,10 +255,7 @@ class LinkRunner:
 def _rows(path: Path) -> int:
     """Steps in a log: rows of run.mcap, or commands in a bag."""
     if path.is_dir():
-        from undertow.outside.ros2.read_bag import read_rosbag2
-
         return len(read_rosbag2(path, ["/thrusters"])["/thrusters"][0])
-    from undertow.logs.read import read_log
 
     return len(read_log(path)["commanded_input"].time)
 

@@ -23,27 +23,3 @@ for package in (undertow, simdjit):
 def test_every_module_imports_without_modules_of_unix():
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(IMPORTS)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
-
-
-@pytest.mark.full
-def test_a_folder_is_locked_by_msvcrt_where_there_is_no_fcntl(tmp_path, monkeypatch):
-    """With a stand-in for it that knows which files are locked."""
-    from undertow.core import file_lock
-
-    locked = set()
-
-    class Stub:
-        LK_NBLCK = 2
-
-        @staticmethod
-        def locking(handle, mode, size):
-            key = file_lock.os.fstat(handle).st_ino
-            if key in locked:
-                raise PermissionError(13, "Permission denied")
-            locked.add(key)
-
-    monkeypatch.setattr(file_lock, "fcntl", None)
-    monkeypatch.setitem(sys.modules, "msvcrt", Stub)
-    with file_lock.file_lock(tmp_path / "out"):
-        with pytest.raises(file_lock.InUse), file_lock.file_lock(tmp_path / "out"):
-            pass

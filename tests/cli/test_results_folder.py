@@ -209,7 +209,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     def plots(*_):
         return {"tracking": lambda: 1 / 0, "error": Figure}
 
-    monkeypatch.setattr("undertow.report.run_figures.run_plots", plots)
+    monkeypatch.setattr("undertow.report.figures.run_files.run_plots", plots)
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("simulate", "s.yaml", "--out", "out")
     assert said.code == 0
@@ -233,7 +233,7 @@ def test_an_interrupt_while_figures_are_drawn_costs_no_results(undertow, tmp_pat
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("undertow.report.run_figures.run_plots", interrupted)
+    monkeypatch.setattr("undertow.report.figures.run_files.run_plots", interrupted)
     (tmp_path / "s.yaml").write_text(SCENARIO)
     assert undertow("simulate", "s.yaml", "--out", "out").code == 130
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["metrics.json", "run.nc", "scenario.yaml"]

@@ -101,7 +101,7 @@ def test_a_network_that_is_not_there(scenario):
 
 def test_without_cyclonedds(scenario, capsys, monkeypatch):
     """As where the extra is not installed."""
-    for name in [name for name in sys.modules if name.startswith("undertow.outside.ros2")]:
+    for name in [name for name in sys.modules if name.startswith(("undertow.outside.ros2", "undertow.cli.ros2"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert run(["ros2", "odin.yaml"]) == 2

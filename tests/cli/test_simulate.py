@@ -72,13 +72,6 @@ def test_result_file_repeats_bit_for_bit(ran, undertow, tmp_path):
         assert second.attrs["content_hash"] == third.attrs["content_hash"]
 
 
-def test_video_is_refused_for_a_plant_that_is_no_vehicle(refused, tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg")
-    (tmp_path / "s.yaml").write_text(SMALL)
-    line = "`--video` must be left out for a plant that is no vehicle with thrusters, but is given"
-    assert refused("simulate", "s.yaml", "--video", "s.mp4") == line
-
-
 def changed(tmp_path, change):
     with xr.open_dataset(tmp_path / "runs/s/run.nc") as dataset:
         copy = dataset.load()

@@ -27,7 +27,8 @@ from undertow.cli.main import run as command
 from undertow.control.controllers.robust.knowledge import _SIGNALS, save_knowledge
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
-from undertow.logs.log import Log, Series
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
 from undertow.logs.read import read_log
 from undertow.outside.export.c_program import Exported
 from undertow.outside.rerun_file import write_rerun

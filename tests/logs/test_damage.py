@@ -7,8 +7,9 @@ from test_log_formats import bag, bin_file, ulg_file
 from test_mavlink_logs import tlog_file
 
 from undertow.core.errors import BadInput
-from undertow.logs.csv_file import write_csv
-from undertow.logs.log import Log, Series
+from undertow.logs.csv_writer import write_csv
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
 from undertow.logs.mapping import mapping_of
 from undertow.logs.mcap_writer import LiveLog, write_mcap
 from undertow.logs.read import read_log

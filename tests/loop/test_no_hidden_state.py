@@ -18,7 +18,7 @@ from undertow.studies.campaign.task import run_trials, site
 # What other packages do to a process when they are imported is theirs; they are imported before.
 PROCESS = """
 import json, logging, os, signal, sys, threading, warnings
-import jax, matplotlib, numpy, xarray, netCDF4, diffrax, pydantic, ruamel.yaml
+import jax, matplotlib, numpy, xarray, netCDF4, diffrax, pydantic, ruamel.yaml, scipy.stats, zarr
 
 def state():
     return {

@@ -2,6 +2,8 @@
 
 import fcntl
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -29,6 +31,32 @@ def test_the_lock_is_released_by_an_error(tmp_path):
         raise ZeroDivisionError
     with file_lock.file_lock(tmp_path / "out"):
         pass
+
+
+LOCK_AND_WAIT = """
+import sys
+from pathlib import Path
+from undertow.core.file_lock import file_lock
+with file_lock(Path(sys.argv[1])):
+    print("locked", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.full
+def test_the_lock_ends_with_a_killed_process(tmp_path):
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [sys.executable, "-c", LOCK_AND_WAIT, str(out)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as owner:
+        assert owner.stdout.readline() == "locked\n"
+        with pytest.raises(file_lock.InUse), file_lock.file_lock(out):
+            pass
+        owner.kill()
+    assert file_lock.lock_of(out).exists()
+    with file_lock.file_lock(out):
+        pass
+    assert not file_lock.lock_of(out).exists()
 
 
 def test_a_lock_whose_file_was_removed_meanwhile_is_taken_again(tmp_path, monkeypatch):

@@ -16,7 +16,8 @@ def flat(element):
 
 
 def tree(tex):
-    return flat(ElementTree.fromstring(mathml(tex)))[1:]
+    (row,) = ElementTree.fromstring(mathml(tex))
+    return flat(row)[1:]
 
 
 def test_the_adaptation_law():
@@ -43,9 +44,10 @@ def test_the_adaptation_law():
     [
         (r"\frac{R k_f}{k_t}", ("mfrac", ("mrow", ("mi", "R"), ("msub", ("mi", "k"), ("mi", "f"))))),
         (r"x_d^2", ("msubsup", ("mi", "x"), ("mi", "d"), ("mn", "2"))),
-        (r"\dot{\hat x}", ("mover", ("mover", ("mi", "x"), ("mo", "^")), ("mo", "\u02d9"))),
-        (r"\theta_{max}", ("msub", ("mi", "\u03b8"), ("mi", "max"))),
-        (r"G^{\#}", ("msup", ("mi", "G"), ("mo", "#"))),
+        (r"\dot{\hat x}", ("mover", ("mrow", ("mover", ("mi", "x"), ("mo", "^"))), ("mo", "\u02d9"))),
+        (r"G^{\#}", ("msup", ("mi", "G"), ("mrow", ("mi", "#")))),
+        (r"\sqrt{\beta}", ("msqrt", ("mrow", ("mi", "\u03b2")))),
+        (r"\text{a<b}", ("mtext", "a<b")),
     ],
 )
 def test_elements(tex, expected):
@@ -53,10 +55,21 @@ def test_elements(tex, expected):
     assert found[: len(expected)] == expected
 
 
-@pytest.mark.parametrize("tex", [r"\unknown", "{x", "x}", "x_"])
+@pytest.mark.parametrize("tex", [r"\unknown", "x_", r"\frac{a}", r"\hat", "", 400 * "{"])
 def test_what_is_no_formula_is_an_error(tex):
-    with pytest.raises(ValueError, match=r"unknown|brace|missing"):
+    with pytest.raises(ValueError, match=r"unknown|not complete"):
         mathml(tex)
+
+
+def test_accents_stand_close_to_their_letters():
+    for tex in (r"\dot x", r"\ddot x", r"\bar x", r"\hat x", r"\tilde x"):
+        assert '<mover accent="true">' in mathml(tex)
+
+
+@pytest.mark.parametrize("tex", [r"\href{javascript:alert()}{x}", r"\style{position: fixed}{x}", r"\class{wide}{x}"])
+def test_a_formula_brings_neither_links_nor_styles_into_a_page(tex):
+    assert not re.search("href|style|class|<a", mathml(tex))
+    assert "<mi>x</mi>" in mathml(tex)
 
 
 def test_symbols_in_plain_text():
@@ -65,7 +78,7 @@ def test_symbols_in_plain_text():
     assert prose(r"gain $\gamma$ < 1") == "gain " + mathml(r"\gamma") + " &lt; 1"
 
 
-@pytest.mark.parametrize("words", [r"gain $\beta$ of x", "5 $ or 6 $", "$" + 400 * "{" + "$"])
+@pytest.mark.parametrize("words", [r"gain $\unknown$ of x", "5 $ or 6 $", "$" + 400 * "{" + "$"])
 def test_dollar_signs_of_a_description_that_is_no_formula(words):
     assert html.unescape(re.sub("<[^>]*>", "", prose(words))).count("$") == words.count("$")
 

@@ -7,8 +7,9 @@ import sys
 import pytest
 
 from undertow.logs.result_file import UnreadableResult
-from undertow.report.plotting import Plotted, PlottingProcess, plotting_process
-from undertow.report.run_figures import plotted
+from undertow.report.figures.run_files import plot_run
+from undertow.report.plotted import Plotted
+from undertow.report.plotting import PlottingProcess, plotting_process
 from undertow.scenario.results.run_facts import facts_from
 from undertow.scenario.results.run_result import RunRecord
 
@@ -33,7 +34,7 @@ def record(run):
 
 @pytest.fixture(scope="module")
 def here(runs):
-    return plotted(record(runs["rafc"]), "wide")
+    return plot_run(record(runs["rafc"]), "wide")
 
 
 def elsewhere(run, folder, meanwhile="pass"):
@@ -57,10 +58,10 @@ def test_drawn_here_where_the_process_was_killed(runs, here, tmp_path):
 
 
 def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
-    from undertow.report import run_figures
+    from undertow.report.figures import run_files
 
-    monkeypatch.setattr(run_figures, "run_plots", lambda *_: {"error": lambda: 1 / 0})
-    found = plotted(record(runs["rafc"]))
+    monkeypatch.setattr(run_files, "run_plots", lambda *_: {"error": lambda: 1 / 0})
+    found = plot_run(record(runs["rafc"]))
     assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
 
 

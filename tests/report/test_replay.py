@@ -15,13 +15,12 @@ from undertow.control.navigation.perfect import perfect
 from undertow.physics.disturbances.adding import Together
 from undertow.physics.thrusters.first_order import first_order
 from undertow.report import run_page
-from undertow.report.plotting import Plotted
+from undertow.report.figures.run_files import LARGE
+from undertow.report.plotted import Plotted
 from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
 from undertow.report.replay.replay_data import hull_size, packed, page_data, replay_of
 from undertow.report.replay.trials_again import replays_of_trials
-from undertow.report.replay.video import _Scenes, check_video
-from undertow.report.run_figures import LARGE
 from undertow.report.run_page import Shown, write_run_page
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
@@ -217,35 +216,3 @@ def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     monkeypatch.setattr(run_page, "replay_of", lambda *_: 1 / 0)
     shown = run_page.shown(RunResult(run, facts_from(run.attrs), loop, None), lambda: Plotted({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]
-
-
-@pytest.mark.slow
-def test_frames_of_a_video_differ(two_minutes):
-    scenes = _Scenes(two_minutes, 4.0)
-    width, height = scenes.size()
-    first, second = (np.frombuffer(scenes.pixels(frame), np.uint8) for frame in (0, 600))
-    assert first.size == width * height * 4 == 1280 * 720 * 4
-    assert 0.001 < (first != second).mean() < 0.2
-
-
-@pytest.mark.parametrize(
-    ("name", "found", "says"),
-    [
-        ("run.avi", True, "`--video` must be a file whose name ends in .mp4"),
-        ("run.mp4", False, "`--video` must be left out where ffmpeg is missing"),
-        ("missing/run.mp4", True, "`--video` must be in an existing folder"),
-    ],
-)
-def test_video_is_checked_before_the_run(tmp_path, monkeypatch, name, found, says):
-    monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg" if found else None)
-    with pytest.raises(ut.BadInput, match=re.escape(says)):
-        check_video(tmp_path / name, tmp_path / "out", False)
-
-
-def test_video_may_stand_beside_the_results_and_replaces_a_file_only_if_asked(tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.which", lambda program: "/usr/bin/ffmpeg")
-    check_video(tmp_path / "out" / "run.mp4", tmp_path / "out", False)
-    (tmp_path / "run.mp4").touch()
-    check_video(tmp_path / "run.mp4", tmp_path / "out", True)
-    with pytest.raises(ut.BadInput, match=re.escape("`--video` must be a new file")):
-        check_video(tmp_path / "run.mp4", tmp_path / "out", False)

@@ -10,7 +10,6 @@ from matplotlib import image
 
 from undertow.report.page import document
 from undertow.report.replay.replay_section import replay_looks, replay_section
-from undertow.report.replay.video import write_video
 
 OPTIONS = (
     "--headless --no-sandbox --no-first-run --disable-background-networking --disable-component-update --disable-sync "
@@ -54,29 +53,3 @@ def test_replay_of_two_vehicles_is_shown(two_minutes, tmp_path, width):
     assert [label for label, *_ in rows] == ["one", "two"]
     for _, *errors in rows:
         assert [float(one) for one in errors] == pytest.approx(two_minutes.series["error"][1200], abs=6e-3)
-
-
-@pytest.mark.slow
-def test_video_is_written_whole_or_not_at_all(two_minutes, tmp_path, monkeypatch):
-    assert shutil.which("ffprobe"), "this test needs ffmpeg: apt-get install -y ffmpeg"
-    short = two_minutes._replace(time=two_minutes.time[:41], series={k: v[:41] for k, v in two_minutes.series.items()})
-    shares = []
-    write_video(short, tmp_path / "run.mp4", lambda message, share: shares.append(share))
-    asked = [
-        "ffprobe",
-        "-v",
-        "error",
-        "-count_frames",
-        "-show_entries",
-        "stream=width,height,nb_read_frames",
-        "-of",
-        "csv=p=0",
-    ]
-    said = subprocess.run([*asked, str(tmp_path / "run.mp4")], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "1280,720,41" and shares[-1] == 1.0
-    (tmp_path / "ffmpeg").write_text("#!/bin/sh\necho no such encoder >&2\nexit 1\n")
-    (tmp_path / "ffmpeg").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
-    with pytest.raises(OSError, match="ffmpeg failed: no such encoder"):
-        write_video(short, tmp_path / "other.mp4")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["ffmpeg", "run.mp4"]

@@ -13,6 +13,7 @@ import typer
 
 from undertow.cli.interruptible import BY_SIGNAL, interrupted_by, raise_if_interrupted
 from undertow.core.errors import BadInput, printable
+from undertow.core.user_code import python_says
 
 DONE = 0
 RUN_FAILED = 1
@@ -98,8 +99,6 @@ def _explain(error: BaseException) -> tuple[int, str]:
     if isinstance(error, BadInput):
         return BAD_INPUT, str(error)
     if isinstance(error, _OF_PLUG_INS):
-        from undertow.core.user_code import python_says
-
         return BAD_INPUT, f"the command was ended by Python code that it runs: {python_says(error)}"
     if isinstance(error, OSError):
         at = f" ({error.filename})" if error.filename else ""

@@ -1,4 +1,4 @@
-"""`undertow logs`: what is in a log, conversion to MCAP or CSV, a layout for Foxglove, and the score of a model."""
+"""`undertow logs`: what is in a log, conversion to MCAP or CSV, and a layout for Foxglove."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -8,12 +8,10 @@ from rich.console import Console
 
 from undertow.cli.commands.inspection import LogsCommand
 from undertow.cli.exit_codes import DONE
-from undertow.cli.interruptible import interruptible
-from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
+from undertow.logs.foxglove_layout import layout as foxglove_layout
 from undertow.logs.log import Log
 from undertow.scenario.log_file import read_log
 
@@ -22,39 +20,44 @@ _NUMBERS = ("samples", "rate, Hz", "from, s", "to, s", "gaps", "longest, s", "mi
 _SHOWN = 3  # names of columns
 _LONG = 1e5  # s; longer times are those of a clock
 _UNIX = (9e8, 4.1e9)  # s since 1970, from 1998 to 2099
-_SCORED = ("score.json", "figures")
 
 
 def logs(command: LogsCommand) -> int:
-    """Do what the words say: FILE; `score` SCENARIO FILE; or `layout`. Return the exit code."""
-    first, *rest = command.words
-    if first == "layout" and not Path(first).exists():
-        _count(rest, 0, "layout")
-        return _layout(command.out or _LAYOUT, command.overwrite)
-    if first == "score" and not Path(first).exists():
-        _count(rest, 2, "score SCENARIO FILE")
-        return _score(Path(rest[0]), Path(rest[1]), command)
-    _count(rest, 0, "FILE")
-    return _described(Path(first), command.mapping, command.out, command.overwrite)
-
-
-def _count(rest: Sequence[str], number: int, form: str) -> None:
-    if len(rest) != number:
-        raise BadInput("logs", f"be followed by {form}", f"with {len(rest)} words after the first")
-
-
-def _described(path: Path, mapping: Path | None, out: Path | None, overwrite: bool) -> int:
+    """Show what is in a file, and convert it if `out` is given; return the exit code."""
+    first, *others = command.words
+    check_words(others, 0, "FILE")
+    path, out = Path(first), command.out
     if out is not None:
-        _check_new(out, (".mcap", ".csv"), overwrite)
+        _check_new(out, (".mcap", ".csv"), command.overwrite)
         if out.exists() and path.exists() and out.samefile(path):
             raise BadInput("--out", "be another file than the log itself", str(out))
-    log = read_log(path, mapping)
+    log = read_log(path, command.mapping)
     console = wide_console()
     _print(log, console)
     if out is not None:
         log.save(out)
         console.print(f"Written: {out}", highlight=False, soft_wrap=True)
     return DONE
+
+
+def layout(command: LogsCommand) -> int:
+    """Write a layout for Foxglove; return the exit code."""
+    check_words(command.words[1:], 0, "layout")
+    out = command.out or _LAYOUT
+    _check_new(out, (".json",), command.overwrite)
+    write_whole(out, foxglove_layout())
+    wide_console().print(f"Layout for Foxglove: {out}", highlight=False, soft_wrap=True)
+    return DONE
+
+
+def check_words(words: Sequence[str], number: int, form: str) -> None:
+    """Check the number of words after the first.
+
+    Raises:
+        BadInput: it is another one than the form of the command has.
+    """
+    if len(words) != number:
+        raise BadInput("logs", f"be followed by {form}", f"with {len(words)} words after the first")
 
 
 def _check_new(out: Path, suffixes: tuple[str, ...], overwrite: bool) -> None:
@@ -105,45 +108,3 @@ def _dates(log: Log) -> str:
         return ""
     first, last = (datetime.fromtimestamp(time, UTC) for time in (min(ends), max(ends)))
     return f"As seconds since 1970, times are from {first:%Y-%m-%d %H:%M:%S} to {last:%Y-%m-%d %H:%M:%S} UTC."
-
-
-def _layout(out: Path, overwrite: bool) -> int:
-    from undertow.logs.foxglove_layout import layout
-
-    _check_new(out, (".json",), overwrite)
-    write_whole(out, layout())
-    wide_console().print(f"Layout for Foxglove: {out}", highlight=False, soft_wrap=True)
-    return DONE
-
-
-def _score(scenario: Path, path: Path, command: LogsCommand) -> int:
-    """Score the model of a scenario against a log, and write score.json and figures/ to a folder."""
-    from undertow.core.json_text import to_json
-    from undertow.outside.log_score import AXES, UNITS, score
-    from undertow.report.figures import save
-    from undertow.report.figures.log_score import log_score_figure
-    from undertow.scenario.build import build
-    from undertow.scenario.reading import read
-
-    console = wide_console()
-    with (
-        output_folder(command.out, Path("runs") / f"{scenario.stem}-score") as folder,
-        results_folder(folder, _SCORED, "score.json", command.overwrite) as draft,
-    ):
-        with stage(console, "reading and building"):
-            log = read_log(path, command.mapping)
-            built = build(read(scenario, allow_code=command.allow_code))
-        with stage(console, "predicting"):
-            found = interruptible(lambda: score(built, log))
-        summary = {"log": log.source} | found.summary()
-        (draft.path / "score.json").write_text(to_json(summary, indent=1) + "\n", encoding="utf-8")
-        save(log_score_figure(found.curve, found.growth), draft.path / "figures", "score")
-    title = f"Error of the predicted motion, rms over {len(found.starts)} starts"
-    table = titled(title, "axis", *(numbers(f"{horizon:g} s") for horizon in found.horizons), "unit")
-    for axis, unit, errors in zip(AXES, UNITS, found.rms.T, strict=True):
-        table.add_row(axis, *(f"{error:.4g}" for error in errors), unit)
-    console.print(table)
-    for warning in found.warnings:
-        console.print(f"Warning: {warning}.", highlight=False, soft_wrap=True)
-    console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
-    return DONE

@@ -6,18 +6,12 @@ from undertow.cli.paced_loop import run_until_signal
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
-from undertow.core.errors import BadInput
+from undertow.outside.mavlink import Companion, CompanionLink, UdpLink, read_key
 from undertow.outside.realtime.loop_settings import LoopSettings
 
 
 def mavlink(command: MavlinkCommand) -> int:
     """Control the vehicle at the other end of a link until Ctrl-C; return the exit code."""
-    try:
-        from undertow.outside.mavlink import Companion, CompanionLink, UdpLink, read_key
-    except ModuleNotFoundError as error:
-        if error.name != "pymavlink":
-            raise
-        raise BadInput("", "", str(error)) from None
     if command.duration is not None:
         checks.positive("duration", command.duration, "s")
     key = None if command.signing_key is None else read_key(command.signing_key)

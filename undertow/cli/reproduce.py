@@ -8,6 +8,8 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
 from undertow.cli.tables import wide_console
+from undertow.paper.pages.report import write
+from undertow.paper.reproduce import reproduce as reproduce_paper
 from undertow.simulation.processes import worker_processes
 
 _WRITTEN = ("report.html", "ablations.html", "results.json", "figures", "runs", "scenarios", "campaigns")
@@ -23,11 +25,7 @@ def reproduce(command: ReproduceCommand) -> None:
         shares(console) as progress,
         worker_processes(preload="undertow.paper.reproduce") as pool,
     ):
-        # Imported while the other processes import the same.
-        from undertow.paper.pages.report import write
-        from undertow.paper.reproduce import reproduce as run
-
-        found = interruptible(lambda: run(draft.path, command.quick, progress, pool))
+        found = interruptible(lambda: reproduce_paper(draft.path, command.quick, progress, pool))
         progress("figures and report", 0.9)
         draft.publish()  # before the figures, which may fail
         page = interruptible(lambda: write(found, draft.path, command.pdf, pool))

@@ -8,10 +8,23 @@ from typing import Any
 from undertow.cli.commands.deploy import Ros2Command
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain, report
 from undertow.cli.interruptible import interruptible
+from undertow.cli.paced_loop import run_until_signal
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.logs.background_writer import BackgroundWriter
+from undertow.outside.autopilot.vehicle import Vehicle
+from undertow.outside.realtime.loop_settings import LoopSettings
+from undertow.outside.ros2.checked_scenario import check_vehicle
+from undertow.outside.ros2.compiled_controller import CompiledController
+from undertow.outside.ros2.controller_link import ControllerLink, ControllerSettings
+from undertow.outside.ros2.from_messages import Frames
+from undertow.outside.ros2.link import Link
+from undertow.outside.ros2.node import Reporter, Topics
+from undertow.outside.ros2.vehicle_node import VehicleNode, VehicleSettings
+from undertow.outside.ros2.write_bag import BagWriter
+from undertow.scenario.build import build
+from undertow.scenario.reading import read
 
 ROLES = ("controller", "vehicle")
 
@@ -30,20 +43,6 @@ def ros2(command: Ros2Command) -> int:
     ):
         if value is not None and role != command.role:
             raise BadInput(name, f"be left out with --as {command.role}", value)
-    try:
-        return _run(command)
-    except ModuleNotFoundError as error:  # the extra is missing
-        if error.name not in ("cyclonedds", "rosbags"):
-            raise
-        raise BadInput("", "", str(error)) from None
-
-
-def _run(command: Ros2Command) -> int:
-    from undertow.outside.ros2.from_messages import Frames
-    from undertow.outside.ros2.link import Link
-    from undertow.outside.ros2.node import Reporter, Topics
-    from undertow.outside.ros2.write_bag import BagWriter
-
     names = Topics().remapped(command.remap or [])
     frames = Frames(tuple(command.world_frame or ()) or Frames().world, command.body_frame)
     reporter = Reporter(report)
@@ -76,11 +75,6 @@ def _recording(bag: Any, missing: list[str]) -> Iterator[BackgroundWriter | None
 
 
 def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
-    from undertow.cli.paced_loop import run_until_signal
-    from undertow.outside.realtime.loop_settings import LoopSettings
-    from undertow.outside.ros2.compiled_controller import CompiledController
-    from undertow.outside.ros2.controller_link import ControllerLink, ControllerSettings
-
     if command.duration is not None:
         checks.positive("--duration", command.duration, "s", finite=False)
     options_of_law = {"unsupervised": command.unsupervised, "allow_code": command.allow_code}
@@ -98,12 +92,6 @@ def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter
 
 
 def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: Any) -> Run:
-    from undertow.outside.autopilot.vehicle import Vehicle
-    from undertow.outside.ros2.checked_scenario import check_vehicle
-    from undertow.outside.ros2.vehicle_node import VehicleNode, VehicleSettings
-    from undertow.scenario.build import build
-    from undertow.scenario.reading import read
-
     if command.rate is not None:
         checks.positive("--rate", command.rate, "Hz")
     period = None if command.rate is None else 1 / command.rate

@@ -19,7 +19,8 @@ from undertow.core.user_code import python_says
 from undertow.logs.mcap_writer import write_mcap
 from undertow.logs.run_log import log_of_run
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
-from undertow.report.plotting import Plotted, PlottingProcess
+from undertow.report.plotted import Plotted
+from undertow.report.plotting import PlottingProcess
 from undertow.report.replay.replay_data import Replay, hull_size
 from undertow.report.run_page import Shown, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
@@ -69,7 +70,7 @@ def present(
         console: for what is printed.
 
     Returns:
-        The replay, for a video; None for a plant that is no vehicle.
+        The replay, for a recording; None for a plant that is no vehicle.
     """
     page = draft.path / "run.html"
     with stage(console, "figures and page"):

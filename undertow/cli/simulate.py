@@ -2,7 +2,6 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
@@ -12,11 +11,12 @@ from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
 from undertow.cli.interruptible import interruptible
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.stages import shares, stage
+from undertow.cli.run_presentation import predict, present
+from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table, wide_console
-from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
+from undertow.outside.rerun_file import check_rerun, write_rerun
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.scenario.build import build, own_parts
@@ -28,9 +28,6 @@ from undertow.scenario.results.result_files import write
 from undertow.scenario.results.run_result import ScenarioResult, lost_thrusters
 from undertow.scenario.results.run_scenario import run_scenario
 
-if TYPE_CHECKING:
-    from undertow.cli.run_presentation import PredictedMetrics
-
 _WRITTEN = ("run.nc", "run.mcap", "metrics.json", "scenario.yaml", "figures", "run.html")
 
 
@@ -39,7 +36,7 @@ def simulate(command: SimulateCommand) -> int:
 
     Without `prediction` (None) there is one where it says something.
     """
-    scenario, video, rerun = command.scenario, command.video, command.rerun
+    scenario, rerun = command.scenario, command.rerun
     check_pdf(command.pdf)
     console = wide_console()
     with (
@@ -48,59 +45,31 @@ def simulate(command: SimulateCommand) -> int:
         plotting_process() as plotting,
         ThreadPoolExecutor(1) as thread,
     ):
-        if video is not None:
-            from undertow.report.replay.video import check_video
-
-            check_video(video, folder, command.overwrite)
         if rerun is not None:
-            from undertow.outside.rerun_file import check_rerun
-
             check_rerun(rerun, folder, command.overwrite)
-        result = _run(scenario, console, command.allow_code, video is not None)
+        result = _run(scenario, console, command.allow_code)
         write(result, draft.path)
         repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         plotting.plot(folder / "run.nc", command.pdf)
-        predicting = None if command.prediction is False else thread.submit(_predicted, result)
+        predicting = None if command.prediction is False else thread.submit(predict, result)
         _print_results(result, folder, console)
         code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
-        # What only the rest needs is imported now: users read the results meanwhile.
-        from undertow.cli.run_presentation import present
-
         replay = present(result, plotting, predicting, bool(command.prediction), draft, folder, console)
-    if video is not None and replay is not None:
-        from undertow.report.replay.video import write_video
-
-        with shares(console) as progress:
-            write_video(replay, video, progress)
     if rerun is not None:
-        from undertow.outside.rerun_file import write_rerun
-
         write_rerun(log_of_run(result.dataset), rerun, None if replay is None else replay.size)
     return code
 
 
-def _run(path: Path, console: Console, allow_code: bool, video: bool) -> ScenarioResult:
+def _run(path: Path, console: Console, allow_code: bool) -> ScenarioResult:
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    if video:
-        from undertow.report.replay.replay_data import can_be_shown
-
-        if not can_be_shown(built.closed_loop.plant):
-            raise BadInput("--video", "be left out for a plant that is no vehicle with thrusters", "given")
     for one in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
         typer.echo(f"Advice: {one.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: run_scenario(built))
-
-
-def _predicted(result: ScenarioResult) -> "PredictedMetrics":
-    """The prediction of a run, in another thread."""
-    from undertow.cli.run_presentation import predict
-
-    return predict(result)
 
 
 def _print_results(result: ScenarioResult, folder: Path, console: Console) -> None:

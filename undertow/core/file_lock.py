@@ -1,21 +1,15 @@
-"""One process at a time writes to a path.
-
-`filelock` would do the same, but leaves its file beside every result: removing it safely takes the handle, which that
-library keeps to itself.
-"""
+"""One process at a time writes to a path."""
 
 import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+
+from filelock import FileLock, Timeout
 
 from undertow.core.errors import BadInput
 
-try:
-    import fcntl
-except ImportError:  # Windows has none
-    fcntl: Any = None
+_PATIENCE = 0.1  # s; whoever opens a lock file that its owner is removing has to try again
 
 
 class InUse(BadInput):
@@ -31,16 +25,24 @@ def file_lock(path: Path) -> Iterator[None]:
 
     Raises:
         InUse: another process is writing to it.
-        OSError: it cannot be written to.
+        OSError: it cannot be written to, or its file system has no locks.
     """
-    lock = lock_of(path)
-    handle = _locked(lock, path)
+    lock_file = lock_of(path)
+    if not lock_file.exists():
+        lock_file.touch()  # an error where no file can be made, as in /proc; `filelock` would wait until it can
+    # A file system without locks is an error: the mark that `filelock` would set there outlives a killed process.
+    lock = FileLock(lock_file, timeout=_PATIENCE, thread_local=False, fallback_to_soft=False)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise InUse("--out", "be a folder that nothing else writes to", str(path)) from None
     try:
         yield
     finally:
-        with contextlib.suppress(OSError):  # one that stays is not locked, and harms nobody
-            lock.unlink()  # while it is held: a waiting process sees that its file was replaced
-        os.close(handle)
+        # While it is held, so that nobody else's is removed. Windows keeps an open file; there `filelock` removes it.
+        with contextlib.suppress(OSError):
+            lock_file.unlink()
+        lock.release()
 
 
 def lock_of(path: Path) -> Path:
@@ -48,40 +50,3 @@ def lock_of(path: Path) -> Path:
     path = path.resolve()
     name = f".{path.name}.lock"
     return path / name if path.is_dir() and not os.access(path.parent, os.W_OK) else path.with_name(name)
-
-
-def _locked(lock: Path, path: Path) -> int:
-    while True:
-        handle = os.open(lock, os.O_CREAT | os.O_RDWR, 0o644)
-        try:
-            try_lock(handle)
-            if _same(handle, lock):
-                return handle
-        except BlockingIOError:
-            os.close(handle)
-            raise InUse("--out", "be a folder that nothing else writes to", str(path)) from None
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)  # its owner has removed the file meanwhile
-
-
-def _same(handle: int, lock: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(handle), lock.stat())
-    except FileNotFoundError:
-        return False
-
-
-def try_lock(handle: int) -> None:
-    """Lock an open file; BlockingIOError where another process has locked it."""
-    if fcntl is not None:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return
-    import msvcrt
-
-    windows: Any = msvcrt
-    try:
-        windows.locking(handle, windows.LK_NBLCK, 1)
-    except OSError as error:
-        raise BlockingIOError(*error.args) from error

@@ -8,8 +8,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-from jax import errors
-
 from undertow.core.errors import nearest
 
 MODULE_PREFIX = "undertow_part_"  # of the modules that users' files become
@@ -23,17 +21,17 @@ _ASSIGNED = re.compile(r"cannot assign to field '(\w+)'")
 _OF_TUPLES = re.compile(r"(unsupported operand.*'(tuple|Measurement|Target)')|(arguments?, got .*(Measurement|Target))")
 _LONGEST = 110  # characters of Python's message
 
-# JAX's error, its cause and the remedy; the first that applies.
-_REFUSED: tuple[tuple[type[Exception], str, str], ...] = (
+# Name of JAX's error, its cause and the remedy; the first that applies. By name, so that JAX need not be imported.
+_REFUSED: tuple[tuple[str, str, str], ...] = (
     (
-        errors.TracerBoolConversionError,
+        "TracerBoolConversionError",
         "Python's `if`, `while`, `and`, `or`, `not`, `min` or `max` needs the value of a traced array",
         "Use `jnp.where(condition, a, b)`, `jnp.minimum` or `jnp.maximum`",
     ),
-    (errors.TracerArrayConversionError, "NumPy needs the value of a traced array", "Use `jax.numpy`"),
-    (errors.TracerIntegerConversionError, "a traced array is used as an index or a length", "Use `jnp.take`"),
+    ("TracerArrayConversionError", "NumPy needs the value of a traced array", "Use `jax.numpy`"),
+    ("TracerIntegerConversionError", "a traced array is used as an index or a length", "Use `jnp.take`"),
     (
-        errors.ConcretizationTypeError,
+        "ConcretizationTypeError",
         "`float`, `int`, `math` or a shape needs the value of a traced array",
         "Keep the array, and use `jax.numpy`",
     ),
@@ -104,8 +102,9 @@ def _is_own(module: str | None) -> bool:
 
 def _reason(error: BaseException, text: str) -> tuple[str, str]:
     """Cause and remedy."""
-    for kind, why, hint in _REFUSED:
-        if isinstance(error, kind):
+    classes = {kind.__name__ for kind in type(error).__mro__ if kind.__module__.partition(".")[0] == "jax"}
+    for name, why, hint in _REFUSED:
+        if name in classes:
             return why, hint
     if isinstance(error, FrozenInstanceError) and (assigned := _ASSIGNED.match(text)):
         why = f"it assigns `self.{assigned[1]}`, but a part holds parameters only"

@@ -2,6 +2,10 @@
 
 Schemas: docs.foxglove.dev/docs/sdk/schemas. Foxglove's axes point up: frame `world` is east, north, up, and `ned`
 within it is ours.
+
+`foxglove-sdk` has these schemas too, but in a library of 54 MB that encodes Protobuf only. Here they take sixty lines,
+and the whole log stays JSON, which readers without Protobuf understand. The fields are those of
+foxglove-schemas-protobuf 0.4.0, without exception.
 """
 
 import json

@@ -7,7 +7,8 @@ from undertow.logs import frames, units
 from undertow.logs.ardupilot_parameters import motor_channels, motor_direction, pulse_columns
 from undertow.logs.ardusub_frames import FRAMES, motor_columns
 from undertow.logs.known_signals import SIGNALS, Known, thruster_columns
-from undertow.logs.log import Log, Series
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
 from undertow.logs.mapping import INPUTS, Entry, LogMapping, factor_of
 from undertow.logs.recording import Recording, Table, cleaned
 

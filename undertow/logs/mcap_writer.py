@@ -16,7 +16,7 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.logs import foxglove
-from undertow.logs.log import Log, Series
+from undertow.logs.log_signals import LogSignals, Series
 from undertow.logs.messages import MessageForm, grouped
 from undertow.logs.motion import at_times, without_jumps
 
@@ -65,7 +65,7 @@ class _Writer:
         self._stream.flush()
 
 
-def write_mcap(log: Log, path: Path, size: Any = None) -> None:
+def write_mcap(log: LogSignals, path: Path, size: Any = None) -> None:
     """Write a log to a file.
 
     Args:
@@ -92,7 +92,7 @@ def write_mcap(log: Log, path: Path, size: Any = None) -> None:
         writer.finish()
 
 
-def _check_times(log: Log) -> None:
+def _check_times(log: LogSignals) -> None:
     """Check that all times can be written: as nanoseconds from 0 in 64 bits."""
     for name, series in log.signals.items():
         held = (series.time > -0.5e-9) & (series.time < _LATEST)
@@ -102,7 +102,7 @@ def _check_times(log: Log) -> None:
             raise BadInput("log", must, got, hint="Write a .csv file instead")
 
 
-def _view(writer: _Writer, log: Log, size: Any) -> list[Iterable[tuple[int, tuple[float, bytes]]]]:
+def _view(writer: _Writer, log: LogSignals, size: Any) -> list[Iterable[tuple[int, tuple[float, bytes]]]]:
     """Channels and messages of the transforms and the scene, of a log that has the pose of a vehicle."""
     pose = pose_of(log.signals)
     if pose is None or not len(pose[0]):

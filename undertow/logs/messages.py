@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from undertow.logs.log import Series
+from undertow.logs.log_signals import Series
 
 # Signals by group; those that are named nowhere belong to `controller`.
 GROUPS = {

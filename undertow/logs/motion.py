@@ -10,7 +10,7 @@ from undertow.logs import frames
 from undertow.logs.ardusub_frames import frame_of_columns, motors_of_thrusters
 from undertow.logs.default_mappings import DEFAULTS
 from undertow.logs.known_signals import thruster_columns
-from undertow.logs.log import Log, Series, mapping_hint, missing
+from undertow.logs.log_signals import LogSignals, Series, mapping_hint, missing
 
 _INPUTS = ("commanded_input", "input")
 _COMMANDS = {"pulses": "us", "duty": "1"}  # to speed controllers, and the unit that makes an input of them
@@ -30,7 +30,7 @@ class LoggedMotion(NamedTuple):
     nu: np.ndarray
 
 
-def inputs_of(log: Log, names: tuple[str, ...] = _INPUTS, thruster_matrix: ArrayLike | None = None) -> Series:
+def inputs_of(log: LogSignals, names: tuple[str, ...] = _INPUTS, thruster_matrix: ArrayLike | None = None) -> Series:
     """The input of the thrusters: the first of the named signals that the log has.
 
     Args:
@@ -61,7 +61,7 @@ def _of_thrusters(inputs: Series, frame: str, thruster_matrix: ArrayLike | None)
     return inputs._replace(values=signs * inputs.values[:, motors - 1], columns=thruster_columns(len(motors)))
 
 
-def _input_hint(log: Log) -> str:
+def _input_hint(log: LogSignals) -> str:
     """How to map an input: from the commands to speed controllers that the log has, or else from pulses by example."""
     commands = next((name for name in _COMMANDS if name in log), "pulses")
     if log.format in ("ArduPilot", "MAVLink"):
@@ -74,7 +74,7 @@ def _input_hint(log: Log) -> str:
     return f"{example}, one column per thruster; `supply` is in V"
 
 
-def motion_of(log: Log) -> LoggedMotion:
+def motion_of(log: LogSignals) -> LoggedMotion:
     """The motion at the times of the position, between the first and last samples of all signals that it is made of.
 
     Other signals are interpolated linearly to these times.
@@ -104,7 +104,7 @@ def motion_of(log: Log) -> LoggedMotion:
     return LoggedMotion(time, np.hstack([place, angles]), np.hstack([linear, turned]))
 
 
-def _velocities(log: Log) -> tuple[Series, Series]:
+def _velocities(log: LogSignals) -> tuple[Series, Series]:
     """Linear and angular velocity, in the forms in which the log has them."""
     for name in ("velocity", "measured_velocity"):
         if name in log and log[name].values.shape[1:] == (6,):

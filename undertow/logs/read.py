@@ -8,7 +8,7 @@ from pathlib import Path
 
 from undertow.core.errors import BadInput, within
 from undertow.logs.ardupilot import read_ardupilot
-from undertow.logs.csv_file import read_csv
+from undertow.logs.csv_reader import read_csv
 from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mapping
 from undertow.logs.log import Log
 from undertow.logs.mapped_log import log_of, suited

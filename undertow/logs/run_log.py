@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 from undertow.core.errors import BadInput
 from undertow.logs.known_signals import thruster_columns
-from undertow.logs.log import Log, Series
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
 from undertow.logs.messages import group_of
 from undertow.logs.result_file import UnreadableResult, opened_result
 

@@ -17,7 +17,7 @@ from undertow.core.measurement import body_of
 from undertow.core.numerics.integrators import METHODS
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.runtime import on_processor
-from undertow.logs.log import Series
+from undertow.logs.log_signals import Series
 from undertow.logs.motion import LoggedMotion
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle, VehicleState
 from undertow.scenario.build import Built

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-from undertow.logs.log import Series
+from undertow.logs.log_signals import Series
 from undertow.logs.motion import LoggedMotion
 from undertow.outside.log_prediction import logged, predict, starts_of, vehicle_of
 from undertow.scenario.build import Built

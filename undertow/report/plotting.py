@@ -9,33 +9,12 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
-
-class Plotted(NamedTuple):
-    """Figures of a run.
-
-    Attributes:
-        files: what the files hold, by their names.
-        pictures: what the page shows: SVG as text or PNG as bytes, by the name of the figure.
-        failures: a sentence for each figure that could not be made.
-    """
-
-    files: Mapping[str, bytes]
-    pictures: Mapping[str, str | bytes]
-    failures: list[str]
-
-    def write(self, folder: Path) -> None:
-        """Write the files into a folder, which is made if need be.
-
-        Raises:
-            OSError: the folder cannot be written.
-        """
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, data in self.files.items():
-            (folder / name).write_bytes(data)
+from undertow.report import figures
+from undertow.report.plotted import Plotted
+from undertow.scenario.results.result_files import read_record
 
 
 class PlottingProcess:
@@ -100,8 +79,7 @@ def serve() -> None:
     """
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    from undertow.report import run_figures as run_figures  # before there is anything to do
-
+    _ = figures.plot_run  # imports matplotlib before there is anything to do
     asked = sys.stdin.buffer.read()
     if asked:
         pickle.dump(_plot(*pickle.loads(asked)), answer)
@@ -109,7 +87,4 @@ def serve() -> None:
 
 
 def _plot(run: Path, width: str | None) -> Plotted:
-    from undertow.report.run_figures import plotted
-    from undertow.scenario.results.result_files import read_record
-
-    return plotted(read_record(run), width)
+    return figures.plot_run(read_record(run), width)

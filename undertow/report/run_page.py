@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from undertow.core.atomic_io import write_whole
-from undertow.report.figures.recorded import input_names
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
-from undertow.report.plotting import Plotted
+from undertow.report.plotted import Plotted
 from undertow.report.replay.replay_data import Replay, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import (
@@ -20,6 +19,7 @@ from undertow.report.run_tables import (
     navigation_rows,
     transition_rows,
 )
+from undertow.report.signal_names import input_names
 from undertow.scenario.reading import dump
 from undertow.scenario.results.run_facts import RunFacts
 from undertow.scenario.results.run_result import RunRecord, RunResult, lost_thrusters
@@ -45,7 +45,7 @@ class Shown(NamedTuple):
 
 
 def shown(result: RunResult, plotted: Callable[[], Plotted]) -> Shown:
-    """What the page and the video of a run show. A failed part affects neither the others nor the results.
+    """What the page of a run shows. A failed part affects neither the others nor the results.
 
     Args:
         result: of the run.

@@ -10,6 +10,7 @@ from undertow.core.errors import BadInput, nearest
 from undertow.logs.result_file import UnreadableResult, opened_result
 from undertow.scenario.foreign_code import check_allowed
 from undertow.scenario.provenance import checksum
+from undertow.scenario.yaml_text import load
 
 Path_ = tuple[str | int, ...]
 
@@ -192,8 +193,6 @@ def parse(text: str, name: str, folder: Path, what: str = "", file: str = "scena
     Raises:
         BadInput: malformed.
     """
-    from undertow.scenario.yaml_text import load  # what it imports adds filters of warnings to the process
-
     what = what or name or file
     data, lines = load(text, name, what)
     if not isinstance(data, dict):

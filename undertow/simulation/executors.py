@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from undertow.core.errors import BadInput, nearest
+from undertow.simulation import local_worker
 
 Columns = dict[str, np.ndarray]
 Work = tuple[Any, ...]  # arguments of the function
@@ -165,8 +166,6 @@ def cluster(kind: str, workers: int) -> Iterator[Any]:
 def _started(kind: str, workers: int) -> Any:
     if kind == "local":
         from distributed import LocalCluster
-
-        from undertow.simulation import local_worker
 
         return LocalCluster(
             n_workers=workers,

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, ClassVar, get_type_hints
 
+from undertow.core.errors import BadInput
 from undertow.core.option_groups import set_signature
 
 
@@ -20,11 +21,13 @@ class Command:
     Attributes:
         runs: `module:function`.
         named: the word after `undertow`; "" for that of the function.
+        needs: packages of the extra without which it cannot run; the module that misses one says how to install it.
         since: when the command line was read, s, of `time.perf_counter`.
     """
 
     runs: ClassVar[str]
     named: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
     since: float = dataclasses.field(init=False, default_factory=time.perf_counter)
 
     @classmethod
@@ -37,13 +40,24 @@ class Command:
         """What the command does."""
         return (cls.__doc__ or "").partition("\n")[0]
 
+    def target(self) -> str:
+        """`module:function` of what was given: that of `runs`, unless a word chooses another one."""
+        return self.runs
+
     @classmethod
     def callback(cls) -> Callable[..., int | None]:
         """The function that typer makes a command of."""
 
-        def run(**given: Any) -> int | None:
-            module, _, function = cls.runs.partition(":")
-            return getattr(importlib.import_module(module), function)(cls(**given))
+        def run(**options: Any) -> int | None:
+            command = cls(**options)
+            module, _, function = command.target().partition(":")
+            try:
+                imported = importlib.import_module(module)
+            except ModuleNotFoundError as error:
+                if error.name not in cls.needs:
+                    raise
+                raise BadInput("", "", str(error)) from None
+            return getattr(imported, function)(command)
 
         hints = get_type_hints(cls, include_extras=True)
         fields = [field for field in dataclasses.fields(cls) if field.init]

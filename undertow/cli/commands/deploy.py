@@ -123,6 +123,7 @@ class Ros2Command(Command):
     """
 
     runs: ClassVar = "undertow.cli.ros2:ros2"
+    needs: ClassVar = ("cyclonedds", "rosbags")
     scenario: ScenarioFile
     role: Annotated[str, typer.Option("--as", metavar="ROLE", help="controller, or vehicle (simulated).")] = (
         "controller"
@@ -200,6 +201,7 @@ class MavlinkCommand(Command):
     """
 
     runs: ClassVar = "undertow.cli.mavlink:mavlink"
+    needs: ClassVar = ("pymavlink",)
     scenario: ScenarioFile
     connect: Annotated[
         str,

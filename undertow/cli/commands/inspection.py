@@ -84,6 +84,7 @@ class LogsCommand(Command):
     """
 
     runs: ClassVar = "undertow.cli.logs:logs"
+    subcommands: ClassVar = {"layout": "undertow.cli.logs:layout", "score": "undertow.cli.log_score:score_log"}
     words: Annotated[
         list[str],
         typer.Argument(
@@ -104,6 +105,11 @@ class LogsCommand(Command):
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier file or result.")] = False
     allow_code: AllowCode = False
+
+    def target(self) -> str:
+        """What the first word chooses, unless it is a file."""
+        word = self.words[0]
+        return self.runs if Path(word).exists() else self.subcommands.get(word, self.runs)
 
 
 @dataclasses.dataclass(frozen=True)

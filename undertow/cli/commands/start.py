@@ -72,10 +72,6 @@ class SimulateCommand(Command):
     ] = None
     allow_code: AllowCode = False
     pdf: Pdf = None
-    video: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.mp4", help="Also write a video of the run, at most 30 s long. It needs ffmpeg."),
-    ] = None
     rerun: Annotated[
         Path | None,
         typer.Option(metavar="FILE.rrd", help="Also write the run for the viewer Rerun. It needs the extra `viz`."),

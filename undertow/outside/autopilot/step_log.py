@@ -16,7 +16,7 @@ from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
 from undertow.logs.background_writer import BackgroundWriter
 from undertow.logs.known_signals import SIGNALS, thruster_columns
-from undertow.logs.log import Series
+from undertow.logs.log_signals import Series
 from undertow.logs.mcap_writer import LiveLog
 from undertow.outside.autopilot.measured_motion import Format, Motion
 

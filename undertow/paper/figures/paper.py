@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from undertow.paper.thruster_response import Law, ThrusterResponse
 from undertow.report.figures import recorded, style
 from undertow.report.figures.multiples import Block, small_multiples
+from undertow.report.signal_names import axis_names, input_names
 
 LOOKS = {"long": style.SOLID, "short": style.DASHED}
 LAWS = style.Look("#555555", (0, (1, 1.2)), 1.2, 4)
@@ -87,7 +88,7 @@ def robust_term(title: str, runs: Controllers) -> Figure:
     end = float(first["time"].values[-1])
     return small_multiples(
         title,
-        recorded.axis_names(first),
+        axis_names(first),
         [
             Block(curves, recorded.per_axis(first, "$u_r$", "/s^2"), height=1.05, titled=True),
             Block(curves, recorded.per_axis(first, "$u_r$", "/s^2"), height=1.05, window=(end / 2, end)),
@@ -104,7 +105,7 @@ def effort(title: str, runs: Controllers) -> Figure:
     labels = recorded.per_input(first, "voltage")
     return small_multiples(
         title,
-        recorded.input_names(first),
+        input_names(first),
         [
             Block(curves, labels, height=0.95, window=(0.0, start), titled=True),
             Block(curves, labels, height=0.95, width=2.1, window=(start, end)),
@@ -127,7 +128,7 @@ def identification(title: str, run: xr.Dataset) -> Figure:
     thousandths = [text.replace(", ", ", m") for text in recorded.per_axis(run, r"$\hat{x} - x$")]
     return small_multiples(
         title,
-        recorded.axis_names(run),
+        axis_names(run),
         [Block([state, model], recorded.places(run), height=1.1, titled=True), Block([apart], thousandths, height=0.9)],
     )
 
@@ -143,7 +144,7 @@ def uncertainty(title: str, runs: Controllers) -> Figure:
     rate = "/s^2"
     return small_multiples(
         title,
-        recorded.axis_names(first),
+        axis_names(first),
         [
             Block(
                 [true, *estimates],
@@ -166,7 +167,7 @@ def tracking(title: str, runs: Controllers) -> Figure:
     errors = [recorded.magnitude(recorded.curve(run, name, "error", look)) for run, name, look in looks]
     return small_multiples(
         title,
-        recorded.axis_names(first),
+        axis_names(first),
         [
             Block([desired, *actual], recorded.places(first), height=1.1, titled=True),
             Block(errors, recorded.per_axis(first, "|error|"), height=1.0, scale="log"),

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.report.figures.multiples import Mark
-from undertow.report.figures.recorded import input_names
+from undertow.report.signal_names import input_names
 from undertow.scenario.results.run_facts import RunFacts
 from undertow.scenario.results.run_result import lost_thrusters
 

@@ -11,6 +11,7 @@ from undertow.report.figures.certificate import certificate, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
+from undertow.report.signal_names import axis_names, controller_axis_names, input_names
 from undertow.scenario.results.run_facts import RunFacts
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
@@ -31,8 +32,8 @@ def run_figures(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Fig
 
 def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name; see `run_figures`."""
-    outputs = recorded.axis_names(run)
-    inputs = recorded.input_names(run)
+    outputs = axis_names(run)
+    inputs = input_names(run)
     shown = recorded.in_degrees(run)
     desired = recorded.curve(shown, "desired $x_d$", "reference", style.TRUTH)
     actual = recorded.curve(shown, "actual $x$", "position", style.SOLID)
@@ -57,7 +58,7 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
         "error": plot("Tracking error", outputs, lambda: [Block([error], errors, 1.4, scale="log", titled=True)]),
         "estimate": plot(
             "Lumped uncertainty and its estimate",
-            recorded.controller_axis_names(run),
+            controller_axis_names(run),
             lambda: [_block(run, curves, rates, recorded.settled(run))],
         ),
         "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, recorded.settled(run))]),

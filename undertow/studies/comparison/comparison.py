@@ -6,21 +6,23 @@ import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from undertow.analysis.metrics import MEANINGS
 from undertow.core import checks
-
-# What a campaign needs is imported where it is used: SciPy and zarr add filters of warnings to the process, and to look
-# at a name of undertow changes nothing.
-if TYPE_CHECKING:
-    from undertow.studies.campaign.store_results import Results
-    from undertow.studies.comparison.findings import Findings
-    from undertow.studies.comparison.paired import Difference
-    from undertow.studies.comparison.prepare import PreparedComparison
+from undertow.simulation.executors import make_executor
+from undertow.studies.campaign.columns import DONE
+from undertow.studies.campaign.run_campaign import STORE, run_campaign
+from undertow.studies.campaign.store_results import Results, load
+from undertow.studies.comparison.equal_budgets import equal_budgets
+from undertow.studies.comparison.findings import Findings, find
+from undertow.studies.comparison.paired import Difference
+from undertow.studies.comparison.prepare import PreparedComparison, prepare_comparison
+from undertow.studies.comparison.sentences import sentences
+from undertow.studies.comparison.tables import STYLES, table
 
 # Metrics that are compared, where they are defined: those that mean the same for every law.
 _COMPARED = (
@@ -46,10 +48,10 @@ class Comparison:
     """
 
     dataset: xr.Dataset
-    findings: "Findings"
+    findings: Findings
 
     @property
-    def differences(self) -> "tuple[Difference, ...]":
+    def differences(self) -> tuple[Difference, ...]:
         """Every two candidates in every metric."""
         return self.findings.differences
 
@@ -63,23 +65,18 @@ class Comparison:
         Raises:
             BadInput: another style.
         """
-        from undertow.studies.comparison.tables import STYLES, table
 
         checks.choice("style", style, tuple(STYLES))
         return table(self.findings, style)
 
     def __repr__(self) -> str:
-        from undertow.studies.comparison.sentences import sentences
 
         names = ", ".join(self.findings.names)
         return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
 
 
-def read_comparison(folder: Path, results: "Results", ready: "PreparedComparison") -> Comparison:
+def read_comparison(folder: Path, results: Results, ready: PreparedComparison) -> Comparison:
     """The result of a comparison whose campaign has run in a folder and was read from there."""
-    from undertow.studies.campaign.columns import DONE
-    from undertow.studies.campaign.run_campaign import STORE
-    from undertow.studies.comparison.findings import find
 
     with xr.open_zarr(folder / STORE, consolidated=False) as opened:
         dataset = opened.drop_vars(DONE).load()
@@ -118,11 +115,6 @@ def compare(
     Raises:
         BadInput: anything wrong with the scenario, the controllers or the number of trials.
     """
-    from undertow.simulation.executors import make_executor
-    from undertow.studies.campaign.run_campaign import run_campaign
-    from undertow.studies.campaign.store_results import load
-    from undertow.studies.comparison.equal_budgets import equal_budgets
-    from undertow.studies.comparison.prepare import prepare_comparison
 
     given: Any = scenario
     if isinstance(scenario, str | Path):

@@ -13,38 +13,13 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.core.number_text import number_in
-from undertow.logs.log import Log, Series
+from undertow.logs.csv_writer import TIME
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
 from undertow.logs.recording import Recording, Table
 
-_TIME = "time [s]"
 _WORDS = {"true": 1.0, "false": 0.0, "": np.nan}
 _OURS = re.compile(r"(?P<signal>[a-z_0-9]+)(?:\.(?P<column>[^\[\]]+))? \[(?P<unit>[^\[\]]*)\]")
-
-
-def write_csv(log: Log, path: Path) -> None:
-    """Write a log to a file. Numbers are written so that they read back as the same; meanings are not kept.
-
-    Args:
-        log: with the signals.
-        path: of the file, which is replaced.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    times = np.unique(np.concatenate([series.time for series in log.signals.values()] or [np.zeros(0)]))
-    header, columns = [_TIME], [[repr(time) for time in times.tolist()]]
-    for name, series in log.signals.items():
-        rows = np.searchsorted(times, series.time)
-        for column, values in zip(series.column_names(), series.flat().T, strict=True):
-            header.append(f"{name}{'.' if column else ''}{column} [{series.unit}]")
-            cells = [""] * len(times)
-            for row, value in zip(rows.tolist(), values.tolist(), strict=True):
-                cells[row] = repr(value)
-            columns.append(cells)
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(header)
-        writer.writerows(zip(*columns, strict=True))
 
 
 def read_csv(path: Path) -> Log | Recording:
@@ -54,7 +29,7 @@ def read_csv(path: Path) -> Log | Recording:
         BadInput: not text, without rows, rows of different length, or cells of ours that are no numbers.
     """
     header, numbers, empty, texts, notes = _read(path)
-    if header[0] == _TIME and all(_OURS.fullmatch(name) for name in header[1:]):
+    if header[0] == TIME and all(_OURS.fullmatch(name) for name in header[1:]):
         if texts:
             raise BadInput("log", "hold numbers", next(iter(texts.values())))
         return _our_log(path, header, numbers, empty, notes)
@@ -87,7 +62,7 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str]
     except UnicodeDecodeError as error:
         raise BadInput("log", "be a CSV text file", f"{path.name}: {error.reason} at byte {error.start}") from None
     lines, notes = text.splitlines(), ()
-    if text.startswith(_TIME) and "\r\n" in text and not text.endswith(("\r", "\n")):
+    if text.startswith(TIME) and "\r\n" in text and not text.endswith(("\r", "\n")):
         lines, notes = lines[:-1], (f"the file ends early, within line {len(lines)}, which is left out",)
     try:
         rows = list(csv.reader(lines, delimiter=_delimiter(text)))

@@ -6,14 +6,14 @@ from PIL import Image
 
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import files_of, make_all
-from undertow.report.plotting import Plotted
+from undertow.report.plotted import Plotted
 from undertow.scenario.results.run_result import RunRecord
 
 # Bytes above which a figure of two minutes would fill the page as SVG, and colours of the PNG that stands for it.
 LARGE, _COLOURS = 80_000, 48
 
 
-def plotted(record: RunRecord, width: str | None = None) -> Plotted:
+def plot_run(record: RunRecord, width: str | None = None) -> Plotted:
     """Figures of a run. A failed figure affects neither the others nor the results.
 
     Args:
