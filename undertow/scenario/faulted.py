@@ -14,7 +14,7 @@ from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, known_key, within
 from undertow.physics.faults.injected import Faults, InputFault, PlantFault, QuantityFault
-from undertow.physics.faults.kinds import Kind, check_pair
+from undertow.physics.faults.kinds import FaultKind, check_pair
 from undertow.physics.faults.mode import AbstractFault
 from undertow.physics.faults.occurrence import Occurrence
 from undertow.physics.faults.of_computation import ComputationFault, computed, law_of_computed
@@ -115,7 +115,7 @@ def _default_severity(function: Any) -> float:
     return made.severity.default if isinstance(made, type) and issubclass(made, AbstractFault) else 0.0
 
 
-def _occurrence(entry: Fault, kind: Kind, target: FaultTarget, fault: AbstractFault) -> Occurrence:
+def _occurrence(entry: Fault, kind: FaultKind, target: FaultTarget, fault: AbstractFault) -> Occurrence:
     """When and how severe, checked against the range of the severity."""
     onset = _range("onset", 0.0 if entry.onset is None else entry.onset, 0.0, math.inf, "s")
     duration = entry.duration
@@ -177,7 +177,7 @@ def _placed(
 
 
 def _resolved(
-    entry: Fault, kind: Kind, target: FaultTarget, number: int | str | None, occurrence: Occurrence
+    entry: Fault, kind: FaultKind, target: FaultTarget, number: int | str | None, occurrence: Occurrence
 ) -> dict[str, Any]:
     """The entry as a scenario has it, with every default filled in."""
     ends = lambda pair: float(pair[0]) if float(pair[0]) == float(pair[1]) else [float(one) for one in pair]
