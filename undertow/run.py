@@ -28,7 +28,7 @@ from undertow.core.errors import BadInput, within
 from undertow.core.status import Status
 from undertow.physics.disturbances.adding import Together
 from undertow.physics.disturbances.none import none
-from undertow.physics.faults.mode import AbstractFault
+from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.scenario import factory
 from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
@@ -233,7 +233,7 @@ def _with_faults(
     if not isinstance(faults, list | tuple) or not all(isinstance(entry, Mapping) for entry in faults):
         raise BadInput("faults", "be a list of mappings", faults)
     made = {place: entry["mode"] for place, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)}
-    named = {place: {"mode": type(mode).__name__} for place, mode in made.items()}
+    named = {place: {"mode": name_of(mode)} for place, mode in made.items()}
     entries = []
     for place, entry in enumerate(faults):
         with within(f"faults[{place}]"):

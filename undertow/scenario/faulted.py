@@ -56,6 +56,7 @@ def faulted(
     known = targets_of(loop.plant, loop.navigation)
     names = input_names(loop.plant) if "thruster" in known else ()
     groups: dict[str, list[Any]] = {"quantity": [], "input": [], "plant": [], "sensor": [], "computation": []}
+    entries_of: dict[str, list[int]] = {name: [] for name in groups}
     resolved = []
     for place, entry in enumerate(entries):
         with within(f"[{place}]"):
@@ -67,9 +68,9 @@ def faulted(
             kind = check_pair(target, entry.mode, fault)
             occurrence = _occurrence(entry, kind, target, fault)
             sampled = sum(one.sampled is not None for one in groups["input"]) if number == "random" else None
-            groups["input" if target.role in ("thruster", "bus") else target.role] += _placed(
-                target, number, entry, fault, occurrence, sampled
-            )
+            group = "input" if target.role in ("thruster", "bus") else target.role
+            groups[group] += _placed(target, number, entry, fault, occurrence, sampled)
+            entries_of[group].append(place)
             resolved.append(_resolved(entry, kind, target, number, occurrence) | options)
     of_sensors, of_computer = tuple(groups["sensor"]), tuple(groups["computation"])
     navigation: Any = loop.navigation
@@ -77,7 +78,8 @@ def faulted(
         navigation = dataclasses.replace(navigation, faults=SensorFaults(of_sensors))
     elsewhere = tuple(one.occurrence for one in (*of_sensors, *of_computer))
     first, second, third = (tuple(groups[name]) for name in ("quantity", "input", "plant"))
-    faults = Faults(first, second, third, elsewhere, loop.plant.inputs())
+    in_order = (*entries_of["quantity"], *entries_of["input"], *entries_of["plant"])
+    faults = Faults(first, second, third, elsewhere, loop.plant.inputs(), in_order)
     controller = computed(loop.controller, of_computer)
     return dataclasses.replace(loop, navigation=navigation, controller=controller, faults=faults), resolved
 

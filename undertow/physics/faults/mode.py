@@ -103,7 +103,7 @@ class MemorylessMode(AbstractMode):
     """A fault of a signal that follows from the present signal: a function, which `signal_mode` makes a part of."""
 
     # In other modes targets and severity belong to the class, as pyright is told.
-    signal_after: Callable[[Moment, Signal], Signal] = eqx.field(static=True)
+    function: Callable[[Moment, Signal], Signal] = eqx.field(static=True)
     targets: tuple[str, ...] = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     severity: Severity = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     arrives: bool = eqx.field(static=True)  # whether a sensor delivers its reading
@@ -112,9 +112,9 @@ class MemorylessMode(AbstractMode):
         return ()
 
     def apply(self, memory, moment, value):
-        faulty_signal = self.signal_after(moment, value)
+        faulty_signal = self.function(moment, value)
         if jnp.shape(faulty_signal) != value.shape:
-            name, location = self.signal_after.__name__, place_of(self.signal_after)
+            name, location = self.function.__name__, place_of(self.function)
             raise BadInput(name, f"return a signal of shape {value.shape}", form(faulty_signal), where=location)
         return Altered(faulty_signal, jnp.asarray(self.arrives)), memory
 
@@ -131,7 +131,7 @@ def signal_mode(
     """
 
     def part_from(signal_after: Callable[[Moment, Signal], Signal]) -> Callable[[], MemorylessMode]:
-        mode = lambda: MemorylessMode(signal_after=signal_after, targets=targets, severity=severity, arrives=arrives)
+        mode = lambda: MemorylessMode(function=signal_after, targets=targets, severity=severity, arrives=arrives)
         return _without_options(signal_after, mode)
 
     return part_from
@@ -212,12 +212,12 @@ class AbstractComputationFault(AbstractFault):
 class ExecutionMode(AbstractComputationFault):
     """A fault of when the controller is computed: a function, which `execution_mode` makes a part of."""
 
-    execution_in: Callable[[Instant, Number], Execution] = eqx.field(static=True)
+    function: Callable[[Instant, Number], Execution] = eqx.field(static=True)
     severity: Severity = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     default_duration: float = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def execution(self, instant, dt):
-        return self.execution_in(instant, dt)
+        return self.function(instant, dt)
 
     def state(self, instant, law, z, y, r):
         return z
@@ -234,10 +234,15 @@ def execution_mode(
     """
 
     def part_from(execution_in: Callable[[Instant, Number], Execution]) -> Callable[[], ExecutionMode]:
-        mode = lambda: ExecutionMode(execution_in=execution_in, severity=severity, default_duration=default_duration)
+        mode = lambda: ExecutionMode(function=execution_in, severity=severity, default_duration=default_duration)
         return _without_options(execution_in, mode)
 
     return part_from
+
+
+def name_of(fault: AbstractFault) -> str:
+    """Name of a mode in messages: that of the function that it is made of, or of its class."""
+    return getattr(fault, "function", type(fault)).__name__
 
 
 def altered_by(mode: AbstractMode, memory: PyTree, moment: Moment, value: Signal) -> tuple[Altered, PyTree]:
