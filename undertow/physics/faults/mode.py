@@ -102,7 +102,7 @@ class AbstractMode(AbstractFault):
 class MemorylessMode(AbstractMode):
     """A fault of a signal that follows from the present signal: a function, which `signal_mode` makes a part of."""
 
-    # In other modes targets and severity belong to the class, as pyright is told.
+    # In other modes targets and severity belong to the class, as is declared for pyright.
     function: Callable[[Moment, Signal], Signal] = eqx.field(static=True)
     targets: tuple[str, ...] = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     severity: Severity = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
