@@ -30,7 +30,7 @@ from undertow.logs.log import Log
 from undertow.logs.run_log import log_of_run
 from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.none import none
-from undertow.physics.faults.mode import AbstractFault
+from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
 from undertow.report.run_page import shown, write_run_page
 from undertow.scenario import factory
@@ -228,7 +228,7 @@ def _with_faults(
     if not isinstance(faults, list | tuple) or not all(isinstance(entry, Mapping) for entry in faults):
         raise BadInput("faults", "be a list of mappings", faults)
     made = {place: entry["mode"] for place, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)}
-    named = {place: {"mode": type(mode).__name__} for place, mode in made.items()}
+    named = {place: {"mode": name_of(mode)} for place, mode in made.items()}
     entries = []
     for place, entry in enumerate(faults):
         with within(f"faults[{place}]"):
