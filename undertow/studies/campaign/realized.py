@@ -40,7 +40,7 @@ def realized_scalars(several: Trials, rows: Sequence[int]) -> dict[str, np.ndarr
     that takes both signs, as an offset does, is there by its size as well: `|navigation.sensors[1].offset[0]| (dvl)`.
 
     Args:
-        several: the trials.
+        campaign_trials: the trials.
         rows: numbers of valid trials; only the first 500 are built again.
 
     Returns:
