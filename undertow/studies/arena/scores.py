@@ -86,9 +86,9 @@ def trial_errors(position: np.ndarray, orientation: np.ndarray, tolerances: Sequ
         orientation: rms angle, rad.
         tolerances: of both.
     """
-    both = np.stack([position / tolerances[0], orientation / tolerances[1]])
-    found = np.sqrt(np.mean(both**2, axis=0))
-    return np.where(np.isfinite(found), np.clip(found, FINEST, LOST), LOST)
+    in_tolerances = np.stack([position / tolerances[0], orientation / tolerances[1]])
+    errors = np.sqrt(np.mean(in_tolerances**2, axis=0))
+    return np.where(np.isfinite(errors), np.clip(errors, FINEST, LOST), LOST)
 
 
 def score_of(entry: Entry, folder: Path) -> Score:
@@ -123,7 +123,7 @@ def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
         float(high),
         float(np.mean(within)),
         float(np.mean(lost)),
-        geometric_mean([max(one, 1e-9) for one in active]),
+        geometric_mean([max(activity, 1e-9) for activity in active]),
         cells,
     )
 
@@ -147,8 +147,8 @@ def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, Cell
     combinations, rows = results.combinations, results.rows
     names = {cell: tuple(scenarios(*cell)) for cell in cells}
     variants = range(sum(map(len, names.values())))
-    number = {name: place for place, (name,) in enumerate(map(results.named, variants))}
-    found = {}
+    number = {name: index for index, (name,) in enumerate(map(results.named, variants))}
+    by_cell = {}
     for cell in cells:
         mine = np.isin(combinations, [number[name] for name in names[cell]])
         if not mine.any():
@@ -158,14 +158,14 @@ def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, Cell
         status = rows["status"].values[mine]
         position, orientation = map(column, METRICS)
         words = [_word(code) for code in status[status != int(Status.OK)].tolist()]
-        found[cell] = CellResult(
+        by_cell[cell] = CellResult(
             trial_errors(position, orientation, tolerances(*cell)),
             position,
             orientation,
             column("input_variation") / VEHICLES[cell[1]].limit,
             {word: words.count(word) for word in dict.fromkeys(words)},
         )
-    return found
+    return by_cell
 
 
 def _word(code: int) -> str:

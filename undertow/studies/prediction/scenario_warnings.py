@@ -28,14 +28,14 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     worst = max(unstable, key=lambda point: point.radius)
     pole = worst.poles[0]
     turning = f" at {abs(pole.imag):.3g} rad/s" if pole.imag else ""
-    said = (
+    sentence = (
         f"the loop is unstable at {len(unstable)} of {len(prediction.points)} operating points: rightmost pole "
         f"{pole.real:+.3g} 1/s{turning}. Use `preset: robust`, or a slower estimator"
     )
     if theory_of(prediction.operating_point.built.closed_loop.controller).adapts:
-        said += ". This holds for fixed weights: drifting weights add damping, so that a run may still last. Simulate "
-        said += "it to find out"
-    return (said,)
+        sentence += ". This holds for fixed weights: drifting weights add damping, so that a run may still last. "
+        sentence += "Simulate it to find out"
+    return (sentence,)
 
 
 def _actuators(prediction: Prediction) -> tuple[str, ...]:

@@ -82,8 +82,8 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     """
     rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
     variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
-    found = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
-    return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))
+    parts = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
+    return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in parts))
 
 
 def times_other(cost: float, other: float) -> str:
