@@ -57,8 +57,8 @@ def _sweep(runs: Runs, controller: str) -> dict[str, Any]:
     points = []
     for i, block in enumerate(_SWEEP):
         if _name(controller, i) in runs:
-            found = steady(runs[_name(controller, i)])
-            ratios = np.divide(found["estimation_rms_axes"], found["uncertainty_rms_axes"])
+            metrics = steady(runs[_name(controller, i)])
+            ratios = np.divide(metrics["estimation_rms_axes"], metrics["uncertainty_rms_axes"])
             points += zip(block, ratios.tolist(), strict=True)
     points.sort()
     curve = np.geomspace(0.5, 500.0, 120)

@@ -185,14 +185,14 @@ def paper_figures(
         example2: runs of Example 2; as in the paper, only `rcafc` is plotted.
         response: the response of the thruster to a slow and a fast voltage.
     """
-    both = {key: example1[key] for key in ("rcafc", "rafc")}
+    of_controllers = {key: example1[key] for key in ("rcafc", "rafc")}
     alone = {"rcafc": example2["rcafc"]}
     return {
         "fig02": thruster_laws(response),
-        "fig06": tracking("Fig. 6  Example 1: tracking", both),
-        "fig07": uncertainty("Fig. 7  Example 1: lumped uncertainty and its estimates", both),
-        "fig08": robust_term("Fig. 8  Example 1: robust term", both),
-        "fig09": effort("Fig. 9  Example 1: control voltages", both),
+        "fig06": tracking("Fig. 6  Example 1: tracking", of_controllers),
+        "fig07": uncertainty("Fig. 7  Example 1: lumped uncertainty and its estimates", of_controllers),
+        "fig08": robust_term("Fig. 8  Example 1: robust term", of_controllers),
+        "fig09": effort("Fig. 9  Example 1: control voltages", of_controllers),
         "fig10": tracking("Fig. 10  Example 2: tracking", alone),
         "fig11": identification("Fig. 11  Example 2: state and series-parallel state", alone["rcafc"]),
         "fig12": uncertainty("Fig. 12  Example 2: lumped uncertainty and its estimate", alone),

@@ -173,6 +173,8 @@ def _together(
     seeds = campaign_trials.seeds(trials)
     numbers[-1] = np.stack([np.zeros_like(seeds), seeds], axis=1)  # the random keys
     good = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
+    # Every valid trial up to the last one built alone has to agree: one that only tracing accepts, or that differs in
+    # one bit, shows that the numbers of this kind cannot be traced.
     for index in np.flatnonzero(good[: max(alone) + 1]).tolist():
         if index not in alone or not _same(batch.first.run, numbers, index, loop_run(alone[index])):
             return None

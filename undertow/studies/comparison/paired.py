@@ -79,6 +79,7 @@ def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
     for baseline, candidate in itertools.combinations(completed, 2):
         candidate_only = int((completed[candidate] & ~completed[baseline]).sum())
         baseline_only = int((completed[baseline] & ~completed[candidate]).sum())
+        # McNemar: only the trials that one of the two completed tell them apart, each with even odds if they are equal.
         discordant = candidate_only + baseline_only
         p = float(binomtest(candidate_only, discordant).pvalue) if discordant else math.nan
         uncorrected.append(Completion(candidate, baseline, candidate_only, baseline_only, p, math.nan))
@@ -152,6 +153,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
     """p values with the step-down correction of Holm (1979) for all tests that were made; NaN stands for none."""
     tested = [i for i, p in enumerate(p_values) if not math.isnan(p)]
     corrected, largest = list(p_values), 0.0
+    # The smallest p is multiplied by the number of tests, the next by one less, and so on; none falls below an earlier.
     for rank, i in enumerate(sorted(tested, key=lambda i: p_values[i])):
         largest = max(largest, min(1.0, (len(tested) - rank) * p_values[i]))
         corrected[i] = largest

@@ -37,6 +37,7 @@ class Front(NamedTuple):
 def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
     """Which points no other point dominates, for two numbers of which less is better; equal points are all kept."""
     costs = np.asarray(points, dtype=float).reshape(-1, 2)
+    # Of every pair: the first axis is the point that may dominate, the second the one that may be dominated.
     no_worse = (costs[:, None] <= costs[None]).all(-1)
     better = (costs[:, None] < costs[None]).any(-1)
     dominated = np.logical_or.reduce(no_worse & better, axis=0)

@@ -146,6 +146,8 @@ def _directions(
     """Directions of norm 1 that may meet the boundary nearer to the nominal scenario."""
     departure, candidates = best.departure, [best.departure]
     if gradient is not None and gradient.any():
+        # The point nearest to the nominal scenario at which the linearised robustness is zero: the departure x of
+        # robustness r with gradient g has the plane g.(y - x) + r = 0, whose point of least norm is along g.
         nearest = (gradient @ departure - best.robustness) / (gradient @ gradient) * gradient
         nearest = np.clip(nearest, box.lower, box.upper)
         candidates += [departure + step * (nearest - departure) for step in _STEPS]
