@@ -119,12 +119,14 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Claim
         return ClaimVerdict("fails", text, "ideal_rcafc", simulated, numbers)
     if rcafc < fair:
         return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
-    where = []
+    conditions = []
     if lost_by_limits(long):
-        where.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
+        conditions.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
     if worse_by_noise(long, metric):
-        where.append("velocities are noisy (1 cm/s)")
-    else_where = f"; at equal loop gain only where {' or '.join(where)}" if where else "; not at equal loop gain"
+        conditions.append("velocities are noisy (1 cm/s)")
+    else_where = (
+        f"; at equal loop gain only where {' or '.join(conditions)}" if conditions else "; not at equal loop gain"
+    )
     return ClaimVerdict(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
 
 

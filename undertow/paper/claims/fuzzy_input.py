@@ -53,7 +53,7 @@ def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
     )
     numbers = {"same_gamma": list(same_gamma), "levels": by_level}
     simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"
-    alike, better = [], []
+    equal_levels, better_levels = [], []
     for level, laws in by_level.items():
         five_sets, alternatives = laws["error_5"], [laws["error_1"], laws["state_25"]]
         if five_sets is None:
@@ -61,14 +61,14 @@ def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
         limit = _AS_GOOD * five_sets["estimation_rms"]
         as_good = [bool(metrics) and metrics["estimation_rms"] <= limit for metrics in alternatives]
         if all(as_good):
-            alike.append(level)
+            equal_levels.append(level)
         elif not any(as_good):
-            better.append(level)
-    if not better:
+            better_levels.append(level)
+    if not better_levels:
         return ClaimVerdict("fails", text, _name(levels[0], "state_25"), simulated, numbers)
-    verdict = f"holds if the thruster lags (level {' and '.join(better)}) and with five sets, not one"
-    verdict += f"; at the same loop gain it makes no difference at {' and '.join(alike)}" if alike else ""
-    return ClaimVerdict(verdict, text, _name(better[0], "error_1"), simulated, numbers)
+    verdict = f"holds if the thruster lags (level {' and '.join(better_levels)}) and with five sets, not one"
+    verdict += f"; at the same loop gain it makes no difference at {' and '.join(equal_levels)}" if equal_levels else ""
+    return ClaimVerdict(verdict, text, _name(better_levels[0], "error_1"), simulated, numbers)
 
 
 def _name(level: str, law: str) -> str:

@@ -123,13 +123,16 @@ def identification(title: str, run: xr.Dataset) -> Figure:
     """Fig. 11."""
     state = recorded.curve(run, "state $x$", "position", STATE)
     model = recorded.curve(run, r"series-parallel state $\hat{x}$", "predicted_position", MODEL)
-    apart = recorded.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
-    apart = apart._replace(values=1000 * apart.values)
+    model_error = recorded.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
+    model_error = model_error._replace(values=1000 * model_error.values)
     thousandths = [text.replace(", ", ", m") for text in recorded.per_axis(run, r"$\hat{x} - x$")]
     return small_multiples(
         title,
         axis_names(run),
-        [Block([state, model], recorded.places(run), height=1.1, titled=True), Block([apart], thousandths, height=0.9)],
+        [
+            Block([state, model], recorded.places(run), height=1.1, titled=True),
+            Block([model_error], thousandths, height=0.9),
+        ],
     )
 
 

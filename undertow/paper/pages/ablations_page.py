@@ -78,14 +78,14 @@ def answers_table(ablations: Sequence[Ablation], page: str = "") -> Html:
 def _ablation(ablation: Ablation) -> Html:
     files = [f"{name}.yaml" for name in ablation["campaigns"]]
     commands = [f"undertow campaign campaigns/{file} --out {file.removesuffix('.yaml')}" for file in files]
-    where = " and ".join(f"`undertow/paper/ablations/{file}`" for file in files)
+    file_names = " and ".join(f"`undertow/paper/ablations/{file}`" for file in files)
     return section(
         ablation["id"],
         f"{ablation['id']}: {ablation['question']}",
         tag("p", "Prediction of the theory: ", prose(ablation["prediction"])),
         tag("p", verdict(ablation), " ", prose(ablation["answer"])),
         *([tag("p", prose(f"Not examined: {ablation['left_out']}."))] if ablation["left_out"] else []),
-        tag("p", prose(f"Campaign file: {where}. To run it alone, in the folder of this page:")),
+        tag("p", prose(f"Campaign file: {file_names}. To run it alone, in the folder of this page:")),
         *(tag("pre", command) for command in commands),
         numbers_table(ablation),
     )

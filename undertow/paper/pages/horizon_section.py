@@ -75,10 +75,10 @@ def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]])
     table_rows = []
     for row in rows:
         size = f"{1e3 * row['value']:g}"
-        behind = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
+        dynamics = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
         between = row["damping"]
         theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
-        table_rows.append((prose(behind), row["words"], theory, _ended(row), *_by_window(row, windows)))
+        table_rows.append((prose(dynamics), row["words"], theory, _ended(row), *_by_window(row, windows)))
     return _wide(("behind", "controller", join("stable for c, ", unit("1/s")), "status"), windows, table_rows)
 
 

@@ -54,10 +54,10 @@ def reference_table(example: dict[str, Any]) -> Html:
     rows = []
     for key, expected in REFERENCE.items():
         metrics = (example.get(key) or {}).get("steady") or {}
-        for metric, theirs in expected.items():
-            ours = metrics.get(metric)
-            apart = None if ours is None else 100 * (ours / theirs - 1)
-            cells = (NAMES[key], _named(metric), number(ours, 4), number(theirs, 4), percent(apart))
+        for metric, independent in expected.items():
+            reproduced = metrics.get(metric)
+            difference = None if reproduced is None else 100 * (reproduced / independent - 1)
+            cells = (NAMES[key], _named(metric), number(reproduced, 4), number(independent, 4), percent(difference))
             rows.append(cells)
     return table(("controller", "metric", "this run", "independent", "difference"), rows, numeric=(2, 3, 4))
 

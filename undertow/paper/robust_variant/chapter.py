@@ -30,10 +30,12 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
     compared = begin_all(fidelity.scenarios(quick), folder, tasks)
     # The longest begin first, so that no process waits for the last one.
     order = sorted(selected, key=study.trials_of, reverse=True)
-    later = {entry.id: tasks.begin(f"ablation {entry.id}", ablation, entry.id, quick, folder) for entry in order}
+    ablation_tasks = {
+        entry.id: tasks.begin(f"ablation {entry.id}", ablation, entry.id, quick, folder) for entry in order
+    }
 
     def finished() -> Chapter:
-        runs, ablation_rows = compared(), [later[entry.id].result() for entry in selected]
+        runs, ablation_rows = compared(), [ablation_tasks[entry.id].result() for entry in selected]
         rows = fidelity.table(runs, quick)
         results = {
             "quick": quick,

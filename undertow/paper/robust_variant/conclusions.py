@@ -19,8 +19,8 @@ class Numbers:
     """Medians of the ablations, and rows of the fidelity comparison; a missing one is a KeyError."""
 
     def __init__(self, compared: Rows, ablations: Rows):
-        everything = {(run.place, run.law): None for run in fidelity.runs(False)}
-        self._compared = everything | {(row["place"], row["law"]): row for row in compared}
+        not_run = {(run.place, run.law): None for run in fidelity.runs(False)}
+        self._compared = not_run | {(row["place"], row["law"]): row for row in compared}
         self._ablations = {ablation.id: None for ablation in ABLATIONS} | {
             row["id"]: {variant["name"]: variant for variant in row["variants"]} for row in ablations
         }
@@ -233,11 +233,11 @@ def _recovery(n: Numbers) -> str:
     paper, robust = n.fidelity("overload", "rcafc"), n.fidelity("overload", "robust")
     if not (robust["steady"] and paper["steady"]):
         return ""
-    after = robust["steady"]["tracking_rms"]
-    how = "back at" if after < _RECOVERED else "not back yet, but at"
+    late_error = robust["steady"]["tracking_rms"]
+    how = "back at" if late_error < _RECOVERED else "not back yet, but at"
     return (
         f"An overload of 1.5 s. Beyond the authority of its motors at 24 V, the error of `robust` is up to "
-        f"{robust['largest_after']:.2g} m or rad, after 7.5 s {how} {after:.2g}; that of Table 1 is up to "
+        f"{robust['largest_after']:.2g} m or rad, after 7.5 s {how} {late_error:.2g}; that of Table 1 is up to "
         f"{paper['largest_after']:.2g}, then {paper['steady']['tracking_rms']:.2g}."
     )
 

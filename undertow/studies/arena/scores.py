@@ -103,9 +103,9 @@ def score_of(entry: Entry, folder: Path) -> Score:
         hint = f"Run the arena again for {entry.name} with --overwrite"
         raise BadInput("--out", "have results that can be read", str(error).partition(";")[0], hint=hint) from None
     trials = results.campaign.trials
-    every = {cell: _refused(trials * len(scenarios(*cell))) for cell in entry.refused}
-    every |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
-    return scored(entry.name, {cell: every[cell] for cell in entry.cells})
+    results_of_cell = {cell: _refused(trials * len(scenarios(*cell))) for cell in entry.refused}
+    results_of_cell |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
+    return scored(entry.name, {cell: results_of_cell[cell] for cell in entry.cells})
 
 
 def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
@@ -150,12 +150,12 @@ def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, Cell
     number = {name: index for index, (name,) in enumerate(map(results.named, variants))}
     by_cell = {}
     for cell in cells:
-        mine = np.isin(combinations, [number[name] for name in names[cell]])
-        if not mine.any():
+        in_cell = np.isin(combinations, [number[name] for name in names[cell]])
+        if not in_cell.any():
             hint = "Run the arena again for this law, which continues"
             raise BadInput("--out", "have trials of every task", f"none of {' on '.join(cell)} for {law}", hint=hint)
-        column = lambda name, mine=mine: rows[name].values[mine].astype(float)
-        status = rows["status"].values[mine]
+        column = lambda name, in_cell=in_cell: rows[name].values[in_cell].astype(float)
+        status = rows["status"].values[in_cell]
         position, orientation = map(column, METRICS)
         words = [_word(code) for code in status[status != int(Status.OK)].tolist()]
         by_cell[cell] = CellResult(

@@ -137,11 +137,11 @@ def _traceable(campaign_trials: Trials, part_cache: PartCache, kind: TrialSignat
     samples = np.arange(min(_SEARCHED, campaign_trials.campaign.trials))
     trials = samples * len(campaign_trials.combinations) + kind.combination
     sampled = campaign_trials.sampled(trials)
-    alike = _by_kind(campaign_trials, trials, sampled, varied).get(kind, samples[:0])[:_COMPARED]
-    if len(alike) < _COMPARED:
+    of_kind = _by_kind(campaign_trials, trials, sampled, varied).get(kind, samples[:0])[:_COMPARED]
+    if len(of_kind) < _COMPARED:
         return False
-    numbers = {key: np.array(sampled[key])[alike] for key in varied}
-    return _together(campaign_trials, part_cache, trials[alike], numbers, _COMPARED) is not None
+    numbers = {key: np.array(sampled[key])[of_kind] for key in varied}
+    return _together(campaign_trials, part_cache, trials[of_kind], numbers, _COMPARED) is not None
 
 
 def _together(
@@ -160,10 +160,10 @@ def _together(
         varied: values of the keys that vary.
         compared: how many valid ones, from the first one on, are built alone too and have to have the same bits.
     """
-    alone = dict(itertools.islice(valid_trials(campaign_trials, part_cache, trials.tolist()), compared))
-    if not alone:
+    built_alone = dict(itertools.islice(valid_trials(campaign_trials, part_cache, trials.tolist()), compared))
+    if not built_alone:
         return None
-    first = alone[min(alone)]
+    first = built_alone[min(built_alone)]
     batch = batch_of(prepare_trial(first, recorded(campaign_trials.campaign, first)))
     try:
         form = structure(batch.first.run)
@@ -172,24 +172,24 @@ def _together(
         return None
     seeds = campaign_trials.seeds(trials)
     numbers[-1] = np.stack([np.zeros_like(seeds), seeds], axis=1)  # the random keys
-    good = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
+    valid = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
     # Every valid trial up to the last one built alone has to agree: one that only tracing accepts, or that differs in
     # one bit, shows that the numbers of this kind cannot be traced.
-    for index in np.flatnonzero(good[: max(alone) + 1]).tolist():
-        if index not in alone or not _same(batch.first.run, numbers, index, loop_run(alone[index])):
+    for index in np.flatnonzero(valid[: max(built_alone) + 1]).tolist():
+        if index not in built_alone or not _same(batch.first.run, numbers, index, loop_run(built_alone[index])):
             return None
-    places = np.flatnonzero(good)
+    places = np.flatnonzero(valid)
     batch_numbers = [None if number is None else number[places] for number in numbers]
     return TrialBatch(places, first, batch._replace(numbers=batch_numbers, size=len(places)))
 
 
-def _same(first: Any, numbers: list[np.ndarray | None], index: int, alone: Any) -> bool:
+def _same(first: Any, numbers: list[np.ndarray | None], index: int, built_alone: Any) -> bool:
     """Whether a trial has the same bits as when it is built alone."""
-    if structure(first) != structure(alone):
+    if structure(first) != structure(built_alone):
         return False
     pairs = zip(numbers_of(first), numbers, strict=True)
     batch_leaves = [leaf if number is None else number[index] for leaf, number in pairs]
-    of_both = zip(batch_leaves, numbers_of(alone), strict=True)
+    of_both = zip(batch_leaves, numbers_of(built_alone), strict=True)
     return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in of_both)
 
 

@@ -214,7 +214,7 @@ def validate(text: Text) -> Campaign:
     return campaign
 
 
-def _check_key(section: str, key: str, every: list[str], where: str) -> None:
+def _check_key(section: str, key: str, varied_keys: list[str], where: str) -> None:
     """A key path of `vary` or `cross`."""
     if not _PATH.fullmatch(key):
         must = "be a key path such as plant.vehicle.mass or initial.position[0]"
@@ -224,11 +224,11 @@ def _check_key(section: str, key: str, every: list[str], where: str) -> None:
     if key == "seed":
         hint = "Every trial has its own seed, which follows from the `seed` of the campaign"
         raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
-    if every.count(key) > 1:
+    if varied_keys.count(key) > 1:
         raise BadInput(
             f"{section if section == 'variants' else 'cross'}.{key}", "not be in `vary` as well", where=where
         )
-    for other_key in every:
+    for other_key in varied_keys:
         if other_key.startswith((f"{key}.", f"{key}[")):
             raise BadInput(other_key, f"not be given together with {key}, which contains it", where=where)
 
@@ -243,8 +243,8 @@ def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
         raise BadInput(name, "be a list, or values by names", f"{next(iter(entries))} alone", hint=hint, where=where)
     words_by_value: dict[str, str] = {}
     for word, entry in entries.items():
-        same = words_by_value.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
-        if same != word:
+        first_word = words_by_value.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
+        if first_word != word:
             raise BadInput(name, "have entries that differ", f"twice {words(entry)}", where=where)
 
 

@@ -65,12 +65,12 @@ _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "in
 
 def labels(campaign_trials: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
     """Labels of all columns, by name; `built` is one of the trials, `metrics` are those that any of them may have."""
-    columns, along = trial_labels(campaign_trials.campaign, metrics), (*campaign_trials.campaign.axes, SAMPLES)
+    columns, dimensions = trial_labels(campaign_trials.campaign, metrics), (*campaign_trials.campaign.axes, SAMPLES)
     loop = built.closed_loop
     for name in campaign_trials.campaign.series.signals if campaign_trials.campaign.series else ():
         signal = loop.signals()[name]
         attributes = _said(*dataset.meaning(signal, loop.plant)) | {"comment": _AFTER}
-        columns[f"series:{name}"] = Label((*along, *dataset.dimensions(signal)), attributes)
+        columns[f"series:{name}"] = Label((*dimensions, *dataset.dimensions(signal)), attributes)
     return columns
 
 
@@ -81,8 +81,8 @@ def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str,
         f"vary:{key}": {"long_name": key} if entries is None else {"long_name": key, "choices": list(entries)}
         for key, entries in varied_keys(campaign)
     }
-    along, of_trials = (*campaign.axes, SAMPLES), sampled | ALWAYS | of_metrics
-    return {name: Label(along, attributes, _DTYPES.get(name, "float64")) for name, attributes in of_trials.items()}
+    dimensions, of_trials = (*campaign.axes, SAMPLES), sampled | ALWAYS | of_metrics
+    return {name: Label(dimensions, attributes, _DTYPES.get(name, "float64")) for name, attributes in of_trials.items()}
 
 
 def coordinates(campaign_trials: Trials, built: Built) -> dict[str, xr.Variable]:

@@ -86,9 +86,9 @@ def robustness(
         requirements, loop = required[id(trial)], trial.scenario.loop
         needed = temporal.needed_signals(requirements)
         signals = temporal.contiguous({name: series[name][row] for name in needed}, needed)
-        how = (int(status[row]), float(ended[row]), loop.duration)
-        for name, judged in temporal.judged(requirements, signals, record_period(loop), {}, *how).items():
-            by_name[name][row] = judged.robustness
+        ending = (int(status[row]), float(ended[row]), loop.duration)
+        for name, judgement in temporal.judged(requirements, signals, record_period(loop), {}, *ending).items():
+            by_name[name][row] = judgement.robustness
     return by_name
 
 

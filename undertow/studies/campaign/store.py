@@ -75,8 +75,8 @@ def check_array(array: Any, label: Label, chunks: tuple[int, ...], path: Path) -
     chunks = (*chunks, *array.shape[len(chunks) :])
     expected_array = new_array(zarr.open_group(MemoryStore()), "made", array.shape, chunks, label)
     stored, expected = array.metadata.to_dict(), expected_array.metadata.to_dict()
-    written = lambda value: json.dumps(value, sort_keys=True, default=str)
-    differing = [key for key in expected | stored if written(stored.get(key)) != written(expected.get(key))]
+    serialized = lambda value: json.dumps(value, sort_keys=True, default=str)
+    differing = [key for key in expected | stored if serialized(stored.get(key)) != serialized(expected.get(key))]
     if differing:
         got = f"{path / array.basename / 'zarr.json'} with another {', '.join(differing)}"
         hint = f"Restore it, or remove {array.basename}/ and use --resume to compute it again"
@@ -200,14 +200,14 @@ class Store:
             OSError: for example, the disk is full; the task then counts as not done.
         """
         region = self.layout.region(task)
-        covered = [span.stop - span.start for span in region]
+        block_shape = [span.stop - span.start for span in region]
         for name, values in columns.items():
             trial_shape = values.shape[1:]
             if name not in self._arrays:
                 shape, chunks = (*self.layout.shape, *trial_shape), (*self.layout.chunk, *trial_shape)
                 self._arrays[name] = new_array(self._group, name, shape, chunks, self._labels[name])
                 self._settle(name)
-            self._arrays[name][region] = values.reshape(*covered, *trial_shape)
+            self._arrays[name][region] = values.reshape(*block_shape, *trial_shape)
         self._arrays[DONE][task] = 1
 
     def close(self) -> None:

@@ -40,12 +40,12 @@ class StoreLayout(NamedTuple):
 
     def region(self, task: int) -> tuple[slice, ...]:
         """What the block of a task covers."""
-        covered = zip(self.block(task), self.chunk, self.shape, strict=True)
-        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in covered)
+        axes = zip(self.block(task), self.chunk, self.shape, strict=True)
+        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in axes)
 
     def count(self, task: int) -> int:
         """Trials of a task."""
-        return math.prod(covered.stop - covered.start for covered in self.region(task))
+        return math.prod(span.stop - span.start for span in self.region(task))
 
     def trials(self, task: int) -> Int[np.ndarray, " trials"]:
         """Numbers of the trials of a task, in the order of its block."""

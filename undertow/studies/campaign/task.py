@@ -79,16 +79,16 @@ def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     sampled = context.trials.sampled(trials)
     columns = {f"vary:{key}": column for key, column in _columns(context.trials, sampled)}
     columns["trial"], columns["seed"] = trials.astype(np.uint32), context.trials.seeds(trials)
-    where: list[int] = []
+    result_rows: list[int] = []
     criteria: list[Mapping[str, float]] = []
     firsts: list[Built] = []
 
     def batches() -> Iterator[RunBatch]:
         for trial_batch in build_trials(context.trials, context.part_cache, trials, sampled, context.traceable):
-            where.extend(trial_batch.places.tolist())
+            result_rows.extend(trial_batch.places.tolist())
             firsts.extend([trial_batch.first] * len(trial_batch.places))
-            judged = trial_batch.first.window()[0] < trial_batch.first.scenario.loop.duration
-            criteria.extend([trial_batch.first.resolved["success"] if judged else {}] * len(trial_batch.places))
+            is_judged = trial_batch.first.window()[0] < trial_batch.first.scenario.loop.duration
+            criteria.extend([trial_batch.first.resolved["success"] if is_judged else {}] * len(trial_batch.places))
             yield trial_batch.batch
 
     campaign = context.trials.campaign
@@ -98,12 +98,12 @@ def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
         one_trial = run_prepared([prepare_trial(next(iter(context.probes().values())), series)], context.programs)
         result = jax.tree.map(lambda values: values[:0], one_trial)
     robust = robustness(campaign, firsts, result.series, result.status, result.ended)
-    scatter = functools.partial(_scatter, len(rows), where)
+    scatter = functools.partial(_scatter, len(rows), result_rows)
     columns["status"] = scatter(result.status, INVALID)
     columns["ended"] = scatter(result.ended, np.nan)
     columns["backend"] = scatter(result.backend, INVALID)
     columns["success"] = scatter(_success(criteria, result.metrics), NOT_JUDGED)
-    undefined = np.full(len(where), np.nan)
+    undefined = np.full(len(result_rows), np.nan)
     result_columns = {name: result.metrics.get(name, undefined) for name in context.metrics()}
     result_columns |= robust
     series_names = campaign.series.signals if campaign.series is not None else ()
@@ -136,10 +136,10 @@ def _columns(campaign_trials: Trials, sampled: Mapping[str, list[Any]]) -> Itera
         yield key, np.array([pick(value) for value in sampled[key]], dtype=float)
 
 
-def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
+def _scatter(count: int, rows: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
     """An array with values at their rows and `empty` elsewhere."""
     column = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
-    column[where] = values
+    column[rows] = values
     return column
 
 

@@ -93,8 +93,8 @@ def _elsewhere(word: str, data: dict[str, Any]) -> str:
     if word in Scenario.model_fields:
         return ""
     paths = {path.rpartition(".")[2]: path for path in _lists(data, "")}
-    near = get_close_matches(word, list(paths), n=1)
-    return f"Did you mean `{paths[near[0]]}`?" if near else ""
+    matches = get_close_matches(word, list(paths), n=1)
+    return f"Did you mean `{paths[matches[0]]}`?" if matches else ""
 
 
 def _lists(node: Any, path: str) -> Iterator[str]:

@@ -84,8 +84,8 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candi
     flat_scenarios = [_flat(data) for data in resolved]
     keys = dict.fromkeys(key for data in flat_scenarios for key in data)
     different = [key for key in keys if any(data.get(key) != flat_scenarios[0].get(key) for data in flat_scenarios)]
-    alike = [path.stem for path in paths]
-    names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
+    stems = [path.stem for path in paths]
+    names = [f"{path.parent.name}/{path.stem}" if stems.count(path.stem) > 1 else path.stem for path in paths]
     # A scenario may be without metrics of its own, faults and a supervisor.
     candidates = [
         Candidate(name, {key: data.get(key, None if key == "supervisor" else []) for key in different}, path)
@@ -96,9 +96,9 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candi
 
 def _differing(texts: Sequence[Text]) -> dict[str, list[str]]:
     """Key -> its value in each scenario as the user wrote it, for the keys that differ."""
-    written = [_flat(validate(text).model_dump()) for text in texts]
-    keys = dict.fromkeys(key for data in written for key in data)
-    values_by_key = {key: [words(data.get(key, "not given")) or "none" for data in written] for key in keys}
+    flat_scenarios = [_flat(validate(text).model_dump()) for text in texts]
+    keys = dict.fromkeys(key for data in flat_scenarios for key in data)
+    values_by_key = {key: [words(data.get(key, "not given")) or "none" for data in flat_scenarios] for key in keys}
     return {key: values for key, values in values_by_key.items() if len(set(values)) > 1}
 
 

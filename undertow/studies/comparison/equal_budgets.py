@@ -177,29 +177,36 @@ def _tuned(candidate: Candidate, text: Text, budget: int, file: Path, say: Say) 
     """The entry of a law: from its file, or tuned now and written."""
     say(f"{candidate.name}: building")
     built = build(text)
-    about = text_hash(
+    fingerprint = text_hash(
         dump({"evaluations": budget, "tune": built.scenario.tune.model_dump(), **built.resolved} | versions())
     )
     finished, checkpoint = file.with_suffix(".json"), file.with_suffix(".jsonl")
     if finished.exists():
-        return _read(finished, about)
-    begun = checkpoint.exists()
+        return _read(finished, fingerprint)
+    interrupted = checkpoint.exists()
     untuned = "" if is_tunable(built) else _NO_GAINS
     entry: dict[str, Any] | None = None
     if not untuned:
         watch = lambda best, count: say(f"{candidate.name}: {count} of {budget} evaluations, best cost {best.cost:.4g}")
         stage = lambda words: say(f"{candidate.name}: {words}")
         try:
-            run = tune(text, checkpoint, method=METHOD, evaluations=budget, resume=begun, say=stage, watch=watch)
+            run = tune(text, checkpoint, method=METHOD, evaluations=budget, resume=interrupted, say=stage, watch=watch)
             entry = _entry(candidate.name, run)
         except NoCertificate:
             untuned = _DIVERGED
     if entry is None:
-        nothing = dict.fromkeys(("train", "held_out", "radius", "sets"))
-        entry = {"name": candidate.name, "gains": {}, "untuned": untuned, "parameters": 0, "evaluations": 0, **nothing}
-    write_whole(finished, to_json({"about": about, **entry}, indent=1) + "\n")
+        empty_fields = dict.fromkeys(("train", "held_out", "radius", "sets"))
+        entry = {
+            "name": candidate.name,
+            "gains": {},
+            "untuned": untuned,
+            "parameters": 0,
+            "evaluations": 0,
+            **empty_fields,
+        }
+    write_whole(finished, to_json({"about": fingerprint, **entry}, indent=1) + "\n")
     checkpoint.unlink(missing_ok=True)
-    return _read(finished, about)
+    return _read(finished, fingerprint)
 
 
 def _entry(name: str, run: Tuned) -> dict[str, Any]:
@@ -227,10 +234,10 @@ def _runs(trials: PlantVariants) -> dict[str, Any]:
     return {"seeds": trials.number // max(1, len(sets)), "sizes": sizes, "sets": sets, "runs": trials.number}
 
 
-def _read(file: Path, about: str) -> dict[str, Any]:
+def _read(file: Path, fingerprint: str) -> dict[str, Any]:
     try:
         entry = json.loads(file.read_text(encoding="utf-8"))
-        mismatch = entry.pop("about") != about
+        mismatch = entry.pop("about") != fingerprint
     except (OSError, ValueError, KeyError, AttributeError) as error:
         raise BadInput("--resume", "find tunings that can be read", f"{file}: {error!r}", hint="Remove it") from None
     if mismatch:

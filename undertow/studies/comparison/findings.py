@@ -109,8 +109,8 @@ def find(
         metric: {name: np.where(lasted[name], trials[metric].values, np.nan) for name, trials in rows.items()}
         for metric in metrics
     }
-    alike = all(_constant(column) for by_name in values.values() for column in by_name.values())
-    all_equal = alike and (bool(values) or dataset.sizes[SAMPLES] == 1)
+    constant = all(_constant(column) for by_name in values.values() for column in by_name.values())
+    all_equal = constant and (bool(values) or dataset.sizes[SAMPLES] == 1)
     if all_equal:  # many copies of one trial prove no more than that trial
         values = {metric: {name: column[:1] for name, column in by_name.items()} for metric, by_name in values.items()}
     failure_times = {name: trials["ended"].values[~lasted[name]] for name, trials in rows.items()}

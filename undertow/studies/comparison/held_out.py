@@ -41,9 +41,9 @@ def held_out(text: Text, scenario: Text, budgets: EqualBudgets) -> Text:
     return text._replace(data=data | {"vary": {**user_vary, **vary}}, lines=lines)
 
 
-def _heights(written: Any, resolved: Any) -> dict[str, float]:
+def _heights(as_written: Any, resolved: Any) -> dict[str, float]:
     """Key path -> wave height, m, of every disturbance with waves."""
-    listed = isinstance(written, list)
+    listed = isinstance(as_written, list)
     entries = resolved if isinstance(resolved, list) else [resolved]
     location = lambda number: f"disturbance[{number}]" if listed else "disturbance"
     return {

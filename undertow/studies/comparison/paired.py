@@ -107,21 +107,23 @@ def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[PairedDi
 def _difference(metric: str, candidate: str, baseline: str, first: np.ndarray, second: np.ndarray) -> PairedDifference:
     finite = np.isfinite(first) & np.isfinite(second)
     first, second = first[finite], second[finite]
-    apart = first - second
-    low, high = median_interval(apart)
+    pair_differences = first - second
+    low, high = median_interval(pair_differences)
     return PairedDifference(
         metric=metric,
         candidate=candidate,
         baseline=baseline,
         pairs=int(finite.sum()),
         left_out=int((~finite).sum()),
-        median=float(np.median(apart)) if apart.size else math.nan,
+        median=float(np.median(pair_differences)) if pair_differences.size else math.nan,
         low=low,
         high=high,
-        relative=float(np.median(apart / second)) if apart.size and (second > 0).all() else math.nan,
-        smaller=int((apart < 0).sum()),
-        larger=int((apart > 0).sum()),
-        p=rank_test(apart),
+        relative=float(np.median(pair_differences / second))
+        if pair_differences.size and (second > 0).all()
+        else math.nan,
+        smaller=int((pair_differences < 0).sum()),
+        larger=int((pair_differences > 0).sum()),
+        p=rank_test(pair_differences),
         p_holm=math.nan,
     )
 
@@ -142,11 +144,11 @@ def median_interval(values: np.ndarray) -> tuple[float, float]:
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
-def rank_test(apart: np.ndarray) -> float:
+def rank_test(pair_differences: np.ndarray) -> float:
     """Two-sided p of the Wilcoxon signed-rank test (1945); NaN where all are zero, and for fewer than six values."""
-    if apart.size < FEWEST or not apart.any():
+    if pair_differences.size < FEWEST or not pair_differences.any():
         return math.nan
-    return float(wilcoxon(apart).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
+    return float(wilcoxon(pair_differences).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

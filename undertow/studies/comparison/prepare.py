@@ -202,12 +202,12 @@ def _prepared(campaign: Campaign, source: Text, allow_code: bool) -> tuple[Prepa
 def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
     """The campaign with a record of errors and positions."""
     loop = schema.validate(trials_of(campaign, source, allow_code).scenario).loop
-    every = loop.dt * max(1, round(loop.duration / loop.dt / _RECORDS))
+    record_period = loop.dt * max(1, round(loop.duration / loop.dt / _RECORDS))
     series = campaign.series
     if series is not None and whole_steps(series.every, loop.dt):
-        every = series.every
+        record_period = series.every
     signals = list(dict.fromkeys([*(series.signals if series else ()), *_SIGNALS]))
-    return Campaign.model_validate(campaign.model_dump() | {"series": {"signals": signals, "every": every}})
+    return Campaign.model_validate(campaign.model_dump() | {"series": {"signals": signals, "every": record_period}})
 
 
 def _firsts(prepared: Prepared) -> tuple[Built, ...]:

@@ -62,11 +62,14 @@ def step_time(built: Built) -> StepTime:
     compiled = CompiledStep(
         step, copy_arrays(numbers), copy_arrays(memory), copy_arrays((y, target, applied, interval))
     )
-    taken, begun = [], time.perf_counter()
+    durations, measurement_start = [], time.perf_counter()
     for _ in range(_BEFORE):
         compiled()
-    while len(taken) < _CALLS and time.perf_counter() - begun < _LONGEST:
+    while len(durations) < _CALLS and time.perf_counter() - measurement_start < _LONGEST:
         start = time.perf_counter()
         compiled()
-        taken.append(time.perf_counter() - start)
-    return StepTime(statistics.median(taken) if taken else (time.perf_counter() - begun) / _BEFORE, compiled.backend)
+        durations.append(time.perf_counter() - start)
+    return StepTime(
+        statistics.median(durations) if durations else (time.perf_counter() - measurement_start) / _BEFORE,
+        compiled.backend,
+    )

@@ -41,14 +41,14 @@ def tuning_note(
     if searched is not None:
         return searched
     kind, preset, gains, main = _given(part, law, dt, folder)
-    short, where = kind.rpartition("/")[2], f" in {source}" if source else ""
+    short, source_words = kind.rpartition("/")[2], f" in {source}" if source else ""
     options = ", ".join(f"{name} {words(value)}" for name, value in gains.items())
     if main is not None:
         instead = {main, *law_of(kind, preset, law).instead.get(main, ())}
         if not instead & set(gains):
-            return TuningNote(f"{_RULE}{f', with {options} given{where}' if gains else ''}", True)
+            return TuningNote(f"{_RULE}{f', with {options} given{source_words}' if gains else ''}", True)
     if gains:
-        return TuningNote(f"gains given{where} ({options}), not tuned by `undertow tune`", False)
+        return TuningNote(f"gains given{source_words} ({options}), not tuned by `undertow tune`", False)
     if (kind, preset) == _TABLE_1:
         return TuningNote("gains of Table 1 of the paper, not tuned for this scenario", False)
     return TuningNote(f"default gains of `{short}`, not tuned", False)
@@ -68,8 +68,8 @@ def _given(
     defaults = inspect.signature(presets[preset] if preset else function).parameters
     law_parameters = law_of(kind, preset, law)
     tunable = [name.partition("[")[0] for name in law_parameters.ranges(dt)]
-    ours = kind in catalogue.names("controllers")
-    ruled = [name for name in tunable[:1] if ours and name in defaults and defaults[name].default is None]
+    in_catalogue = kind in catalogue.names("controllers")
+    ruled = [name for name in tunable[:1] if in_catalogue and name in defaults and defaults[name].default is None]
     names = set(tunable)
     names |= {option for equivalents in law_parameters.instead.values() for option in equivalents}
     gains = [name for name in part if name in names or (not names and name not in _NO_GAINS)]

@@ -66,9 +66,9 @@ class Box(NamedTuple):
         """Departures of points of the unit cube, uniform in the numbers themselves."""
         columns = []
         for axis, share in zip(self.axes, np.asarray(points).T, strict=True):
-            away = axis.low + share * (axis.high - axis.low) - axis.nominal
-            below, above = axis.nominal - axis.low, axis.high - axis.nominal
-            columns.append(np.where(away < 0, away / (below or 1.0), away / (above or 1.0)))
+            offset = axis.low + share * (axis.high - axis.low) - axis.nominal
+            room_below, room_above = axis.nominal - axis.low, axis.high - axis.nominal
+            columns.append(np.where(offset < 0, offset / (room_below or 1.0), offset / (room_above or 1.0)))
         return np.stack(columns, axis=-1)
 
     def to_cube(self, departures: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p k"]:

@@ -80,8 +80,8 @@ class Falsified(NamedTuple):
 
     def repeated(self) -> bool:
         """Whether the run of the counter-example by itself has the same robustness, bit for bit."""
-        alone = judged_alone(self.evaluator.requirements, self.single_runs[-1])
-        return self.violation is not None and alone == self.broken
+        rerun = judged_alone(self.evaluator.requirements, self.single_runs[-1])
+        return self.violation is not None and rerun == self.broken
 
 
 def falsify(
@@ -155,11 +155,11 @@ def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) ->
     return {name: judgement.robustness for name, judgement in judgements.items()}
 
 
-def _kept(evaluator: Evaluator, path: Path, resume: bool, how: tuple[str, int]) -> Robustness:
+def _kept(evaluator: Evaluator, path: Path, resume: bool, search_options: tuple[str, int]) -> Robustness:
     """Robustness of departures with their seeds, from the checkpoint as far as it goes."""
     settings = evaluator.nominal.scenario.falsify.model_dump()
-    about = text_hash(dump({"how": list(how), "falsify": settings, **evaluator.nominal.resolved}))
-    checkpoint = Checkpoint(path, about, np.inf, resume, what="falsification")
+    fingerprint = text_hash(dump({"how": list(search_options), "falsify": settings, **evaluator.nominal.resolved}))
+    checkpoint = Checkpoint(path, fingerprint, np.inf, resume, what="falsification")
 
     def compute(departures: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
         numbers = lambda: np.minimum(evaluator.robustness(departures, seeds), _MOST).tolist()  # JSON has no infinity
@@ -181,8 +181,8 @@ def evaluator_of(text: Text) -> Evaluator:
             raise BadInput("loop.kind", "be sampled for `undertow falsify`", loop.kind)
         box = box_of(settings.vary, built)
         # Metrics of a batch are of every control step.
-        every = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
-        evaluator = Evaluator(every, build(every), box, _required(built, settings))
+        every_step = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
+        evaluator = Evaluator(every_step, build(every_step), box, _required(built, settings))
         for axis in box.axes:
             with within(f"falsify.vary.{axis.key}"):
                 scenario_at(text, {axis.key: axis.high})

@@ -59,8 +59,9 @@ def shrink(
         BudgetSpent: before the search has converged.
     """
     chance = np.random.default_rng(seed)
-    alone = objective.box.size(first) <= 1.0  # one number at its bound
-    for ends in filter(len, (np.concatenate([_smallest(objective).departure[None], first[alone]]), first[~alone])):
+    at_one_bound = objective.box.size(first) <= 1.0  # one number at its bound
+    single_axes = np.concatenate([_smallest(objective).departure[None], first[at_one_bound]])
+    for ends in filter(len, (single_axes, first[~at_one_bound])):
         before = _smallest(objective)
         _along(objective, ends)
         if _smallest(objective) is not before:

@@ -76,8 +76,8 @@ def predicted(op_point: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     start, stop = op_point.built.window()
     settings = op_point.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
-    begun = from_start(op_point.linear, op_point.mean, *_start(op_point))
-    signals = signals_within(op_point.mean, begun, op_point.around, (start, stop), every)
+    transient = from_start(op_point.linear, op_point.mean, *_start(op_point))
+    signals = signals_within(op_point.mean, transient, op_point.around, (start, stop), every)
     forbidden = _forbidden(op_point.built.closed_loop.controller, signals) or _beyond_limits(op_point, signals["u"])
     units = op_point.built.closed_loop.plant.output_units
     return (None, forbidden) if forbidden else (metrics_of(signals, units), "")

@@ -36,30 +36,30 @@ def measure(watch: Watch) -> dict[str, Any]:
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     figures: dict[str, Any] = {"threads": threads, "simd_width": simd_batch.simd_width(64)}
-    lacking = simd_batch.unavailable()
-    if lacking:
-        figures["simd_unavailable"] = lacking
+    why_no_simd = simd_batch.unavailable()
+    if why_no_simd:
+        figures["simd_unavailable"] = why_no_simd
     watch("first results", 0.0)
     figures["first_cold_s"], figures["first_kept_s"] = _first_results()
     with runtime.on_processor():
         watch("W1, one run", 0.1)
         w1 = workload.workload(W1)
-        figures |= {"steps": w1.steps} | ({} if lacking else _single(w1))
+        figures |= {"steps": w1.steps} | ({} if why_no_simd else _single(w1))
         watch("W1, one run, XLA backend", 0.2)
         figures |= _by_xla(w1)
-        if not lacking:
+        if not why_no_simd:
             watch("W2, one run", 0.3)
             w2 = workload.workload(W2)
             second = {"steps": w2.steps} | _single(w2, _REPETITIONS_W2)
             second |= _prefixed("batch_float64_", _batch(w2, threads, _BATCH_W2, _REPETITIONS_W2))
             figures |= _prefixed("w2_", second)
-    for i, kind in enumerate(() if lacking else ("float64", "float32")):
+    for i, kind in enumerate(() if why_no_simd else ("float64", "float32")):
         watch(f"W1, batch, {kind}", 0.5 + 0.2 * i)
         with runtime.in_precision(kind):
             figures |= _many(kind, threads)
     watch("W1 in plain NumPy", 0.9)
     figures["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_STEPS), 1) / _NUMPY_STEPS
-    if not lacking:
+    if not why_no_simd:
         figures["single_times_numpy"] = figures["numpy_ns"] / figures["single_ns"]
         figures["batch_times_scalar"] = figures["single_ns"] / figures["batch_float64_ns"]
     watch("", 1.0)

@@ -69,8 +69,8 @@ def workload(data: Mapping[str, Any]) -> Workload:
 
 def constant(run: LoopRun) -> list[bool]:
     """Which numbers are equal in `several`: all except the initial position."""
-    same = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
-    return jax.tree.leaves(same._replace(start=(False, True)))
+    all_constant = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
+    return jax.tree.leaves(all_constant._replace(start=(False, True)))
 
 
 def several(run: LoopRun, count: int) -> Any:

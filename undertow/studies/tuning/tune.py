@@ -108,21 +108,21 @@ def tune(
         if evaluations < INITIAL_DESIGN:
             raise BadInput("evaluations", f"be at least {INITIAL_DESIGN}, the initial design", evaluations)
         budget = math.inf
-    begun = time.perf_counter() if started is None else started
+    start_time = time.perf_counter() if started is None else started
     say("building")
     task = problem(text)
     counted = {} if evaluations is None else {"evaluations": evaluations}
     settings = {"method": method, "tune": task.built.scenario.tune.model_dump(), **counted}
-    about = text_hash(dump({**settings, **task.built.resolved}))
-    notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
+    fingerprint = text_hash(dump({**settings, **task.built.resolved}))
+    notes = Checkpoint(checkpoint, fingerprint, _FOR_THE_SEARCH * budget, resume, start_time)
     evaluation, certifier = _prepared(task, notes, budget, say)
     tried: dict[str, Certificate] = {}
 
     def certify(point: np.ndarray) -> Certificate:
         pairs = zip(task.parameters, point, strict=True)
-        words = ", ".join(f"{parameter.name} = {parameter.value(share):.3g}" for parameter, share in pairs)
-        tried[words] = certifier(evaluation.law(point))
-        return tried[words]
+        gains_text = ", ".join(f"{parameter.name} = {parameter.value(share):.3g}" for parameter, share in pairs)
+        tried[gains_text] = certifier(evaluation.law(point))
+        return tried[gains_text]
 
     objective = Objective(evaluation, certify, notes, watch, evaluations)
     seed, iterations = task.built.scenario.seed, task.built.scenario.tune.iterations
