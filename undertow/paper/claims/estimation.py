@@ -113,7 +113,8 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Claim
     rafc_error, rcafc_error = (steady(runs[name])["tracking_rms"] for name in (EQUAL_GAIN, "ideal_rcafc"))
     text += f" Its tracking error is {100 * (1 - rafc_error / rcafc_error):.1f} % smaller than that of RCAFC."
     more, more_numbers = sentences(long, metric, unit)
-    numbers, text = numbers | more_numbers, f"{text} {more}"
+    numbers = numbers | more_numbers
+    text = f"{text} {more}"
     simulated = "level ideal, U1, 20 s"
     if rcafc >= rafc:
         return ClaimVerdict("fails", text, "ideal_rcafc", simulated, numbers)

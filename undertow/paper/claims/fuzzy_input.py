@@ -55,7 +55,8 @@ def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
     simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"
     equal_levels, better_levels = [], []
     for level, laws in by_level.items():
-        five_sets, alternatives = laws["error_5"], [laws["error_1"], laws["state_25"]]
+        five_sets = laws["error_5"]
+        alternatives = [laws["error_1"], laws["state_25"]]
         if five_sets is None:
             continue
         limit = _AS_GOOD * five_sets["estimation_rms"]

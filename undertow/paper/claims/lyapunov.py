@@ -51,5 +51,6 @@ def lyapunov_equation(runs: Runs, long: Long) -> ClaimVerdict:
     smallest = float(np.linalg.eigvalsh(p).min())
     text = f"P = {p.tolist()}, smallest eigenvalue {smallest:.3f}, residual {residual:.1g}."
     is_solution = residual <= 1e-12 * np.abs(q).max() and smallest > 0
-    verdict, numbers = "holds" if is_solution else "fails", {"residual": residual, "smallest": smallest}
+    verdict = "holds" if is_solution else "fails"
+    numbers = {"residual": residual, "smallest": smallest}
     return ClaimVerdict(verdict, text, "ideal_rcafc", "algebra, nothing is simulated", numbers)

@@ -76,9 +76,11 @@ def chattering(runs: Runs, long: Long) -> ClaimVerdict:
 
 def perfect_variation(run: ScenarioResult) -> float:
     """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
-    loop, model = run.built.closed_loop, law_of(run).model
+    loop = run.built.closed_loop
+    model = law_of(run).model
     late = run.dataset["reference"].sel(time=slice(*run.built.window()))
-    path, x = loop.realize(jax.random.PRNGKey(0)).disturbance_realization, loop.plant.initial_state()
+    path = loop.realize(jax.random.PRNGKey(0)).disturbance_realization
+    x = loop.plant.initial_state()
 
     @jax.jit
     @jax.vmap

@@ -61,7 +61,8 @@ def _horizons(results: Mapping[str, Any]) -> list[Html]:
 
 def _table(results: Mapping[str, Any]) -> Html:
     windows = results["windows"]
-    rows, last = [], None
+    rows = []
+    last = None
     for row in results["rows"]:
         level = tag("b", row["level"]) if row["level"] != last else ""
         last = row["level"]

@@ -62,7 +62,8 @@ def write_report(
     for (name, plot), (vector, _) in zip(figures.items(), written, strict=True):
         alternative = _alternative(plot, name)
         elements[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
-    page, overview = folder / "report.html", elements.pop("ablations", Html(""))
+    page = folder / "report.html"
+    overview = elements.pop("ablations", Html(""))
     write_whole(page, document(_TITLE, *_content(results, elements)))
     if robust := results.get("robust_variant"):
         second = ablations_page.ablations_page(robust, overview, page.name)

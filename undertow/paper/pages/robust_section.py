@@ -92,7 +92,8 @@ _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "
 
 def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
     """Every controller in every case, with the command that runs it."""
-    table_rows, last = [], None
+    table_rows = []
+    last = None
     for row in rows:
         steady = row["steady"] or {}
         case = tag("b", row["words"]) if row["words"] != last else ""

@@ -35,7 +35,8 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
     }
 
     def finished() -> Chapter:
-        runs, ablation_rows = compared(), [ablation_tasks[entry.id].result() for entry in selected]
+        runs = compared()
+        ablation_rows = [ablation_tasks[entry.id].result() for entry in selected]
         rows = fidelity.table(runs, quick)
         results = {
             "quick": quick,

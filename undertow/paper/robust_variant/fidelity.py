@@ -105,7 +105,8 @@ class ComparedRun(NamedTuple):
 
 def runs(quick: bool) -> list[ComparedRun]:
     """Every law in every setting, from the simplest to the most realistic; quick: the full motor model only."""
-    compared, laws = [], [law for law in LAWS if law != "measured" or not quick]
+    compared = []
+    laws = [law for law in LAWS if law != "measured" or not quick]
     for fidelity in (WHOLE,) if quick else FIDELITIES:
         words = "full motor model, no limit" if fidelity == WHOLE else fidelity
         laws_of_fidelity = [law for law in laws if law != "measured" or fidelity == WHOLE]

@@ -65,7 +65,8 @@ _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "in
 
 def labels(campaign_trials: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
     """Labels of all columns, by name; `built` is one of the trials, `metrics` are those that any of them may have."""
-    columns, dimensions = trial_labels(campaign_trials.campaign, metrics), (*campaign_trials.campaign.axes, SAMPLES)
+    columns = trial_labels(campaign_trials.campaign, metrics)
+    dimensions = (*campaign_trials.campaign.axes, SAMPLES)
     loop = built.closed_loop
     for name in campaign_trials.campaign.series.signals if campaign_trials.campaign.series else ():
         signal = loop.signals()[name]
@@ -81,7 +82,8 @@ def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str,
         f"vary:{key}": {"long_name": key} if entries is None else {"long_name": key, "choices": list(entries)}
         for key, entries in varied_keys(campaign)
     }
-    dimensions, of_trials = (*campaign.axes, SAMPLES), sampled | ALWAYS | of_metrics
+    dimensions = (*campaign.axes, SAMPLES)
+    of_trials = sampled | ALWAYS | of_metrics
     return {name: Label(dimensions, attributes, _DTYPES.get(name, "float64")) for name, attributes in of_trials.items()}
 
 
@@ -97,7 +99,8 @@ def coordinates(campaign_trials: Trials, built: Built) -> dict[str, xr.Variable]
 
 def _swept(entries: dict[str, Any]) -> np.ndarray:
     """The values where they are unnamed numbers or booleans; otherwise their names."""
-    values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
+    values = list(entries.values())
+    named = any(name != words(value) for name, value in entries.items())
     if not named and all(isinstance(value, bool) for value in values):
         return np.array(values)
     return np.array(values, dtype=float) if not named and all(map(is_number, values)) else np.array(list(entries))

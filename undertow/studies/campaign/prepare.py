@@ -52,7 +52,8 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     """
     campaign_trials = trials(campaign, source, allow_code)
     check_kind(campaign_trials.scenario, "scenario", source.where(("scenario",)))
-    text, folder = whole(campaign, campaign_trials.scenario.data), campaign_trials.scenario.folder
+    text = whole(campaign, campaign_trials.scenario.data)
+    folder = campaign_trials.scenario.folder
     context = tasks.site(text, str(folder))
     firsts = [_first(campaign_trials, context, combination) for combination in range(len(campaign_trials.combinations))]
     with within(location=source.location):

@@ -46,7 +46,9 @@ def realized_scalars(campaign_trials: Trials, rows: Sequence[int]) -> dict[str, 
     Returns:
         One value per row: NaN where a trial has no such scalar, or was not built again.
     """
-    part_cache, random, columns = PartCache(), set[str](), dict[tuple[str, str], np.ndarray]()
+    part_cache = PartCache()
+    random = set[str]()
+    columns = dict[tuple[str, str], np.ndarray]()
     probes = {*rows[:1], *campaign_trials.probes()}
     with runtime.on_processor(), contextlib.suppress(BadInput):  # a file that the scenario names may be gone by now
         for index, row in enumerate(rows[:MOST]):
@@ -72,7 +74,8 @@ def _random(built: Built) -> set[str]:
     """Names of the arrays that depend on the seed."""
     if not _realized(built, trace=True):  # which takes no compiling
         return set()
-    scalars, of_other_seeds = _realized(built), [_realized(built, number) for number in _OTHERS]
+    scalars = _realized(built)
+    of_other_seeds = [_realized(built, number) for number in _OTHERS]
     differs = lambda name: any((scalars[name] != realization[name]).any() for realization in of_other_seeds)
     return {name for name in scalars if differs(name)}
 

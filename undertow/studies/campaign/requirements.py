@@ -26,7 +26,8 @@ def formulas_of(campaign: Campaign, built: Built) -> tuple[temporal.Requirement,
     if not campaign.formulas:
         return ()
     with within("requirements"):
-        loop, duration = built.closed_loop, built.scenario.loop.duration
+        loop = built.closed_loop
+        duration = built.scenario.loop.duration
         return temporal.requirements_of(campaign.formulas, {}, loop, {}, duration)
 
 
@@ -83,7 +84,8 @@ def robustness(
     for row, trial in enumerate(built):
         if id(trial) not in required:
             required[id(trial)] = formulas_of(campaign, trial)
-        requirements, loop = required[id(trial)], trial.scenario.loop
+        requirements = required[id(trial)]
+        loop = trial.scenario.loop
         needed = temporal.needed_signals(requirements)
         signals = temporal.contiguous({name: series[name][row] for name in needed}, needed)
         ending = (int(status[row]), float(ended[row]), loop.duration)
@@ -102,7 +104,8 @@ def verdict(rows: xr.Dataset, name: str, required: CampaignRequirement) -> dict[
 
     values = rows[name].values
     keeps = values > 0 if required.below is None else values < required.below
-    passed, count = int(keeps.sum()), max(1, rows.sizes["trial"])
+    passed = int(keeps.sum())
+    count = max(1, rows.sizes["trial"])
     interval = binomtest(passed, count).proportion_ci(_CONFIDENCE, method="exact")
     holds = "holds" if interval.low >= required.share else "fails" if interval.high < required.share else "open"
     return {

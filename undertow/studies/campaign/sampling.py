@@ -50,7 +50,8 @@ class Samples:
         return _entries(self._seeds, _BLOCK, samples)
 
     def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
-        seed, dimensions = self._campaign.seed, len(self._campaign.vary)
+        seed = self._campaign.seed
+        dimensions = len(self._campaign.vary)
         if not dimensions:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":

@@ -39,7 +39,8 @@ def opened(path: Path) -> Any:
     try:
         return zarr.open_group(path, mode="a")
     except Exception as error:  # whatever zarr says of metadata that is no JSON, or not of a group
-        got, hint = f"{path.parent}: zarr.json is damaged ({error})", "Use --overwrite to start again"
+        got = f"{path.parent}: zarr.json is damaged ({error})"
+        hint = "Use --overwrite to start again"
         raise BadInput("--out", "hold a store that can be read", got, hint=hint) from error
 
 

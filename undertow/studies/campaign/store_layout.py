@@ -62,7 +62,8 @@ class StoreLayout(NamedTuple):
 
 def layout(campaign: Campaign) -> StoreLayout:
     """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples."""
-    swept, most = tuple(len(entries) for entries in campaign.axes.values()), campaign.trials_per_task
+    swept = tuple(len(entries) for entries in campaign.axes.values())
+    most = campaign.trials_per_task
     chunk = [min(most, max(campaign.trials, most // math.prod(swept)))]
     for count in reversed(swept):
         chunk.insert(0, min(count, most // math.prod(chunk)) or 1)

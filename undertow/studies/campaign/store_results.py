@@ -119,7 +119,8 @@ def _rows(group: Any, campaign: Campaign, stored: StoreLayout, names: Iterable[s
 
     Arrays may be longer while a process makes room for more samples.
     """
-    axes, region = (*campaign.axes, SAMPLES), tuple(slice(0, size) for size in stored.shape)
+    axes = (*campaign.axes, SAMPLES)
+    region = tuple(slice(0, size) for size in stored.shape)
     arrays = {name: group[name] for name in names if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:

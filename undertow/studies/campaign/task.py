@@ -78,7 +78,8 @@ def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     trials = np.array(rows, dtype=np.int64)
     sampled = context.trials.sampled(trials)
     columns = {f"vary:{key}": column for key, column in _columns(context.trials, sampled)}
-    columns["trial"], columns["seed"] = trials.astype(np.uint32), context.trials.seeds(trials)
+    columns["trial"] = trials.astype(np.uint32)
+    columns["seed"] = context.trials.seeds(trials)
     result_rows: list[int] = []
     criteria: list[Mapping[str, float]] = []
     firsts: list[Built] = []
@@ -161,7 +162,8 @@ def reasons(campaign_trials: Trials, rows: Sequence[int]) -> tuple[InvalidTrials
         campaign_trials: the trials.
         rows: numbers of the invalid trials; only the first 200 are built again.
     """
-    part_cache, messages_by_cause = PartCache(), dict[tuple[str, str], list[str]]()
+    part_cache = PartCache()
+    messages_by_cause = dict[tuple[str, str], list[str]]()
     for row in rows[:_MOST]:
         try:
             build_trial(campaign_trials, part_cache, int(row))

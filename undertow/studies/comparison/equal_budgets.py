@@ -164,7 +164,8 @@ def _with_gains(candidate: Candidate, law: TunedLaw) -> dict[str, Any]:
 
 def _scenario_with(candidate: Candidate, scenario: Text) -> Text:
     """The scenario with the controller of a candidate."""
-    data, part = dict(scenario.data), candidate.changes["controller"]
+    data = dict(scenario.data)
+    part = candidate.changes["controller"]
     tune_section = data.get("tune")
     if isinstance(tune_section, dict) and "parameters" in tune_section:
         scenario_controller = part_of(validate(scenario).controller, scenario.folder)

@@ -154,7 +154,8 @@ def rank_test(pair_differences: np.ndarray) -> float:
 def holm(p_values: Sequence[float]) -> list[float]:
     """p values with the step-down correction of Holm (1979) for all tests that were made; NaN stands for none."""
     tested = [i for i, p in enumerate(p_values) if not math.isnan(p)]
-    corrected, largest = list(p_values), 0.0
+    corrected = list(p_values)
+    largest = 0.0
     # The smallest p is multiplied by the number of tests, the next by one less, and so on; none falls below an earlier.
     for rank, i in enumerate(sorted(tested, key=lambda i: p_values[i])):
         largest = max(largest, min(1.0, (len(tested) - rank) * p_values[i]))

@@ -106,7 +106,8 @@ def prepare_comparison(
     if not campaign.vary and not any(map(_random, _firsts(prepared))):
         prepared, advice = _prepared(campaign.model_copy(update={"trials": 1}), source, allow_code)
         advice += (f"{NOT_RANDOM}. {VARY}",)
-    names, built = tuple(next(iter(campaign.axes.values()))), _firsts(prepared)
+    names = tuple(next(iter(campaign.axes.values())))
+    built = _firsts(prepared)
     pairs = enumerate(zip(built, request.sources, strict=True))
     notes = tuple(_note(prepared, number, trial, file) for number, (trial, file) in pairs)
     if request.budgets is not None:
@@ -124,7 +125,8 @@ def _read_request(
     if tuner is not None and entries is None:
         raise BadInput("--tune", "be given with --controllers, whose gains are tuned", "given without")
     differing: dict[str, list[str]] = {}
-    dimension, path = "controller", None
+    dimension = "controller"
+    path = None
     if not isinstance(sources, Mapping) and len(sources) > 1:
         if entries is not None:
             strays = [str(path) for path in sources[1:] if not path.suffix and not path.exists()]
@@ -212,7 +214,8 @@ def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
 
 def _firsts(prepared: Prepared) -> tuple[Built, ...]:
     """The first valid trial of each candidate."""
-    campaign_trials, probes = prepared.trials, tasks.site(prepared.text, str(prepared.folder)).probes()
+    campaign_trials = prepared.trials
+    probes = tasks.site(prepared.text, str(prepared.folder)).probes()
     return tuple(
         next(probes[row] for row in campaign_trials.first(number) if row in probes)
         for number in range(len(campaign_trials.combinations))

@@ -52,7 +52,8 @@ def step_time(built: Built) -> StepTime:
     if law.takes_raw_readings:
         y = y._replace(health=jnp.ones(plant.inputs()))
     target: Target = loop.reference.at(jnp.zeros(()))
-    applied, interval = jnp.zeros(plant.inputs()), jnp.asarray(dt)
+    applied = jnp.zeros(plant.inputs())
+    interval = jnp.asarray(dt)
     memory, _ = first_step(law, y, target)
 
     def step(numbers: Any, memory: Any, inputs: Any) -> tuple[Any, Any]:
@@ -62,7 +63,8 @@ def step_time(built: Built) -> StepTime:
     compiled = CompiledStep(
         step, copy_arrays(numbers), copy_arrays(memory), copy_arrays((y, target, applied, interval))
     )
-    durations, measurement_start = [], time.perf_counter()
+    durations = []
+    measurement_start = time.perf_counter()
     for _ in range(_BEFORE):
         compiled()
     while len(durations) < _CALLS and time.perf_counter() - measurement_start < _LONGEST:

@@ -41,7 +41,8 @@ def tuning_note(
     if searched is not None:
         return searched
     kind, preset, gains, main = _given(part, law, dt, folder)
-    short, source_words = kind.rpartition("/")[2], f" in {source}" if source else ""
+    short = kind.rpartition("/")[2]
+    source_words = f" in {source}" if source else ""
     options = ", ".join(f"{name} {words(value)}" for name, value in gains.items())
     if main is not None:
         instead = {main, *law_of(kind, preset, law).instead.get(main, ())}

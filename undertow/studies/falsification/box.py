@@ -107,7 +107,8 @@ def box_of(vary: Mapping[str, Bounds], built: Built) -> Box:
 
 def _axis(key: str, bounds: Bounds, built: Built) -> SearchDimension:
     low, high = bounds.between
-    nominal, name = bounds.nominal, f"falsify.vary.{key}"
+    nominal = bounds.nominal
+    name = f"falsify.vary.{key}"
     section = next(iter(key_path(key)), "")
     if section not in _SECTIONS:
         got = f"`{section}`" if section else "empty"

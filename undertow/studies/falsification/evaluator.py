@@ -36,7 +36,8 @@ class Evaluator:
 
     def __init__(self, text: Text, built: Built, box: Box, requirements: Sequence[Requirement]):
         self.text, self.nominal, self.box, self.requirements = text, built, box, tuple(requirements)
-        settings, seed = built.scenario.falsify, built.scenario.seed
+        settings = built.scenario.falsify
+        seed = built.scenario.seed
         self.seeds = [(seed + number) % 2**32 for number in range(settings.seeds)]
         self._part_cache = PartCache()
         loop = built.scenario.loop

@@ -130,7 +130,8 @@ def falsify(
         finished = False
     violation = objective.smallest
     say("running the counter-example by itself" if violation is not None else "running the nominal scenario by itself")
-    broken, runs = dict[str, float](), (run_scenario(evaluator.nominal),)
+    broken = dict[str, float]()
+    runs = (run_scenario(evaluator.nominal),)
     if violation is not None:
         names = [requirement.name for requirement in evaluator.requirements]
         broken = dict(zip(names, evaluator.each(violation.departure[None], [violation.seed])[0].tolist(), strict=True))
@@ -142,7 +143,8 @@ def falsify(
 
 def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) -> dict[str, float]:
     """Robustness of every requirement in one run of a scenario, by name."""
-    loop, names = result.built.scenario.loop, needed_signals(requirements)
+    loop = result.built.scenario.loop
+    names = needed_signals(requirements)
     judgements = judged(
         requirements,
         contiguous(result.outcome.signals, names),

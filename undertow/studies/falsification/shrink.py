@@ -118,7 +118,9 @@ def _descend(
     objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator
 ) -> None:
     """Improve the direction of the smallest violation until no candidate is better."""
-    spread, gradient, at = _WIDE, None, None
+    spread = _WIDE
+    gradient = None
+    at = None
     for _ in range(_ROUNDS):
         best = _smallest(objective)
         if at is not best:
@@ -145,7 +147,8 @@ def _directions(
     box: Box, best: Violation, gradient: np.ndarray | None, spread: float, chance: np.random.Generator
 ) -> Departures:
     """Directions of norm 1 that may meet the boundary nearer to the nominal scenario."""
-    departure, candidates = best.departure, [best.departure]
+    departure = best.departure
+    candidates = [best.departure]
     if gradient is not None and gradient.any():
         # The point nearest to the nominal scenario at which the linearised robustness is zero: the departure x of
         # robustness r with gradient g has the plane g.(y - x) + r = 0, whose point of least norm is along g.

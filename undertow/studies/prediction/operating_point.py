@@ -102,7 +102,8 @@ def _beyond_limits(op_point: OperatingPoint, inputs: np.ndarray) -> str:
     share = size / np.maximum(-low, high)
     if share.max(initial=0.0) <= 1:
         return ""
-    worst, unit = int(share.argmax()), op_point.built.closed_loop.plant.input_unit
+    worst = int(share.argmax())
+    unit = op_point.built.closed_loop.plant.input_unit
     at_rest = op_point.mean.at["u"][worst]
     if share[worst] > _ABSURD and abs(at_rest) < _LITTLE * max(-low[worst], high[worst]):
         return (
@@ -117,7 +118,8 @@ def _beyond_limits(op_point: OperatingPoint, inputs: np.ndarray) -> str:
 
 def input_limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest input that reaches the actuators; infinite without a limit."""
-    plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
+    plant = built.closed_loop.plant
+    x, _ = at.parts.states(at.at)
     ask = as_array(np.full(plant.inputs(), 1e9))
     low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
     return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)

@@ -87,9 +87,11 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
     progress("noise and disturbances", 0.9)
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
     error, estimation = _responses(op_point.linear, frequency)
-    law, names = loop.controller, loop.plant.outputs
+    law = loop.controller
+    names = loop.plant.outputs
     metrics, why_not = predicted(op_point)
-    axes, theory = range(len(names)), theory_of(law)
+    axes = range(len(names))
+    theory = theory_of(law)
     gains = np.asarray(law.model.dynamics.gain(loop.plant.output(as_array(0.0), worst.parts.states(worst.at)[0])))
     return Prediction(
         operating_point=op_point,
@@ -133,7 +135,8 @@ def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
 
 
 def _noise(op_point: OperatingPoint) -> VelocityNoise:
-    dt, axes = op_point.linear.dt, op_point.around.load.shape[1]
+    dt = op_point.linear.dt
+    axes = op_point.around.load.shape[1]
     sampled = margins.closed(op_point.mean, dt)
     velocity_noise = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
     gain = lambda name: margins.noise_gain(sampled, name, velocity_noise) / _NOISE

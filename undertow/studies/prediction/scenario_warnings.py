@@ -39,7 +39,8 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _actuators(prediction: Prediction) -> tuple[str, ...]:
-    warnings, authority = [], prediction.authority
+    warnings = []
+    authority = prediction.authority
     if authority.held < 1:
         warnings.append(
             f"the actuators meet the demand for only {authority.held:.0%} of the time, and give "
@@ -54,7 +55,8 @@ def _actuators(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _sampling(prediction: Prediction) -> tuple[str, ...]:
-    warnings, dt = [], prediction.operating_point.linear.dt
+    warnings = []
+    dt = prediction.operating_point.linear.dt
     law = prediction.operating_point.built.closed_loop.controller
     fastest = max((row[1] for row in prediction.estimators), default=0.0)
     if fastest * dt > _SAMPLED:

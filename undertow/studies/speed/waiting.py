@@ -69,7 +69,8 @@ def waiting_times(
     Raises:
         CalledProcessError: a command failed.
     """
-    times, stages = {}, [*cases, *compared]
+    times = {}
+    stages = [*cases, *compared]
     watch("start of JAX", 0.0)
     times["jax_start_s"] = _seconds(_JAX, Path(), dict(os.environ))[1]
     for i, (name, case) in enumerate(cases.items()):
@@ -104,7 +105,8 @@ def _simulated(folder: Path, settings: dict[str, str], scenario: Mapping[str, An
 
 def _seconds(command: Sequence[str], folder: Path, settings: dict[str, str], until: str = "") -> tuple[float, float]:
     """Seconds until a process prints a line that begins with `until`, and until it ends."""
-    started, printed = time.perf_counter(), float("nan")
+    started = time.perf_counter()
+    printed = float("nan")
     options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
     with subprocess.Popen(command, cwd=folder, env=settings, **options) as process:
         for line in process.stdout or ():

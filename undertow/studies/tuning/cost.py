@@ -60,7 +60,8 @@ class CostSums(AbstractAccumulator):
     def update(self, state: Sums, t: Scalar, signals: Signals) -> Sums:
         inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
         last_t, last_share, last_inside = state.last
-        share, between = signals["input"] / self.input_scale, inside * last_inside
+        share = signals["input"] / self.input_scale
+        between = inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
         return Sums(
             samples=state.samples + inside,

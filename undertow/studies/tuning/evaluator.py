@@ -42,7 +42,8 @@ class Scaled(AbstractDisturbance):
         return self.inner.realize(key)
 
     def at(self, realization, t, pose, load: Load) -> Load:
-        full, size = self.inner.at(realization, t, pose, load), self.size
+        full = self.inner.at(realization, t, pose, load)
+        size = self.size
         water, factors, surface = full.water, full.scaling, full.surface
         return Load(
             acceleration=load.acceleration + size * (full.acceleration - load.acceleration),

@@ -76,7 +76,9 @@ def _problem(text: Text, built: Built) -> Problem:
     loop, scenario, tune = built.closed_loop, built.scenario, built.scenario.tune
     if scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind)
-    tunable, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.coordinates.angles
+    tunable = _law_of(built)
+    dt = scenario.loop.dt
+    angles = loop.controller.model.coordinates.angles
     function, base_options = _controller(text, built)
     chosen = _parameters(tunable, function, base_options, tune, dt, angles)
     train, held_out = training_and_held_out(text, built)
@@ -127,7 +129,8 @@ def _parameters(
     dt: float,
     angles: tuple[bool, ...],
 ) -> list[TunableParameter]:
-    ranges, options = tune.parameters or tunable.ranges(dt), list(inspect.signature(function).parameters)[1:]
+    ranges = tune.parameters or tunable.ranges(dt)
+    options = list(inspect.signature(function).parameters)[1:]
     if not ranges:
         raise BadInput(
             "tune.parameters", "be given: this controller has no ranges of its own", hint=_example(base_options)

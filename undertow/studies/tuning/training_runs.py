@@ -70,7 +70,8 @@ def trials(
         key: key of `tune`, for messages.
         first_seed: first seed; the others follow.
     """
-    names, published = tuple(runs.sets if runs.sets is not None else default), parameter_sets(built)
+    names = tuple(runs.sets if runs.sets is not None else default)
+    published = parameter_sets(built)
     for i, name in enumerate(names):
         if not published:
             raise BadInput(f"tune.{key}.sets", "be left out: there is only one parameter set", list(names))

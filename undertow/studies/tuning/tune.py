@@ -132,7 +132,8 @@ def tune(
     finished = True
     with contextlib.suppress(OutOfTime):
         objective.costs(points[AT_ONCE:])
-    designed, start = objective.evaluations, objective.best
+    designed = objective.evaluations
+    start = objective.best
     if start is None:
         with within(location=text.location):
             raise no_certificate(certifier(evaluation.law(task.start)), tried, designed)
@@ -145,7 +146,8 @@ def tune(
         else:
             search(objective, np.array(start.point), iterations, seed)
         while evaluations is not None:  # until they are used up
-            at, seed = objective.best or start, (seed + 1) % 2**32
+            at = objective.best or start
+            seed = (seed + 1) % 2**32
             evolve(objective, np.array(at.point), at.cost, iterations, seed)
     except OutOfTime:
         finished = evaluations is not None
@@ -191,7 +193,8 @@ def _prepared(
         BadInput: the budget ends before they are; they go on in their threads until the process ends.
     """
     say("compiling")
-    evaluation, threads = _evaluation(task), runtime.workers(2)
+    evaluation = _evaluation(task)
+    threads = runtime.workers(2)
     program, certifier = threads.submit(evaluation.compile), threads.submit(_certifier, task)
     try:
         notes.wait(program, "compiling", say)
