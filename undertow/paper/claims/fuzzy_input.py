@@ -42,10 +42,10 @@ def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
     levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
     by_level = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
-    sentences = [
-        f"{level}: " + "; ".join(f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS)
-        for level in levels
-    ]
+    sentences = []
+    for level in levels:
+        of_laws = [f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS]
+        sentences.append(f"{level}: {'; '.join(of_laws)}")
     text = (
         f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, "
         "since its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering "

@@ -49,10 +49,8 @@ def conclusions(compared: Rows, ablations: Rows) -> dict[str, list[str]]:
         KeyError: a sentence uses an ablation, a variant or a row that does not exist.
     """
     numbers = Numbers(compared, ablations)
-    return {
-        kind: [text for sentence in sentences if (text := _text_of(sentence, numbers))]
-        for kind, sentences in _KINDS.items()
-    }
+    texts = {kind: [_text_of(sentence, numbers) for sentence in sentences] for kind, sentences in _KINDS.items()}
+    return {kind: list(filter(None, of_kind)) for kind, of_kind in texts.items()}
 
 
 def _text_of(sentence, numbers: Numbers) -> str:

@@ -79,10 +79,11 @@ def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[s
         defined = np.isfinite(column) & np.isfinite(values)
         groups = [defined & (numbers == number) for number in np.unique(numbers)]
         pairs = [(column[group], values[group]) for group in groups]
+        # Without three points, or where one of the two is constant, there is no rank correlation.
         coefficients = [
-            float(spearmanr(*pair)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
-            for pair in pairs
-            if all(len(variable) > 2 and np.ptp(variable) > 0 for variable in pair)
+            float(spearmanr(x, y)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
+            for x, y in pairs
+            if len(x) > 2 and np.ptp(x) > 0 and np.ptp(y) > 0
         ]
         if coefficients:
             by_input.setdefault(key, {})[name] = sum(coefficients) / len(coefficients)

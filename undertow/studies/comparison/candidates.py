@@ -83,14 +83,16 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candi
     resolved = [build(text).resolved for text in texts]
     flat_scenarios = [_flat(data) for data in resolved]
     keys = dict.fromkeys(key for data in flat_scenarios for key in data)
-    different = [key for key in keys if any(data.get(key) != flat_scenarios[0].get(key) for data in flat_scenarios)]
+    differs = lambda key: any(data.get(key) != flat_scenarios[0].get(key) for data in flat_scenarios)
+    different = [key for key in keys if differs(key)]
     stems = [path.stem for path in paths]
     names = [f"{path.parent.name}/{path.stem}" if stems.count(path.stem) > 1 else path.stem for path in paths]
     # A scenario may be without metrics of its own, faults and a supervisor.
-    candidates = [
-        Candidate(name, {key: data.get(key, None if key == "supervisor" else []) for key in different}, path)
-        for name, data, path in zip(names, flat_scenarios, paths, strict=True)
-    ]
+    empty_values = {key: None if key == "supervisor" else [] for key in different}
+    candidates = []
+    for name, data, path in zip(names, flat_scenarios, paths, strict=True):
+        changes = {key: data.get(key, empty_values[key]) for key in different}
+        candidates.append(Candidate(name, changes, path))
     return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(candidates), _differing(texts)
 
 
