@@ -22,20 +22,22 @@ def with_all_outputs(metrics: Mapping[str, Any] | None) -> Any:
     """
     if metrics is None:
         return None
-    of = lambda names: {name: metrics[f"{one}_axes"] for name, one in names.items() if f"{one}_axes" in metrics}
+    of = lambda names: {
+        name: metrics[f"{metric}_axes"] for name, metric in names.items() if f"{metric}_axes" in metrics
+    }
     rms = {name: float(np.sqrt(np.mean(np.square(axes)))) for name, axes in of(_RMS).items()}
     return {**metrics, **rms} | {name: float(np.max(axes)) for name, axes in of(_PEAK).items()}
 
 
 def of_columns(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The same from metrics of many runs, of groups of equal size: outputs in m and, for a vehicle, in rad."""
-    found = {}
-    for name, one in (_RMS | _PEAK).items():
-        groups = [columns[each] for group in _GROUPS if (each := of_group(group, one)) in columns]
+    combined = {}
+    for name, metric in (_RMS | _PEAK).items():
+        groups = [columns[column] for group in _GROUPS if (column := of_group(group, metric)) in columns]
         defined = [group for group in groups if not np.isnan(group).all()] or groups
         if defined:
-            found[name] = np.sqrt(np.mean(np.square(defined), axis=0)) if name in _RMS else np.max(defined, axis=0)
-    return found
+            combined[name] = np.sqrt(np.mean(np.square(defined), axis=0)) if name in _RMS else np.max(defined, axis=0)
+    return combined
 
 
 def unit_of(metric: str) -> str:

@@ -33,18 +33,18 @@ _BIN = 200  # samples of 1 ms over which chattering is computed
 
 def scenarios() -> dict[str, dict[str, Any]]:
     """Both runs, by name."""
-    found = {}
+    by_name = {}
     for name, words, bound in (("free", "weights free", float("inf")), ("bounded", "weights within 20", BOUND)):
-        one = scenario(
+        data = scenario(
             f"Table 1 with a lag of {1e3 * LAG:g} ms, {words}: one sinusoid per axis",
             fidelity="electromechanical",
             controller={"weights_bound": bound},
             disturbance=STATIONARY,
             loop={"kind": "sampled", "duration": _SECONDS, "record": 1e-3},
         )
-        one["plant"]["thruster"] = lag_thruster(LAG)
-        found[f"drifting_{name}"] = one
-    return found
+        data["plant"]["thruster"] = lag_thruster(LAG)
+        by_name[f"drifting_{name}"] = data
+    return by_name
 
 
 def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchedRun]]:
@@ -54,16 +54,16 @@ def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchedRun]]:
     return begin_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"), tasks)
 
 
-def shown(found: Mapping[str, BatchedRun]) -> dict[str, Any]:
+def shown(batched_runs: Mapping[str, BatchedRun]) -> dict[str, Any]:
     """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop needs.
 
     Args:
-        found: both runs.
+        batched_runs: both, by name.
     """
-    law = law_of(found["drifting_free"])
+    law = law_of(batched_runs["drifting_free"])
     between = stable_gains(lambda gain: lag_matrix(law, LAG, drifted=gain), 6000.0)
-    runs = {name.removeprefix("drifting_"): _curves(run) for name, run in found.items()}
-    bounded = gain_bound(law_of(found["drifting_bounded"]))
+    runs = {name.removeprefix("drifting_"): _curves(run) for name, run in batched_runs.items()}
+    bounded = gain_bound(law_of(batched_runs["drifting_bounded"]))
     return {"lag": LAG, "needed": between and between[0], "bounded_gain": bounded, "runs": runs}
 
 

@@ -46,11 +46,11 @@ def table2(runs: Mapping[str, ScenarioResult]) -> dict[str, Any]:
 
 def fidelity(runs: Mapping[str, ScenarioResult]) -> dict[str, Any]:
     """Both controllers at Table 1 gains at every fidelity level: how each run ended, when and why."""
-    found = {}
+    by_level = {}
     for level in FIDELITIES:
-        both = {name: runs[f"{level}_{name}"] for name in CONTROLLERS}
-        found[level] = {name: _metrics(run) | {"why": _why(run, level)} for name, run in both.items()}
-    return found
+        runs_of_level = {name: runs[f"{level}_{name}"] for name in CONTROLLERS}
+        by_level[level] = {name: _metrics(run) | {"why": _why(run, level)} for name, run in runs_of_level.items()}
+    return by_level
 
 
 def _metrics(run: ScenarioResult) -> dict[str, Any]:

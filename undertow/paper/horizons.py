@@ -47,7 +47,7 @@ def sampled(seconds: float, substeps: int = 1) -> dict[str, Any]:
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     """Every long run, by name."""
-    return {name: one for name, (_, one) in _runs(quick).items()}
+    return {name: data for name, (_, data) in _runs(quick).items()}
 
 
 def table(long: Long, quick: bool) -> list[dict[str, Any]]:
@@ -57,10 +57,10 @@ def table(long: Long, quick: bool) -> list[dict[str, Any]]:
 
 def described(name: str, facts: dict[str, Any], run: BatchedRun) -> dict[str, Any]:
     """A row of results.json: description of a run, its ending, metrics by window, growth of its weights."""
-    over = lambda metric: [None if found is None else found[metric] for found in run.windows]
+    over = lambda metric: [None if window_metrics is None else window_metrics[metric] for window_metrics in run.windows]
     peaks = run.series["weights_peak"]
-    kept = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
-    reached = [found for found in run.windows if found is not None]
+    indices = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
+    reached = [window_metrics for window_metrics in run.windows if window_metrics is not None]
     success = judged(DEFAULT, reached[-1]) if run.lasted and reached else None
     return facts | {
         "scenario": f"scenarios/{name}.yaml",
@@ -72,7 +72,7 @@ def described(name: str, facts: dict[str, Any], run: BatchedRun) -> dict[str, An
         "estimation_rms": over("estimation_rms"),
         "input_variation": over("input_variation"),
         "weights_peak": over("weights_peak"),
-        "growth": {"time": run.time[kept].tolist(), "weights_peak": peaks[kept].tolist()},
+        "growth": {"time": run.time[indices].tolist(), "weights_peak": peaks[indices].tolist()},
     }
 
 
@@ -91,7 +91,7 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
     }
     swept = {f"composite_{value:g}": (f"gamma_eps {value:g}", value, {}) for value in _SWEEP}
     one_rule = {"one_rule": ("one rule, gamma_eps 5", 5.0, {"sets": 1})}
-    found = {}
+    runs = {}
     for level in FIDELITIES[2:] if quick else FIDELITIES:
         more = swept | one_rule if level == WHOLE and not quick else {}
         for law, (words, composite, gains) in (laws | more).items():
@@ -99,13 +99,13 @@ def _runs(quick: bool) -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
                 name = name_of(level, law, bounded)
                 words_too = f"{words}, weights within {BOUND:g}" if bounded else words
                 facts = {"level": level, "law": law, "words": words_too, "composite": composite, "bounded": bounded}
-                found[name] = (facts, _scenario(words_too, level, quick, composite, gains, bounded))
+                runs[name] = (facts, _scenario(words_too, level, quick, composite, gains, bounded))
         if not quick:
             name = name_of(level, "robust")
             facts = {"level": level, "law": "robust", "words": "robust", "composite": None, "bounded": True}
-            one = _scenario("preset robust", level, quick, 0.0, {}, False)
-            found[name] = (facts, one | {"controller": {"kind": "rcaf", "preset": "robust"}})
-    return found
+            data = _scenario("preset robust", level, quick, 0.0, {}, False)
+            runs[name] = (facts, data | {"controller": {"kind": "rcaf", "preset": "robust"}})
+    return runs
 
 
 def _scenario(words: str, level: str, quick: bool, composite: float, gains: dict, bounded: bool) -> dict[str, Any]:

@@ -74,15 +74,15 @@ def _name(kind: str, value: float, law: str) -> str:
 def _scenario(kind: str, value: float, law: str, quick: bool) -> dict[str, Any]:
     words, options = _LAWS[law]
     seconds = duration(quick) if law == "five" else min(duration(quick), _SHORT)
-    behind = f"a lag of {1e3 * value:g} ms" if kind == "lag" else f"a winding of {1e3 * value:g} mH"
-    one = scenario(
-        f"Table 1 with {words} and {behind}, suite U2 for {seconds:g} s",
+    dynamics = f"a lag of {1e3 * value:g} ms" if kind == "lag" else f"a winding of {1e3 * value:g} mH"
+    data = scenario(
+        f"Table 1 with {words} and {dynamics}, suite U2 for {seconds:g} s",
         fidelity="electromechanical",
         controller=options,
         disturbance={"kind": "u2"},
         loop=sampled(seconds, substeps=1 if kind == "lag" else 2),
     )
-    one["plant"]["thruster"] = (
-        lag_thruster(value) if kind == "lag" else one["plant"]["thruster"] | {"inductance": value}
+    data["plant"]["thruster"] = (
+        lag_thruster(value) if kind == "lag" else data["plant"]["thruster"] | {"inductance": value}
     )
-    return one
+    return data

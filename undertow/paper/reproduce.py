@@ -65,6 +65,6 @@ def reproduce(folder: Path, quick: bool, progress: Callable[[str, float], None],
         "drifting": drifting.shown(of_drift()),
         "claims": claims.audit(runs, long),
     }
-    results["robust_variant"], more = of_chapter()
+    results["robust_variant"], chapter_runs = of_chapter()
     write_whole(folder / "results.json", to_json(results, indent=1) + "\n")
-    return Reproduction(results, runs | more, thruster_response())
+    return Reproduction(results, runs | chapter_runs, thruster_response())

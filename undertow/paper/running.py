@@ -51,13 +51,13 @@ def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], 
     write_all(scenarios, folder)
     (folder / "runs").mkdir(exist_ok=True)
     # The adaptive integrator takes longest to compile, once for all of them: it begins before others are built.
-    adaptive = {name: one for name, one in scenarios.items() if one["loop"].get("method") == "adaptive"}
+    adaptive = {name: data for name, data in scenarios.items() if data["loop"].get("method") == "adaptive"}
     pieces = [tasks.begin(f"ran {_words(adaptive)}", _one_by_one, _built(adaptive), folder)] if adaptive else []
-    built = _built({name: one for name, one in scenarios.items() if name not in adaptive})
+    built = _built({name: data for name, data in scenarios.items() if name not in adaptive})
     names = list(built)
-    for group in ProgramCache().groups(_recorded(one) for one in built.values()):
-        own = {names[place]: built[names[place]] for place in group.places}
-        pieces.append(tasks.begin(f"ran {_words(own)}", _executed, group, own, folder))
+    for group in ProgramCache().groups(_recorded(built_scenario) for built_scenario in built.values()):
+        group_scenarios = {names[index]: built[names[index]] for index in group.places}
+        pieces.append(tasks.begin(f"ran {_words(group_scenarios)}", _executed, group, group_scenarios, folder))
 
     def finished() -> dict[str, ScenarioResult]:
         results = {name: result for piece in pieces for name, result in piece.result().items()}
@@ -114,22 +114,26 @@ def begin_batches(
     """
     built = _built(scenarios)
     names = list(built)
-    runs = [prepare(one, signals, every, _gathered(one, windows)) for one in built.values()]
+    runs = [
+        prepare(built_scenario, signals, every, _gathered(built_scenario, windows)) for built_scenario in built.values()
+    ]
     pieces = []
     for group in ProgramCache().groups(runs):
-        words = _words([names[place] for place in group.places])
+        words = _words([names[index] for index in group.places])
         pieces.append(tasks.begin(f"ran {words}", run_group, group))
 
     def finished() -> dict[str, BatchedRun]:
         batches = [batch for piece in pieces for batch in piece.result()]
-        outcomes = {names[place]: outcome for batch in batches for place, outcome in batch.each()}
-        return {name: _ran(one, outcomes[name], windows) for name, one in built.items()}
+        outcomes = {names[index]: outcome for batch in batches for index, outcome in batch.each()}
+        return {name: _ran(built_scenario, outcomes[name], windows) for name, built_scenario in built.items()}
 
     return finished
 
 
 def _gathered(built: Built, windows: Sequence[Window]) -> Gathered:
-    return tuple(one for window in windows for one in accumulators(built.closed_loop.plant, (), *window))
+    return tuple(
+        accumulator for window in windows for accumulator in accumulators(built.closed_loop.plant, (), *window)
+    )
 
 
 def _words(runs: Collection[str]) -> str:
@@ -149,7 +153,7 @@ def _recorded(built: Built) -> PreparedRun:
 
 def _one_by_one(built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
     """Runs, written to `runs/`."""
-    return {name: _saved(name, run_scenario(one), folder) for name, one in built.items()}
+    return {name: _saved(name, run_scenario(built_scenario), folder) for name, built_scenario in built.items()}
 
 
 def _executed(group: RunGroup, built: Mapping[str, Built], folder: Path) -> dict[str, ScenarioResult]:
@@ -158,13 +162,13 @@ def _executed(group: RunGroup, built: Mapping[str, Built], folder: Path) -> dict
         batches = run_group(group)
     except Unsupported:
         return _one_by_one(built, folder)
-    names = {int(place): name for place, name in zip(group.places, built, strict=True)}
-    found = {}
+    names = {int(index): name for index, name in zip(group.places, built, strict=True)}
+    results = {}
     for batch in batches:
-        for place, outcome in batch.each():
-            one = built[names[place]]
-            found[names[place]] = _saved(names[place], _finished(one, outcome, batch), folder)
-    return found
+        for index, outcome in batch.each():
+            built_scenario = built[names[index]]
+            results[names[index]] = _saved(names[index], _finished(built_scenario, outcome, batch), folder)
+    return results
 
 
 def _finished(built: Built, outcome: Outcome, batch: BatchResult) -> ScenarioResult:
@@ -175,16 +179,19 @@ def _finished(built: Built, outcome: Outcome, batch: BatchResult) -> ScenarioRes
         return finished(built, outcome, batch.left_to_xla, gathered_of(built))
 
 
-def _saved(name: str, one: ScenarioResult, folder: Path) -> ScenarioResult:
-    save(shortened(one.dataset, _KEPT), folder / "runs" / f"{name}.nc")
-    return one
+def _saved(name: str, result: ScenarioResult, folder: Path) -> ScenarioResult:
+    save(shortened(result.dataset, _KEPT), folder / "runs" / f"{name}.nc")
+    return result
 
 
 def _ran(built: Built, outcome: Outcome, windows: Sequence[Window]) -> BatchedRun:
     status, end = Status(int(outcome.status)), float(outcome.ended)
-    each = zip(_gathered(built, windows), outcome.accumulated, windows, strict=True)
-    metrics = [with_all_outputs(results((one,), (state,))) if end >= stop else None for one, state, (_, stop) in each]
+    columns = zip(_gathered(built, windows), outcome.accumulated, windows, strict=True)
+    metrics = [
+        with_all_outputs(results((accumulator,), (state,))) if end >= stop else None
+        for accumulator, state, (_, stop) in columns
+    ]
     time = np.asarray(outcome.time)
-    kept = time <= end
-    series = {name: np.asarray(values)[kept] for name, values in outcome.signals.items()}
-    return BatchedRun(built, status, end, metrics, series, time[kept])
+    valid = time <= end
+    series = {name: np.asarray(values)[valid] for name, values in outcome.signals.items()}
+    return BatchedRun(built, status, end, metrics, series, time[valid])

@@ -82,8 +82,8 @@ def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
 
     def step(state, t):
         volts = voltage(t)
-        seen = (t, volts[0], thruster.thrust(state, volts)[0], thruster.current(state, volts)[0])
-        return rk4(field, t, state, dt), seen
+        sample = (t, volts[0], thruster.thrust(state, volts)[0], thruster.current(state, volts)[0])
+        return rk4(field, t, state, dt), sample
 
     times = dt * jnp.arange(_PERIODS * _STEPS, dtype=dt.dtype)
     return jax.lax.scan(step, thruster.initial_state(1), times)[1]
@@ -91,11 +91,11 @@ def _actuators(thruster: AbstractThruster, frequency: Float[Array, ""]):
 
 def _law(text: str, unit: str, pick, long: Period, short: Period) -> MemorylessFit:
     """Least squares through the origin on the long period: output = coefficient * input."""
-    given, measured = pick(long)
-    coefficient = float(given @ measured / (given @ given))
+    inputs, measured = pick(long)
+    coefficient = float(inputs @ measured / (inputs @ inputs))
 
     def error(period: Period) -> float:
-        given, measured = pick(period)
-        return float(100 * np.sqrt(np.mean((measured - coefficient * given) ** 2) / np.mean(measured**2)))
+        inputs, measured = pick(period)
+        return float(100 * np.sqrt(np.mean((measured - coefficient * inputs) ** 2) / np.mean(measured**2)))
 
     return MemorylessFit(text, coefficient, unit, error(long), error(short))

@@ -48,10 +48,10 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
     Raises:
         KeyError: the verdict needs a variant that the campaign does not have.
     """
-    found: dict[str, Variant] = {}
+    by_name: dict[str, Variant] = {}
     for name in ablation.campaigns:
-        found |= dict(variants(_FOLDER / f"{name}.yaml", ablation.metrics, quick, folder))
-    verdict = ablation.judge(found)
+        by_name |= dict(variants(_FOLDER / f"{name}.yaml", ablation.metrics, quick, folder))
+    verdict = ablation.judge(by_name)
     return {
         "id": ablation.id,
         "question": read_campaign(_FOLDER / f"{ablation.campaigns[0]}.yaml")[0].description,
@@ -60,7 +60,7 @@ def run(ablation: Ablation, quick: bool, folder: Path | None = None) -> dict[str
         "answer": verdict.text,
         "left_out": ablation.left_out,
         "campaigns": list(ablation.campaigns),
-        "variants": [{"name": name, **one._asdict()} for name, one in found.items()],
+        "variants": [{"name": name, **variant._asdict()} for name, variant in by_name.items()],
     }
 
 
@@ -76,24 +76,25 @@ def variants(
     campaign, text = read_campaign(path)
     if quick:
         campaign = campaign.model_copy(update={"trials": QUICK_SEEDS})
-    several = trials(campaign, text)
-    asked = whole(campaign, several.scenario.data)
+    campaign_trials = trials(campaign, text)
+    campaign_text = whole(campaign, campaign_trials.scenario.data)
     if folder is not None:
         (folder / "campaigns").mkdir(parents=True, exist_ok=True)
-        write_whole(folder / "campaigns" / path.name, asked)
-    columns = task.run_trials(asked, str(several.scenario.folder), range(several.number))
+        write_whole(folder / "campaigns" / path.name, campaign_text)
+    columns = task.run_trials(campaign_text, str(campaign_trials.scenario.folder), range(campaign_trials.number))
     if (columns["status"] == task.INVALID).any():
-        build_trial(several, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
+        build_trial(campaign_trials, PartCache(), int(np.argmax(columns["status"] == task.INVALID)))  # raises the error
     names = list(itertools.product(*campaign.axes.values()))
     for i, name in enumerate(names):
-        own = {key: values[i :: len(names)] for key, values in columns.items()}
-        lasted = own["status"] == int(Status.OK)
-        own |= all_outputs.of_columns(own)
-        own["share"] = own["estimation_rms"] / np.where(own["uncertainty_rms"] > 0, own["uncertainty_rms"], np.nan)
-        defined = [metric for metric in metrics if not np.isnan(own[metric][lasted]).all() or not lasted.any()]
-        kept = {metric: spread(np.where(lasted, own[metric], np.inf)) for metric in defined}
-        settings = ", ".join(f"{key}: {words(value)}" for key, value in several.values(i).items())
-        yield ", ".join(name), Variant(settings or "Table 1", lasted.size, int((~lasted).sum()), kept)
+        of_variant = {key: values[i :: len(names)] for key, values in columns.items()}
+        lasted = of_variant["status"] == int(Status.OK)
+        of_variant |= all_outputs.of_columns(of_variant)
+        uncertainty = of_variant["uncertainty_rms"]
+        of_variant["share"] = of_variant["estimation_rms"] / np.where(uncertainty > 0, uncertainty, np.nan)
+        defined = [metric for metric in metrics if not np.isnan(of_variant[metric][lasted]).all() or not lasted.any()]
+        spreads = {metric: spread(np.where(lasted, of_variant[metric], np.inf)) for metric in defined}
+        settings = ", ".join(f"{key}: {words(value)}" for key, value in campaign_trials.values(i).items())
+        yield ", ".join(name), Variant(settings or "Table 1", lasted.size, int((~lasted).sum()), spreads)
 
 
 def unit_of(metric: str) -> str:

@@ -23,12 +23,12 @@ from undertow.scenario.results.run_result import ScenarioResult
 
 def scenarios(quick: bool) -> Scenarios:
     """Runs of the audit besides the examples, by name; fewer points of the sweeps when quick."""
-    return {name: one for claim in CLAIMS for name, one in claim.scenarios(quick).items()}
+    return {name: scenario for claim in CLAIMS for name, scenario in claim.scenarios(quick).items()}
 
 
 def batched(quick: bool) -> Scenarios:
     """Sampled scenarios of which metrics are enough, by name."""
-    return {name: one for claim in CLAIMS for name, one in claim.batched(quick).items()}
+    return {name: scenario for claim in CLAIMS for name, scenario in claim.batched(quick).items()}
 
 
 def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchedRun]) -> list[dict[str, Any]]:
@@ -38,10 +38,12 @@ def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchedRun]) ->
         runs: runs of `scenarios` and of the examples.
         long: runs of `batched`, of the long horizon and of the map of lags.
     """
-    found = []
+    rows = []
     for claim in CLAIMS:
         finding = claim.judge(runs, long)
-        said = {"verdict": finding.verdict, "evidence": finding.evidence, "simulated": finding.simulated}
-        shown = f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None
-        found.append({"id": claim.id, "claim": claim.text, **said, "scenario": shown, "numbers": dict(finding.numbers)})
-    return found
+        judgement = {"verdict": finding.verdict, "evidence": finding.evidence, "simulated": finding.simulated}
+        scenario_file = f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None
+        about = {"id": claim.id, "claim": claim.text}
+        numbers = dict(finding.numbers)
+        rows.append({**about, **judgement, "scenario": scenario_file, "numbers": numbers})
+    return rows

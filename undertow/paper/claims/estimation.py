@@ -20,7 +20,8 @@ _LAWS: dict[str, tuple[str, float, dict[str, Any]]] = {
 
 def _conditions(quick: bool) -> dict[str, dict[str, Any]]:
     """Example 1 at 1 kHz with limited voltages, and with noise of 1 cm/s on the velocities."""
-    found, load = {}, {"kind": "u2"}  # U1 for 20 s, as in the long runs, so that they share a program
+    by_name = {}
+    load = {"kind": "u2"}  # U1 for 20 s, as in the long runs, so that they share a program
     for law, (words, composite, gains) in _LAWS.items():
         common = {
             "composite": composite,
@@ -29,12 +30,12 @@ def _conditions(quick: bool) -> dict[str, dict[str, Any]]:
             "disturbance": load,
         }
         for volts in LIMITS:
-            one = scenario(f"{words}, voltages limited to {volts:g} V", **common)
-            one["plant"]["thruster"]["supply"] = volts
-            found[_limited(law, volts)] = one
+            limited_scenario = scenario(f"{words}, voltages limited to {volts:g} V", **common)
+            limited_scenario["plant"]["thruster"]["supply"] = volts
+            by_name[_limited(law, volts)] = limited_scenario
         noise = {"kind": "white_noise", "velocity": NOISE}
-        found[_noisy(law)] = scenario(f"{words}, 1 cm/s of velocity noise", navigation=noise, **common)
-    return found
+        by_name[_noisy(law)] = scenario(f"{words}, 1 cm/s of velocity noise", navigation=noise, **common)
+    return by_name
 
 
 def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
@@ -42,7 +43,7 @@ def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
     limited = {law: [_steady(long[_limited(law, volts)], metric) for volts in LIMITS] for law in _LAWS}
     tracking = {law: [_shown(long[_limited(law, volts)]) for volts in LIMITS] for law in _LAWS}
     noisy = {law: _steady(long[_noisy(law)], metric) for law in _LAWS}
-    volts = ", ".join(f"{one:g}" for one in LIMITS)
+    volts = ", ".join(f"{limit:g}" for limit in LIMITS)
     text = (
         f"This is so with unlimited voltages and exact velocities. With limits of {volts} V (1 kHz) RCAFC tracks "
         f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because "
@@ -75,8 +76,8 @@ def _noisy(law: str) -> str:
 
 
 def _steady(run: BatchedRun, metric: str) -> float | None:
-    found = run.windows[0]
-    return None if found is None else found[metric]
+    metrics = run.windows[0]
+    return None if metrics is None else metrics[metric]
 
 
 def _shown(run: BatchedRun) -> str:
@@ -109,21 +110,24 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Claim
     """Verdict on `RCAFC has a smaller <metric> than RAFC`."""
     text, numbers = at_table_1(runs, metric, what, unit)
     rcafc, rafc, fair = numbers.values()
-    own, other = (steady(runs[name])["tracking_rms"] for name in (EQUAL_GAIN, "ideal_rcafc"))
-    text += f" Its tracking error is {100 * (1 - own / other):.1f} % smaller than that of RCAFC."
-    more, found = sentences(long, metric, unit)
-    numbers, text = numbers | found, f"{text} {more}"
+    rafc_error, rcafc_error = (steady(runs[name])["tracking_rms"] for name in (EQUAL_GAIN, "ideal_rcafc"))
+    text += f" Its tracking error is {100 * (1 - rafc_error / rcafc_error):.1f} % smaller than that of RCAFC."
+    more, more_numbers = sentences(long, metric, unit)
+    numbers = numbers | more_numbers
+    text = f"{text} {more}"
     simulated = "level ideal, U1, 20 s"
     if rcafc >= rafc:
         return ClaimVerdict("fails", text, "ideal_rcafc", simulated, numbers)
     if rcafc < fair:
         return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
-    where = []
+    conditions = []
     if lost_by_limits(long):
-        where.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
+        conditions.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
     if worse_by_noise(long, metric):
-        where.append("velocities are noisy (1 cm/s)")
-    else_where = f"; at equal loop gain only where {' or '.join(where)}" if where else "; not at equal loop gain"
+        conditions.append("velocities are noisy (1 cm/s)")
+    else_where = (
+        f"; at equal loop gain only where {' or '.join(conditions)}" if conditions else "; not at equal loop gain"
+    )
     return ClaimVerdict(f"holds if both use the gamma of Table 1{else_where}", text, EQUAL_GAIN, simulated, numbers)
 
 

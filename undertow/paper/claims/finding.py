@@ -43,7 +43,7 @@ def claim(
 
     def register(judge: Callable[[Runs, Any], ClaimVerdict]) -> Callable[[Runs, Any], ClaimVerdict]:
         CLAIMS.append(Claim(id, text, judge, scenarios, batched))
-        CLAIMS.sort(key=lambda one: int(one.id[1:]))
+        CLAIMS.sort(key=lambda entry: int(entry.id[1:]))
         return judge
 
     return register

@@ -38,10 +38,11 @@ def frequency(runs: Runs, long: Long) -> ClaimVerdict:
     sweep = {controller: _sweep(runs, controller) for controller in CONTROLLERS}
     points = list(zip(sweep["rcafc"]["frequency"], sweep["rcafc"]["measured"], strict=True))
     crossing, predicted = _crossing(points), crossing_frequency(law_of(runs["ideal_rcafc"]))
-    below, above = points[0], points[-1]
+    lowest, highest = points[0], points[-1]
     text = (
-        f"The error of the estimate is {100 * below[1]:.2g} % of d at {below[0]:g} rad/s and {100 * above[1]:.0f} % at "
-        f"{above[0]:g} rad/s. From {crossing:.0f} rad/s on (theory: {predicted:.0f}) it is worse than no estimate."
+        f"The error of the estimate is {100 * lowest[1]:.2g} % of d at {lowest[0]:g} rad/s and "
+        f"{100 * highest[1]:.0f} % at {highest[0]:g} rad/s. From {crossing:.0f} rad/s on "
+        f"(theory: {predicted:.0f}) it is worse than no estimate."
     )
     numbers = {"sweep": sweep, "crossing_measured": crossing, "crossing_predicted": predicted}
     verdict = f"holds if d stays well below {crossing:.0f} rad/s"
@@ -57,8 +58,8 @@ def _sweep(runs: Runs, controller: str) -> dict[str, Any]:
     points = []
     for i, block in enumerate(_SWEEP):
         if _name(controller, i) in runs:
-            found = steady(runs[_name(controller, i)])
-            ratios = np.divide(found["estimation_rms_axes"], found["uncertainty_rms_axes"])
+            metrics = steady(runs[_name(controller, i)])
+            ratios = np.divide(metrics["estimation_rms_axes"], metrics["uncertainty_rms_axes"])
             points += zip(block, ratios.tolist(), strict=True)
     points.sort()
     curve = np.geomspace(0.5, 500.0, 120)

@@ -41,32 +41,35 @@ def fuzzy_input(runs: Runs, long: Long) -> ClaimVerdict:
     """Estimation error and chattering at every fidelity level; at the printed gamma at `ideal`."""
     same_gamma = steady(runs["table2_rcafc_state"])["estimation_rms"], steady(runs["ideal_rcafc"])["estimation_rms"]
     levels = [level for level in FIDELITIES if _name(level, "error_5") in long]
-    found = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
-    said = [
-        f"{level}: " + "; ".join(f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS)
-        for level in levels
-    ]
+    by_level = {level: {law: _metrics(long[_name(level, law)]) for law in _LAWS} for level in levels}
+    sentences = []
+    for level in levels:
+        of_laws = [f"{_LAWS[law][0]} {_shown(long[_name(level, law)])}" for law in _LAWS]
+        sentences.append(f"{level}: {'; '.join(of_laws)}")
     text = (
         f"At the same gamma the state has {same_gamma[0] / same_gamma[1]:.2g} times the estimation error at ideal, "
         "since its loop gain is smaller. At the same loop gain, rms estimation error in m/s^2 and chattering "
-        f"from 10 s to 20 s of U1, 1 kHz: {'. '.join(said)}."
+        f"from 10 s to 20 s of U1, 1 kHz: {'. '.join(sentences)}."
     )
-    numbers = {"same_gamma": list(same_gamma), "levels": found}
+    numbers = {"same_gamma": list(same_gamma), "levels": by_level}
     simulated = f"levels {', '.join(levels)}, U1 at 1 kHz, 20 s"
-    alike, better = [], []
-    for level, laws in found.items():
-        own, others = laws["error_5"], [laws["error_1"], laws["state_25"]]
-        if own is None:
+    equal_levels, better_levels = [], []
+    for level, laws in by_level.items():
+        five_sets = laws["error_5"]
+        alternatives = [laws["error_1"], laws["state_25"]]
+        if five_sets is None:
             continue
-        if all(other and other["estimation_rms"] <= _AS_GOOD * own["estimation_rms"] for other in others):
-            alike.append(level)
-        elif not any(other and other["estimation_rms"] <= _AS_GOOD * own["estimation_rms"] for other in others):
-            better.append(level)
-    if not better:
+        limit = _AS_GOOD * five_sets["estimation_rms"]
+        as_good = [bool(metrics) and metrics["estimation_rms"] <= limit for metrics in alternatives]
+        if all(as_good):
+            equal_levels.append(level)
+        elif not any(as_good):
+            better_levels.append(level)
+    if not better_levels:
         return ClaimVerdict("fails", text, _name(levels[0], "state_25"), simulated, numbers)
-    verdict = f"holds if the thruster lags (level {' and '.join(better)}) and with five sets, not one"
-    verdict += f"; at the same loop gain it makes no difference at {' and '.join(alike)}" if alike else ""
-    return ClaimVerdict(verdict, text, _name(better[0], "error_1"), simulated, numbers)
+    verdict = f"holds if the thruster lags (level {' and '.join(better_levels)}) and with five sets, not one"
+    verdict += f"; at the same loop gain it makes no difference at {' and '.join(equal_levels)}" if equal_levels else ""
+    return ClaimVerdict(verdict, text, _name(better_levels[0], "error_1"), simulated, numbers)
 
 
 def _name(level: str, law: str) -> str:
@@ -74,12 +77,12 @@ def _name(level: str, law: str) -> str:
 
 
 def _metrics(run: BatchedRun) -> dict[str, float] | None:
-    found = run.windows[0]
-    return found and {metric: found[metric] for metric in ("tracking_rms", "estimation_rms", "input_variation")}
+    metrics = run.windows[0]
+    return metrics and {metric: metrics[metric] for metric in ("tracking_rms", "estimation_rms", "input_variation")}
 
 
 def _shown(run: BatchedRun) -> str:
-    found = _metrics(run)
-    if found is None:
+    metrics = _metrics(run)
+    if metrics is None:
         return f"ends at {run.ended:.2g} s"
-    return f"{found['estimation_rms']:.3g} ({found['input_variation']:.3g} V/s)"
+    return f"{metrics['estimation_rms']:.3g} ({metrics['input_variation']:.3g} V/s)"

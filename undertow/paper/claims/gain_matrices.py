@@ -52,12 +52,12 @@ def gain_matrices(runs: Runs, long: Long) -> ClaimVerdict:
         plant = plant_of(run)
         count, rank = plant.inputs(), plant.rank()
         numbers[key] = error = tracking_error(run)
-        shown = (
+        result = (
             f"ends at {float(run.outcome.ended):.1f} s ({run.status.word.replace('_', ' ')})"
             if error is None
             else f"{error:.2g}"
         )
-        parts.append(f"{count} thrusters, rank {rank}: {shown}")
+        parts.append(f"{count} thrusters, rank {rank}: {result}")
         if error is None or error > 10 * everything:
             failed.append((count, rank))
     text = "Tracking rms, m and rad, from 10 s on: " + "; ".join(parts) + "."

@@ -27,8 +27,8 @@ def _lyapunov_function_decreases_scenarios(quick: bool) -> dict:
 def lyapunov_function_decreases(runs: Runs, long: Long) -> ClaimVerdict:
     """Share of 10 ms steps at which V_f grows: constant d with theta* = d, and suite U1 with the minimax theta*."""
     law = law_of(runs["ideal_rcafc"])
-    judged = {"constant": runs["c12_constant"], "u1": runs["ideal_rcafc"]}
-    steps = {name: share_increasing(of_set_point(law, run.dataset)) for name, run in judged.items()}
+    run_by_load = {"constant": runs["c12_constant"], "u1": runs["ideal_rcafc"]}
+    steps = {name: share_increasing(of_set_point(law, run.dataset)) for name, run in run_by_load.items()}
     text = (
         f"Constant d: V_f grows at {100 * steps['constant']:.2g} % of the 10 ms steps. Suite U1, with the best "
         f"constant theta*: at {100 * steps['u1']:.0f} %. The bound needs omega_bar > |omega|, half the "
@@ -50,6 +50,7 @@ def lyapunov_equation(runs: Runs, long: Long) -> ClaimVerdict:
     residual = float(np.abs(a.T @ p + p @ a + q).max())
     smallest = float(np.linalg.eigvalsh(p).min())
     text = f"P = {p.tolist()}, smallest eigenvalue {smallest:.3f}, residual {residual:.1g}."
-    good = residual <= 1e-12 * np.abs(q).max() and smallest > 0
-    verdict, numbers = "holds" if good else "fails", {"residual": residual, "smallest": smallest}
+    is_solution = residual <= 1e-12 * np.abs(q).max() and smallest > 0
+    verdict = "holds" if is_solution else "fails"
+    numbers = {"residual": residual, "smallest": smallest}
     return ClaimVerdict(verdict, text, "ideal_rcafc", "algebra, nothing is simulated", numbers)

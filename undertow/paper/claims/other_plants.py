@@ -62,12 +62,14 @@ def other_plants(runs: Runs, long: Long) -> ClaimVerdict:
         numbers["levitation_ideal"] = tracking_error(runs[_IDEAL])
         text += f" With coils without lag, {min(_GAPS)} mm: {_shown(runs[_IDEAL], 'm')}."
     lost = [lag for lag, gap in coils if runs[_at(gap)].status is not Status.OK]
-    kept = [lag for lag, _ in coils if not lost or lag < lost[0]]
-    if runs[_PENDULUM].status is not Status.OK or not kept:
-        return ClaimVerdict("fails", text, _PENDULUM if kept else _at(coils[0][1]), _SIMULATED, numbers)
+    tolerated = [lag for lag, _ in coils if not lost or lag < lost[0]]
+    if runs[_PENDULUM].status is not Status.OK or not tolerated:
+        return ClaimVerdict("fails", text, _PENDULUM if tolerated else _at(coils[0][1]), _SIMULATED, numbers)
     if not lost:
         return ClaimVerdict("holds", text, _PENDULUM, _SIMULATED, numbers)
-    verdict = f"holds if the actuator lags by no more than {1e3 * kept[-1]:.1f} ms; not with {1e3 * lost[0]:.1f} ms"
+    verdict = (
+        f"holds if the actuator lags by no more than {1e3 * tolerated[-1]:.1f} ms; not with {1e3 * lost[0]:.1f} ms"
+    )
     return ClaimVerdict(verdict, text, next(_at(gap) for lag, gap in coils if lag == lost[0]), _SIMULATED, numbers)
 
 

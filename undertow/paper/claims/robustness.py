@@ -34,9 +34,9 @@ def _robustness_scenarios(quick: bool) -> dict:
     starts = {
         f"c10_start_{i + 1}": scenario(
             f"RCAFC from random start {i + 1}",
-            initial={"position": (one[0] * reach).round(3).tolist(), "velocity": (0.5 * one[1]).round(3).tolist()},
+            initial={"position": (state[0] * reach).round(3).tolist(), "velocity": (0.5 * state[1]).round(3).tolist()},
         )
-        for i, one in enumerate(samples)
+        for i, state in enumerate(samples)
     }
     if quick:
         gains = dict(list(gains.items())[:2])

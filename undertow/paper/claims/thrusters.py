@@ -40,12 +40,13 @@ def speed_sensor(runs: Runs, long: Long) -> ClaimVerdict:
         f"{100 * (without / with_sensor - 1):.0f} % more. "
     )
     shaft = long[name_of("shaft", "rcafc")]
-    if (found := shaft.windows[0]) is not None:
-        numbers["tracking_rms_shaft"] = found["tracking_rms"]
+    if (shaft_metrics := shaft.windows[0]) is not None:
+        numbers["tracking_rms_shaft"] = shaft_metrics["tracking_rms"]
         text += (
-            f"Without, and with a rotor that has inertia (shaft): {found['tracking_rms']:.3g}, but with "
-            f"{found['input_variation']:.0f} V/s of chattering and weights up to {found['weights_peak']:.0f}; there "
-            "the sensor is useless, since Eq. (23) becomes an algebraic loop of gain 1. "
+            f"Without, and with a rotor that has inertia (shaft): {shaft_metrics['tracking_rms']:.3g}, but with "
+            f"{shaft_metrics['input_variation']:.0f} V/s of chattering and weights up to "
+            f"{shaft_metrics['weights_peak']:.0f}; there the sensor is useless, since Eq. (23) becomes an algebraic "
+            "loop of gain 1. "
         )
     for name, run in full.items():
         if run.status is Status.OK:

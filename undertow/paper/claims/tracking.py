@@ -16,37 +16,37 @@ _SMALL = 1e-3  # m, rad; rms
 def tracking(runs: Runs, long: Long) -> ClaimVerdict:
     """At every fidelity level, for 20 s and for the long horizon; and against the inductance of the winding."""
     lasting = {level: long[name] for level in FIDELITIES if (name := name_of(level, "rcafc")) in long}
-    short = {level: one.windows[0] for level, one in lasting.items()}
-    horizon = max(one.built.scenario.loop.duration for one in lasting.values())
-    said = []
+    short = {level: run.windows[0] for level, run in lasting.items()}
+    horizon = max(run.built.scenario.loop.duration for run in lasting.values())
+    sentences = []
     for level, run in lasting.items():
-        found, last = run.windows[0], run.windows[-1]
-        if found is None:
-            said.append(f"{level}: ends at {run.ended:.2f} s")
+        metrics, last = run.windows[0], run.windows[-1]
+        if metrics is None:
+            sentences.append(f"{level}: ends at {run.ended:.2f} s")
             continue
         ending = "lasts" if run.lasted else f"ends at {run.ended:.0f} s"
         late = f", {last['tracking_rms']:.2g} at its end" if last else ""
-        said.append(
-            f"{level}: {found['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {found['input_variation']:.0f} "
+        sentences.append(
+            f"{level}: {metrics['tracking_rms']:.2g} m and rad rms at 10 to 20 s with {metrics['input_variation']:.0f} "
             f"V/s of chattering, {ending}{late}"
         )
-    kept = {value: run for value, run in windings(long).items() if run.windows[0] is not None}
+    survived = {value: run for value, run in windings(long).items() if run.windows[0] is not None}
     lost = {value: run for value, run in windings(long).items() if run.windows[0] is None}
-    text = f"RCAFC at Table 1, 1 kHz, U2 for {horizon:g} s. " + "; ".join(said) + ". Inductance of the winding: "
+    text = f"RCAFC at Table 1, 1 kHz, U2 for {horizon:g} s. " + "; ".join(sentences) + ". Inductance of the winding: "
     text += ", ".join(f"{1e3 * value:g} mH {_ending(run)}" for value, run in windings(long).items())
     text += " (Table 3: 10 mH). With a lag only, weights that drift apart add damping, unknown to the theorem."
     numbers = {
-        "tracking_rms_short": {level: found and found["tracking_rms"] for level, found in short.items()},
+        "tracking_rms_short": {level: metrics and metrics["tracking_rms"] for level, metrics in short.items()},
         "ended": {level: None if run.lasted else run.ended for level, run in lasting.items()},
         "windings_ended": {f"{value:g}": None if run.lasted else run.ended for value, run in windings(long).items()},
     }
     simulated = f"levels {', '.join(lasting)}, U2 at 1 kHz, {horizon:g} s"
-    good = [level for level, found in short.items() if found and found["tracking_rms"] < _SMALL]
+    good = [level for level, metrics in short.items() if metrics and metrics["tracking_rms"] < _SMALL]
     if len(good) == len(short) and not lost:
         return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
     if not good:
         return ClaimVerdict("fails", text, "electromechanical_rcafc", simulated, numbers)
-    verdict = f"holds if the winding has at most {1e3 * max(kept, default=0):g} mH and 20 s are enough"
+    verdict = f"holds if the winding has at most {1e3 * max(survived, default=0):g} mH and 20 s are enough"
     early = [f"{level} ends at {run.ended:.0f} s" for level, run in lasting.items() if level in good and not run.lasted]
     completed = [level for level in good if lasting[level].lasted]
     verdict += f"; for {horizon:g} s only at fidelity {' and '.join(completed)}" if completed else ""
@@ -76,9 +76,11 @@ def chattering(runs: Runs, long: Long) -> ClaimVerdict:
 
 def perfect_variation(run: ScenarioResult) -> float:
     """Total variation, V/s, of the voltages that cancel the prescribed d at the goal, over the steady window."""
-    loop, model = run.built.closed_loop, law_of(run).model
+    loop = run.built.closed_loop
+    model = law_of(run).model
     late = run.dataset["reference"].sel(time=slice(*run.built.window()))
-    path, x = loop.realize(jax.random.PRNGKey(0)).disturbance_realization, loop.plant.initial_state()
+    path = loop.realize(jax.random.PRNGKey(0)).disturbance_realization
+    x = loop.plant.initial_state()
 
     @jax.jit
     @jax.vmap

@@ -25,39 +25,39 @@ def ablations_figure(ablations: Sequence[Ablation]) -> Figure:
         ablations: `id` and `variants`, each with `name`, `failures`, `seeds` and `metrics`.
     """
     columns = _packed(ablations)
-    tall = max((sum(_height(one) for one in column) for column in columns), default=0.5)
+    tall = max((sum(_height(ablation) for ablation in column) for column in columns), default=0.5)
     figure = style.blank(9.6, 0.35 + tall)
     style.head(figure, "Ablations: the metric named above each panel, over the seeds", {})
     for number, column in enumerate(columns):
         top = 0.35
-        for one in column:
-            rows = len(one["variants"])
+        for ablation in column:
+            rows = len(ablation["variants"])
             panel = style.place(figure, number * _WIDTH + _LABELS + 0.12, top + _ABOVE, _PANEL, _ROW * rows)
-            _panel(panel, one)
-            top += _height(one)
+            _panel(panel, ablation)
+            top += _height(ablation)
     return figure
 
 
-def _height(one: Ablation) -> float:
-    return _ABOVE + _ROW * len(one["variants"]) + _BELOW
+def _height(ablation: Ablation) -> float:
+    return _ABOVE + _ROW * len(ablation["variants"]) + _BELOW
 
 
 def _packed(ablations: Sequence[Ablation]) -> list[list[Ablation]]:
     """In reading order down the columns, about equally tall."""
-    whole = sum(map(_height, ablations))
+    total_height = sum(map(_height, ablations))
     columns: list[list[Ablation]] = [[] for _ in range(_COLUMNS)]
     passed = 0.0
-    for one in ablations:
-        middle = passed + _height(one) / 2
-        columns[min(int(_COLUMNS * middle / whole), _COLUMNS - 1)].append(one)
-        passed += _height(one)
+    for ablation in ablations:
+        middle = passed + _height(ablation) / 2
+        columns[min(int(_COLUMNS * middle / total_height), _COLUMNS - 1)].append(ablation)
+        passed += _height(ablation)
     return columns
 
 
-def _panel(panel: Axes, one: Ablation) -> None:
-    metric = next(iter(one["variants"][0]["metrics"]))
+def _panel(panel: Axes, ablation: Ablation) -> None:
+    metric = next(iter(ablation["variants"][0]["metrics"]))
     panel.set_xscale("log")
-    for row, variant in enumerate(one["variants"]):
+    for row, variant in enumerate(ablation["variants"]):
         spread = variant["metrics"][metric]
         median = spread["median"]
         if not np.isfinite(median) or median <= 0:
@@ -76,11 +76,11 @@ def _panel(panel: Axes, one: Ablation) -> None:
     low, high = panel.get_xlim()
     panel.set_xlim(low / 1.5, high * 1.5)
     style.few_log_ticks(panel.xaxis, most=4)
-    names = [variant["name"] for variant in one["variants"]]
+    names = [variant["name"] for variant in ablation["variants"]]
     panel.set_yticks(range(len(names)), names, fontsize=style.TINY - 1)
     panel.set_ylim(len(names) - 0.5, -0.5)
     panel.tick_params(axis="x", labelsize=style.TINY)
-    title = f"{one['id']}  {metric.replace('_', ' ')}, {style.power(unit_of(metric))}".removesuffix(", ")
+    title = f"{ablation['id']}  {metric.replace('_', ' ')}, {style.power(unit_of(metric))}".removesuffix(", ")
     panel.set_title(title, fontsize=style.TINY + 0.5, loc="left", y=1, pad=2)
 
 

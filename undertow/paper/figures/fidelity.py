@@ -68,12 +68,12 @@ def _metric(panel: Axes, levels: Mapping[str, Mapping[str, Any]], metric: str) -
         entries = [levels[fidelity].get(key) or {} for fidelity in fidelities]
         values = [(entry.get("steady") or {}).get(metric, np.nan) for entry in entries]
         panel.plot(range(len(fidelities)), values, **look.line, marker=style.MARKS[key], markersize=4, label=name)
-        for place, entry in enumerate(entries):
+        for position, entry in enumerate(entries):
             if entry and not entry.get("steady"):
                 top = panel.get_xaxis_transform()
-                panel.plot(place, 0.93, "X", transform=top, color=look.colour, markersize=6)
+                panel.plot(position, 0.93, "X", transform=top, color=look.colour, markersize=6)
                 words = {"transform": top, "fontsize": style.TINY, "ha": "right", "va": "center"}
-                panel.text(place - 0.15, 0.93, f"{name} {ending(entry)}", **words)
+                panel.text(position - 0.15, 0.93, f"{name} {ending(entry)}", **words)
     panel.set_xticks(
         range(len(fidelities)), [fidelity.replace("electromechanical", "electro-\nmech.") for fidelity in fidelities]
     )
@@ -110,41 +110,41 @@ def robust_fidelity_figure(rows: Rows, datasets: Mapping[tuple[str, str], xr.Dat
         rows: `place`, `words`, `law`, `status`, `diverged_at` and `steady` of each run.
         datasets: runs by place and law; missing ones are not plotted.
     """
-    places = list(dict.fromkeys(row["place"] for row in rows))
-    shown = [place for place in _CASES if any(place == where for where, _ in datasets)]
-    tall = 1.75 if shown else 0.0
-    figure = style.blank(9.6, 1.05 + tall + 0.27 * len(places) + 0.35)
+    cases = list(dict.fromkeys(row["place"] for row in rows))
+    plotted_cases = [case for case in _CASES if any(case == where for where, _ in datasets)]
+    tall = 1.75 if plotted_cases else 0.0
+    figure = style.blank(9.6, 1.05 + tall + 0.27 * len(cases) + 0.35)
     style.head(figure, "The robust variant on every fidelity level", {})
     laws = dict(_LAWS[row["law"]][:2] for row in rows)
     style.key(figure, laws, 0.28, len(laws))
-    for number, place in enumerate(shown):
+    for number, case in enumerate(plotted_cases):
         panel = style.place(figure, 0.56 + 2.38 * number, 0.8, 1.75, 1.2)
         panel.set_yscale("log", nonpositive="mask")
         style.few_log_ticks(panel.yaxis)
-        for law in (law for where, law in datasets if where == place):
+        for law in (law for where, law in datasets if where == case):
             name, look, _ = _LAWS[law]
-            _error(panel, datasets[place, law], look, name)
-        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", _CASES[place])
-    panel = style.place(figure, 3.3, 0.82 + tall, 6.0, 0.27 * len(places))
-    _dots(panel, places, rows)
+            _error(panel, datasets[case, law], look, name)
+        style.label(panel, "time, s", "|error| rms, m and rad" if number == 0 else "", _CASES[case])
+    panel = style.place(figure, 3.3, 0.82 + tall, 6.0, 0.27 * len(cases))
+    _dots(panel, cases, rows)
     style.label(panel, "tracking error rms over the second half, m and rad; cross: ended early")
     return figure
 
 
-def _dots(panel: Axes, places: Sequence[str], rows: Rows) -> None:
+def _dots(panel: Axes, cases: Sequence[str], rows: Rows) -> None:
     panel.set_xscale("log")
     style.few_log_ticks(panel.xaxis, most=8)
     words = {row["place"]: row["words"] for row in rows}
     for row in rows:
         _, look, mark = _LAWS[row["law"]]
-        height = places.index(row["place"])
+        height = cases.index(row["place"])
         if row["steady"]:
             marked = {"color": look.colour, "markerfacecolor": "white", "markersize": 5.5, "zorder": look.order}
             panel.plot(row["steady"]["tracking_rms"], height, mark, **marked)
         else:
             panel.plot(0.985, height, "X", transform=panel.get_yaxis_transform(), color=look.colour, markersize=6)
-    panel.set_yticks(range(len(places)), [_wrapped(words[place]) for place in places], fontsize=style.SMALL)
-    panel.set_ylim(len(places) - 0.5, -0.5)
+    panel.set_yticks(range(len(cases)), [_wrapped(words[case]) for case in cases], fontsize=style.SMALL)
+    panel.set_ylim(len(cases) - 0.5, -0.5)
     low, high = panel.get_xlim()
     panel.set_xlim(low, high * 3)  # room for what ended early
 

@@ -71,12 +71,12 @@ def _survival(panel: Axes, rows: Rows, duration: float) -> None:
     panel.set_yscale("log")
     swept = sorted({row["composite"] for row in rows if _of_the_sweep(row)})
     for row in filter(_of_the_sweep, rows):
-        place = swept.index(row["composite"]) + (0.16 if row["bounded"] else -0.16)
+        position = swept.index(row["composite"]) + (0.16 if row["bounded"] else -0.16)
         colour = _BOUNDED.colour if row["bounded"] else style.SOLID.colour
         at = duration if row["lasted"] else row["ended"]
-        panel.plot([place, place], [0.3, at], color=colour, linewidth=6, solid_capstyle="butt", zorder=2)
+        panel.plot([position, position], [0.3, at], color=colour, linewidth=6, solid_capstyle="butt", zorder=2)
         words = "completed" if row["lasted"] else f"{round_time(row['ended'])} s"
-        panel.text(place, at * 1.15, words, fontsize=style.TINY, ha="center", va="bottom")
+        panel.text(position, at * 1.15, words, fontsize=style.TINY, ha="center", va="bottom")
     panel.set_xticks(range(len(swept)), [f"{value:g}" for value in swept])
     panel.set_xlim(-0.6, len(swept) - 0.4)
     panel.set_ylim(0.3, duration * 6)

@@ -63,11 +63,11 @@ def _metric(panel: Axes, rows: Rows, metric: str, dashes: Sequence[Any]) -> None
     _logarithmic(panel)
     for law, (_, colour, mark) in _LAWS.items():
         for number, look in enumerate(dashes):
-            shown = [(1e3 * row["value"], row[metric][number]) for row in _of(rows, law=law)]
-            shown = [(x, y) for x, y in shown if y is not None]
-            if shown:
+            points = [(1e3 * row["value"], row[metric][number]) for row in _of(rows, law=law)]
+            points = [(x, y) for x, y in points if y is not None]
+            if points:
                 panel.plot(
-                    *zip(*shown, strict=True),
+                    *zip(*points, strict=True),
                     mark,
                     color=colour,
                     linestyle=look,
@@ -91,28 +91,28 @@ def _life(panel: Axes, rows: Rows, longest: float) -> None:
 _LOOKS = {"free": ("weights free", style.SOLID), "bounded": ("weights within 20", style.DASHED)}
 
 
-def drifting_figure(shown: Mapping[str, Any]) -> Figure:
+def drifting_figure(drifting: Mapping[str, Any]) -> Figure:
     """Three panels.
 
     Args:
-        shown: `lag` (s), `needed` (the gain c that the linearised loop requires, 1/s), and `runs`: by name
+        drifting: `lag` (s), `needed` (the gain c that the linearised loop requires, 1/s), and `runs`: by name
             (free, bounded) `time`, `gain` by axis, `input_variation` and `tracking`.
     """
     figure = style.blank(9.6, 2.5)
     needed = style.Look("#000000", (0, (1, 1.8)), 1.1, 4)
     keys = dict(_LOOKS.values()) | {"c at which the linearised loop is stable": needed}
-    style.head(figure, f"Behind a lag of {1e3 * shown['lag']:g} ms", keys)
+    style.head(figure, f"Behind a lag of {1e3 * drifting['lag']:g} ms", keys)
     titles = ("gain c of each axis, 1/s", "voltage variation, V/s", "|error| rms, m and rad")
     panels = [style.place(figure, 0.56 + 3.1 * number, 0.62, 2.45, 1.35) for number in range(3)]
-    for name, run in shown["runs"].items():
+    for name, run in drifting["runs"].items():
         _, look = _LOOKS[name]
         plain = {"color": look.colour, "linestyle": look.dashes, "linewidth": look.width}
         for gain in run["gain"]:
             panels[0].plot(run["time"], gain, **plain)
         panels[1].plot(run["time"], run["input_variation"], **plain)
         panels[2].plot(run["time"], run["tracking"], **plain)
-    if shown["needed"] is not None:
-        panels[0].axhline(shown["needed"], color=needed.colour, linestyle=needed.dashes, linewidth=needed.width)
+    if drifting["needed"] is not None:
+        panels[0].axhline(drifting["needed"], color=needed.colour, linestyle=needed.dashes, linewidth=needed.width)
     for panel, title in zip(panels, titles, strict=True):
         style.label(panel, "time, s", "", title, style.TINY)
     for panel in panels[1:]:

@@ -123,13 +123,16 @@ def identification(title: str, run: xr.Dataset) -> Figure:
     """Fig. 11."""
     state = recorded.curve(run, "state $x$", "position", STATE)
     model = recorded.curve(run, r"series-parallel state $\hat{x}$", "predicted_position", MODEL)
-    apart = recorded.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
-    apart = apart._replace(values=1000 * apart.values)
+    model_error = recorded.difference(run, r"$\hat{x} - x$", "predicted_position", "position", APART)
+    model_error = model_error._replace(values=1000 * model_error.values)
     thousandths = [text.replace(", ", ", m") for text in recorded.per_axis(run, r"$\hat{x} - x$")]
     return small_multiples(
         title,
         axis_names(run),
-        [Block([state, model], recorded.places(run), height=1.1, titled=True), Block([apart], thousandths, height=0.9)],
+        [
+            Block([state, model], recorded.places(run), height=1.1, titled=True),
+            Block([model_error], thousandths, height=0.9),
+        ],
     )
 
 
@@ -185,14 +188,14 @@ def paper_figures(
         example2: runs of Example 2; as in the paper, only `rcafc` is plotted.
         response: the response of the thruster to a slow and a fast voltage.
     """
-    both = {key: example1[key] for key in ("rcafc", "rafc")}
+    of_controllers = {key: example1[key] for key in ("rcafc", "rafc")}
     alone = {"rcafc": example2["rcafc"]}
     return {
         "fig02": thruster_laws(response),
-        "fig06": tracking("Fig. 6  Example 1: tracking", both),
-        "fig07": uncertainty("Fig. 7  Example 1: lumped uncertainty and its estimates", both),
-        "fig08": robust_term("Fig. 8  Example 1: robust term", both),
-        "fig09": effort("Fig. 9  Example 1: control voltages", both),
+        "fig06": tracking("Fig. 6  Example 1: tracking", of_controllers),
+        "fig07": uncertainty("Fig. 7  Example 1: lumped uncertainty and its estimates", of_controllers),
+        "fig08": robust_term("Fig. 8  Example 1: robust term", of_controllers),
+        "fig09": effort("Fig. 9  Example 1: control voltages", of_controllers),
         "fig10": tracking("Fig. 10  Example 2: tracking", alone),
         "fig11": identification("Fig. 11  Example 2: state and series-parallel state", alone["rcafc"]),
         "fig12": uncertainty("Fig. 12  Example 2: lumped uncertainty and its estimate", alone),

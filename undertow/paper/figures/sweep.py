@@ -16,12 +16,12 @@ def sweep_figure(sweep: Mapping[str, Mapping[str, Sequence[float]] | Any]) -> Fi
             `theory_frequency` (rad/s) and `theory` where there is a prediction.
     """
     figure = style.blank(9.6, 3.7)
-    shown = {key: look for key, look in style.CONTROLLERS.items() if key in sweep}
+    looks = {key: look for key, look in style.CONTROLLERS.items() if key in sweep}
     style.head(figure, "Estimation error against frequency", {})
     panel = style.place(figure, 0.62, 0.55, 8.75, 2.7)
     panel.set_xscale("log")
     panel.set_yscale("log")
-    for key, (name, look) in shown.items():
+    for key, (name, look) in looks.items():
         points = sweep[key]
         if points.get("theory"):
             wider = look._replace(width=look.width + 0.2)

@@ -25,85 +25,86 @@ _COLOURS = (
 Ablation = Mapping[str, Any]
 
 
-def ablations_page(found: Mapping[str, Any], overview: Html, report: str) -> str:
+def ablations_page(results: Mapping[str, Any], overview: Html, report: str) -> str:
     """The whole page.
 
     Args:
-        found: `robust_variant` of results.json.
+        results: `robust_variant` of results.json.
         overview: the figure of all ablations; empty where there is none.
         report: name of the page that it belongs to.
     """
-    ablations = found["ablations"]
+    ablations = results["ablations"]
     back = tag("nav", tag("a", "Report: reproduction of the paper and check of its claims", href=report))
     return document(
         TITLE,
         tag("h1", TITLE),
         back,
-        tag("p", prose(_how(found)), class_="lead"),
+        tag("p", prose(_how(results)), class_="lead"),
         section("verdicts", "Verdicts", tag("p", prose(_COLOURS)), answers_table(ablations), overview),
-        *(_ablation(one) for one in ablations),
+        *(_ablation(ablation) for ablation in ablations),
     )
 
 
-def _how(found: Mapping[str, Any]) -> str:
+def _how(results: Mapping[str, Any]) -> str:
     text = (
-        f"One element is changed at a time. Disturbances, noise and failures are random, with {found['seeds']} seeds "
+        f"One element is changed at a time. Disturbances, noise and failures are random, with {results['seeds']} seeds "
         "that are the same for every variant; gains were tuned on other seeds. Statistics are those of the second half "
         "of each run. A run that ended early counts as infinite."
     )
-    return f"{text}{left_out(found)}"
+    return f"{text}{left_out(results)}"
 
 
-def left_out(found: Mapping[str, Any]) -> str:
+def left_out(results: Mapping[str, Any]) -> str:
     """A sentence on what a quick report lacks; empty otherwise."""
-    if not found["left_out"]:
+    if not results["left_out"]:
         return ""
-    return f" This quick report uses fewer seeds and leaves out {', '.join(found['left_out'])}."
+    return f" This quick report uses fewer seeds and leaves out {', '.join(results['left_out'])}."
 
 
-def verdict(one: Ablation) -> Html:
+def verdict(ablation: Ablation) -> Html:
     """Whether the prediction of the theory holds, coloured."""
-    return tag("span", f"as predicted: {one['agrees']}", class_=f"chip {_KINDS[one['agrees']]}")
+    return tag("span", f"as predicted: {ablation['agrees']}", class_=f"chip {_KINDS[ablation['agrees']]}")
 
 
 def answers_table(ablations: Sequence[Ablation], page: str = "") -> Html:
     """One row per ablation: question, whether the theory predicted the answer, and a link to its section on a page."""
     rows = [
-        (tag("a", one["id"], href=f"{page}#{one['id']}"), prose(one["question"]), verdict(one)) for one in ablations
+        (tag("a", ablation["id"], href=f"{page}#{ablation['id']}"), prose(ablation["question"]), verdict(ablation))
+        for ablation in ablations
     ]
     return table(("", "question", "verdict"), rows)
 
 
-def _ablation(one: Ablation) -> Html:
-    files = [f"{name}.yaml" for name in one["campaigns"]]
+def _ablation(ablation: Ablation) -> Html:
+    files = [f"{name}.yaml" for name in ablation["campaigns"]]
     commands = [f"undertow campaign campaigns/{file} --out {file.removesuffix('.yaml')}" for file in files]
-    where = " and ".join(f"`undertow/paper/ablations/{file}`" for file in files)
+    file_names = " and ".join(f"`undertow/paper/ablations/{file}`" for file in files)
     return section(
-        one["id"],
-        f"{one['id']}: {one['question']}",
-        tag("p", "Prediction of the theory: ", prose(one["prediction"])),
-        tag("p", verdict(one), " ", prose(one["answer"])),
-        *([tag("p", prose(f"Not examined: {one['left_out']}."))] if one["left_out"] else []),
-        tag("p", prose(f"Campaign file: {where}. To run it alone, in the folder of this page:")),
+        ablation["id"],
+        f"{ablation['id']}: {ablation['question']}",
+        tag("p", "Prediction of the theory: ", prose(ablation["prediction"])),
+        tag("p", verdict(ablation), " ", prose(ablation["answer"])),
+        *([tag("p", prose(f"Not examined: {ablation['left_out']}."))] if ablation["left_out"] else []),
+        tag("p", prose(f"Campaign file: {file_names}. To run it alone, in the folder of this page:")),
         *(tag("pre", command) for command in commands),
-        numbers_table(one),
+        numbers_table(ablation),
     )
 
 
-def numbers_table(one: Ablation) -> Html:
+def numbers_table(ablation: Ablation) -> Html:
     """Every variant: settings, medians with intervals, runs that ended early."""
-    metrics = list(dict.fromkeys(name for variant in one["variants"] for name in variant["metrics"]))
+    metrics = list(dict.fromkeys(name for variant in ablation["variants"] for name in variant["metrics"]))
     rows = []
-    for variant in one["variants"]:
+    for variant in ablation["variants"]:
         name = join(variant["name"], tag("span", variant["settings"], class_="said"))
         failed = f"{variant['failures']} of {variant['seeds']}" if variant["failures"] else "0"
         rows.append((name, failed, *(_spread(variant["metrics"].get(metric)) for metric in metrics)))
     heads = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in metrics)
     sentence = "Median [95 % interval of the median], and below it the 5 % to 95 % range of the seeds."
-    whole = table(
+    statistics = table(
         ("variant and its settings", "ended early", *heads), rows, numeric=range(2, 2 + len(metrics)), wide=True
     )
-    return join(tag("p", sentence, class_="small"), whole)
+    return join(tag("p", sentence, class_="small"), statistics)
 
 
 def _spread(spread: Mapping[str, float] | None) -> Html:
@@ -112,8 +113,8 @@ def _spread(spread: Mapping[str, float] | None) -> Html:
     if not math.isfinite(spread["median"]):
         return Html("most ended early")
     middle = join(_number(spread["median"]), " [", _number(spread["median_low"]), ", ")
-    whole = tag("span", _number(spread["low"]), " to ", _number(spread["high"]), class_="said")
-    return join(middle, _number(spread["median_high"]), "]", whole)
+    seed_range = tag("span", _number(spread["low"]), " to ", _number(spread["high"]), class_="said")
+    return join(middle, _number(spread["median_high"]), "]", seed_range)
 
 
 def _number(value: float) -> Html:

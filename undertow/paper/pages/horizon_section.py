@@ -48,38 +48,39 @@ def horizon_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> 
     return content
 
 
-def _horizons(found: Mapping[str, Any]) -> list[Html]:
+def _horizons(results: Mapping[str, Any]) -> list[Html]:
     text = (
-        f"The same fidelity levels for {found['duration']:.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
+        f"The same fidelity levels for {results['duration']:.0f} s of suite U2, which repeats U1 every 20 s (U1 itself "
         "cannot be continued, because its chirp keeps rising), sampled at 1 kHz. Each controller runs with free "
         "weights and with weights bounded by 20 m/s^2 or rad/s^2. Metrics are computed over three windows, chattering "
         "from every sample."
     )
     colours = f"{CRITERION} The window is the last one that the run reached."
-    return [tag("h3", f"Long runs: {found['duration']:.0f} s"), tag("p", prose(text)), tag("p", prose(colours))]
+    return [tag("h3", f"Long runs: {results['duration']:.0f} s"), tag("p", prose(text)), tag("p", prose(colours))]
 
 
-def _table(found: Mapping[str, Any]) -> Html:
-    windows = found["windows"]
-    rows, last = [], None
-    for row in found["rows"]:
+def _table(results: Mapping[str, Any]) -> Html:
+    windows = results["windows"]
+    rows = []
+    last = None
+    for row in results["rows"]:
         level = tag("b", row["level"]) if row["level"] != last else ""
         last = row["level"]
         name = join(prose(row["words"]), tag("div", tag("code", row["scenario"]), class_="small"))
         rows.append((level, name, _ended(row), *_by_window(row, windows)))
-    return _wide(("level", "controller", f"status after {found['duration']:g} s"), windows, rows)
+    return _wide(("level", "controller", f"status after {results['duration']:g} s"), windows, rows)
 
 
 def _lags(rows: Sequence[Mapping[str, Any]], windows: Sequence[Sequence[float]]) -> Html:
     """One row per run of the map, with the prediction for drifted weights beside five sets."""
-    shown = []
+    table_rows = []
     for row in rows:
         size = f"{1e3 * row['value']:g}"
-        behind = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
+        dynamics = f"lag {size} ms" if row["kind"] == "lag" else f"winding {size} mH"
         between = row["damping"]
         theory = "" if row["law"] != "five" else "never" if between is None else _between(between)
-        shown.append((prose(behind), row["words"], theory, _ended(row), *_by_window(row, windows)))
-    return _wide(("behind", "controller", join("stable for c, ", unit("1/s")), "status"), windows, shown)
+        table_rows.append((prose(dynamics), row["words"], theory, _ended(row), *_by_window(row, windows)))
+    return _wide(("behind", "controller", join("stable for c, ", unit("1/s")), "status"), windows, table_rows)
 
 
 def _between(gains: Sequence[float]) -> str:

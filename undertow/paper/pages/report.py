@@ -54,14 +54,17 @@ def write_report(
     folder.mkdir(parents=True, exist_ok=True)
     texts = captions(dict(results)) | horizon_section.CAPTIONS | CAPTIONS
     texts |= {"ablations": ablations_page.CAPTION}
-    shown, arguments = {}, [(one, folder / "figures", name, pdf) for name, one in figures.items()]
-    waiting = None if pool is None else [pool.submit(save, *each) for each in arguments]
-    written = (save(*each) for each in arguments) if waiting is None else (each.result() for each in waiting)
-    for (name, one), (vector, _) in zip(figures.items(), written, strict=True):
-        alternative = _alternative(one, name)
-        shown[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
-    page, overview = folder / "report.html", shown.pop("ablations", Html(""))
-    write_whole(page, document(_TITLE, *_content(results, shown)))
+    arguments = [(plot, folder / "figures", name, pdf) for name, plot in figures.items()]
+    # All are submitted before the first is waited for; without a pool each is written when its turn comes.
+    pending = None if pool is None else [pool.submit(save, *call) for call in arguments]
+    written = (save(*call) for call in arguments) if pending is None else (future.result() for future in pending)
+    elements = {}
+    for (name, plot), (vector, _) in zip(figures.items(), written, strict=True):
+        alternative = _alternative(plot, name)
+        elements[name] = figure(vector.read_text(encoding="utf-8"), name, alternative, texts.get(name, name))
+    page = folder / "report.html"
+    overview = elements.pop("ablations", Html(""))
+    write_whole(page, document(_TITLE, *_content(results, elements)))
     if robust := results.get("robust_variant"):
         second = ablations_page.ablations_page(robust, overview, page.name)
         write_whole(folder / ablations_page.NAME, second)
@@ -79,19 +82,19 @@ def _content(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Ht
         "open": ("Open points and misprints of the paper", _left_open()),
         "provenance": ("Provenance", _provenance(results)),
     }
-    shown = {name: (title, content) for name, (title, content) in parts.items() if content}
-    links = [tag("a", title, href=f"#{name}") for name, (title, _) in shown.items()]
-    if "robust_variant" in shown:
+    sections = {name: (title, content) for name, (title, content) in parts.items() if content}
+    links = [tag("a", title, href=f"#{name}") for name, (title, _) in sections.items()]
+    if "robust_variant" in sections:
         links.insert(-2, tag("a", "Ablations", href=ablations_page.NAME))
     first = [tag("h1", _TITLE), tag("p", INTRODUCTION, class_="lead"), tag("nav", *links)]
     verdicts = tag("div", tag("h3", "Summary of the verdicts"), tables.glance(claims)) if claims else Html("")
     assumed = tag("div", tag("h3", "Assumptions"), bullets(ASSUMED), class_="assumed")
     first.append(tag("div", verdicts, assumed, class_="first"))
-    return [*first, *(section(name, title, *content) for name, (title, content) in shown.items())]
+    return [*first, *(section(name, title, *content) for name, (title, content) in sections.items())]
 
 
 def _figures(results: Mapping[str, Any], figures: Mapping[str, Html]) -> list[Html]:
-    content = [one for name, one in figures.items() if name not in _ELSEWHERE]
+    content = [element for name, element in figures.items() if name not in _ELSEWHERE]
     if content:
         note = (
             "Dotted lines are desired or true values, solid lines RCAFC, dashed lines RAFC. Figures 1 and 3 to 5 of "
@@ -151,38 +154,40 @@ def _left_open() -> list[Html]:
 
 
 def _provenance(results: Mapping[str, Any]) -> list[Html]:
-    found = results.get("provenance")
-    return [tables.provenance(found)] if found else []
+    provenance = results.get("provenance")
+    return [tables.provenance(provenance)] if provenance else []
 
 
-def _alternative(one: Figure, name: str) -> str:
+def _alternative(figure: Figure, name: str) -> str:
     """Title of a figure, as its alternative text."""
-    return one.texts[0].get_text() if one.texts else name
+    return figure.texts[0].get_text() if figure.texts else name
 
 
-def write(found: Reproduction, folder: Path, pdf: str | None = None, pool: Executor | None = None) -> Path:
+def write(reproduction: Reproduction, folder: Path, pdf: str | None = None, pool: Executor | None = None) -> Path:
     """Write the pages and `figures/`; returns the first page. Arguments of `write_report`.
 
     Raises:
         OSError: the folder cannot be written.
     """
-    return write_report(found.results, make_figures(found), folder, pdf, pool)
+    return write_report(reproduction.results, make_figures(reproduction), folder, pdf, pool)
 
 
-def make_figures(found: Reproduction) -> dict[str, Figure]:
+def make_figures(reproduction: Reproduction) -> dict[str, Figure]:
     """Every figure of the report, by name."""
-    numbers = {claim["id"]: claim["numbers"] for claim in found.results["claims"]}
-    levels = found.results["fidelity"]
-    figures = paper_figures(found.datasets("ideal"), found.datasets("static"), found.response) | {
-        "fidelity": fidelity_figure(levels, {fidelity: found.datasets(fidelity) for fidelity in levels}),
+    numbers = {claim["id"]: claim["numbers"] for claim in reproduction.results["claims"]}
+    levels = reproduction.results["fidelity"]
+    figures = paper_figures(reproduction.datasets("ideal"), reproduction.datasets("static"), reproduction.response) | {
+        "fidelity": fidelity_figure(levels, {fidelity: reproduction.datasets(fidelity) for fidelity in levels}),
         "sweep": sweep_figure(numbers["C6"]["sweep"]),
-        "horizons": horizons_figure(found.results["horizons"]["rows"], found.results["horizons"]["duration"]),
-        "lags": lags_figure(found.results["lags"], found.results["horizons"]["windows"]),
-        "drifting": drifting_figure(found.results["drifting"]),
+        "horizons": horizons_figure(
+            reproduction.results["horizons"]["rows"], reproduction.results["horizons"]["duration"]
+        ),
+        "lags": lags_figure(reproduction.results["lags"], reproduction.results["horizons"]["windows"]),
+        "drifting": drifting_figure(reproduction.results["drifting"]),
     }
-    if robust := found.results.get("robust_variant"):
+    if robust := reproduction.results.get("robust_variant"):
         rows = robust["fidelity"]
-        datasets = {(row["place"], row["law"]): found.runs[Path(row["scenario"]).stem].dataset for row in rows}
+        datasets = {(row["place"], row["law"]): reproduction.runs[Path(row["scenario"]).stem].dataset for row in rows}
         figures["robust_fidelity"] = robust_fidelity_figure(rows, datasets)
         figures["ablations"] = ablations_figure(robust["ablations"])
     return figures

@@ -35,8 +35,11 @@ def robust_section(results: Mapping[str, Any], figures: Mapping[str, Html]) -> l
     """
     if not results:
         return []
-    found = results["conclusions"]
-    lists = [part for key, title in _LISTS.items() if found[key] for part in (tag("h3", title), _sentences(found[key]))]
+    conclusions = results["conclusions"]
+    lists = []
+    for key, title in _LISTS.items():
+        if conclusions[key]:
+            lists += [tag("h3", title), _sentences(conclusions[key])]
     conditions = (
         "Runs take 20 s on ODIN under U1 and 120 s on BlueROV2 Heavy at sea; statistics are those of the second half. "
         "Where an ablation is named, its runs take 10 s at 1 kHz (A10 and A18: 20 s) unless stated otherwise, and the "
@@ -79,8 +82,8 @@ def _sentences(conclusions: list[str]) -> Html:
     """A list with the topic of each conclusion, up to the first full stop, in bold."""
     items = []
     for sentence in conclusions:
-        about, rest = sentence.split(". ", 1)
-        items.append(Html(f"<b>{prose(about)}.</b> {prose(rest)}"))
+        topic, statement = sentence.split(". ", 1)
+        items.append(Html(f"<b>{prose(topic)}.</b> {prose(statement)}"))
     return bullets(items)
 
 
@@ -89,14 +92,15 @@ _FIDELITY = ("tracking_rms", "estimation_rms", "input_rms", "input_variation", "
 
 def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
     """Every controller in every case, with the command that runs it."""
-    shown, last = [], None
+    table_rows = []
+    last = None
     for row in rows:
         steady = row["steady"] or {}
-        place = tag("b", row["words"]) if row["words"] != last else ""
+        case = tag("b", row["words"]) if row["words"] != last else ""
         last = row["words"]
         ended = outcome(ending(row), row["status"] == "completed", within(row["steady"]))
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
-        shown.append((place, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
+        table_rows.append((case, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
     metrics = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in _FIDELITY)
     head = ("case", "controller", "status", *metrics)
-    return table(head, shown, numeric=range(3, 3 + len(_FIDELITY)), wide=True)
+    return table(head, table_rows, numeric=range(3, 3 + len(_FIDELITY)), wide=True)

@@ -53,11 +53,11 @@ def reference_table(example: dict[str, Any]) -> Html:
     """This run compared with the independent solution."""
     rows = []
     for key, expected in REFERENCE.items():
-        found = (example.get(key) or {}).get("steady") or {}
-        for metric, theirs in expected.items():
-            ours = found.get(metric)
-            apart = None if ours is None else 100 * (ours / theirs - 1)
-            cells = (NAMES[key], _named(metric), number(ours, 4), number(theirs, 4), percent(apart))
+        metrics = (example.get(key) or {}).get("steady") or {}
+        for metric, independent in expected.items():
+            reproduced = metrics.get(metric)
+            difference = None if reproduced is None else 100 * (reproduced / independent - 1)
+            cells = (NAMES[key], _named(metric), number(reproduced, 4), number(independent, 4), percent(difference))
             rows.append(cells)
     return table(("controller", "metric", "this run", "independent", "difference"), rows, numeric=(2, 3, 4))
 
@@ -86,8 +86,8 @@ def fidelity_levels(results: dict[str, Any]) -> Html:
             lasted = entry["status"] == "completed"
             words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
             ended = outcome(words, lasted, within(entry["steady"]))
-            place = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
-            rows.append((place, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
+            level = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
+            rows.append((level, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
     metrics = map(_named, ("tracking_rms", "estimation_rms", "input_variation"))
     head = ("fidelity", "controller", "status", *metrics, "reason")
     return table(head, rows, numeric=(3, 4, 5), wide=True)
@@ -128,8 +128,8 @@ def _named(metric: str) -> Html:
 
 
 def _condition(verdict: str) -> Html:
-    said = condition(verdict)
-    return tag("span", prose(said), class_="said") if said else Html("")
+    words = condition(verdict)
+    return tag("span", prose(words), class_="said") if words else Html("")
 
 
 def _worded(value: Any, word: str) -> Html:

@@ -26,22 +26,25 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
     Returns:
         Function that waits for the entries of results.json, and the runs of the fidelity comparison.
     """
-    selected = [one for one in ABLATIONS if not (quick and one.long)]
+    selected = [entry for entry in ABLATIONS if not (quick and entry.long)]
     compared = begin_all(fidelity.scenarios(quick), folder, tasks)
     # The longest begin first, so that no process waits for the last one.
     order = sorted(selected, key=study.trials_of, reverse=True)
-    later = {one.id: tasks.begin(f"ablation {one.id}", ablation, one.id, quick, folder) for one in order}
+    ablation_tasks = {
+        entry.id: tasks.begin(f"ablation {entry.id}", ablation, entry.id, quick, folder) for entry in order
+    }
 
     def finished() -> Chapter:
-        runs, found = compared(), [later[one.id].result() for one in selected]
+        runs = compared()
+        ablation_rows = [ablation_tasks[entry.id].result() for entry in selected]
         rows = fidelity.table(runs, quick)
         results = {
             "quick": quick,
-            "seeds": found[0]["variants"][0]["seeds"],
-            "left_out": [one.id for one in ABLATIONS if one not in selected],
+            "seeds": ablation_rows[0]["variants"][0]["seeds"],
+            "left_out": [entry.id for entry in ABLATIONS if entry not in selected],
             "fidelity": rows,
-            "ablations": found,
-            "conclusions": conclusions(rows, found),
+            "ablations": ablation_rows,
+            "conclusions": conclusions(rows, ablation_rows),
         }
         return results, runs
 
@@ -50,4 +53,4 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
 
 def ablation(name: str, quick: bool, folder: Path) -> dict[str, Any]:
     """The ablation of an id, run."""
-    return study.run(next(one for one in ABLATIONS if one.id == name), quick, folder)
+    return study.run(next(entry for entry in ABLATIONS if entry.id == name), quick, folder)

@@ -19,10 +19,10 @@ class Numbers:
     """Medians of the ablations, and rows of the fidelity comparison; a missing one is a KeyError."""
 
     def __init__(self, compared: Rows, ablations: Rows):
-        everything = {(run.place, run.law): None for run in fidelity.runs(False)}
-        self._compared = everything | {(row["place"], row["law"]): row for row in compared}
-        self._ablations = {one.id: None for one in ABLATIONS} | {
-            one["id"]: {each["name"]: each for each in one["variants"]} for one in ablations
+        not_run = {(run.place, run.law): None for run in fidelity.runs(False)}
+        self._compared = not_run | {(row["place"], row["law"]): row for row in compared}
+        self._ablations = {ablation.id: None for ablation in ABLATIONS} | {
+            row["id"]: {variant["name"]: variant for variant in row["variants"]} for row in ablations
         }
 
     def median(self, ablation: str, variant: str, metric: str = "tracking_rms") -> float:
@@ -31,12 +31,12 @@ class Numbers:
 
     def failures(self, ablation: str, variant: str) -> tuple[int, int]:
         """Number of runs that ended early, and of all runs."""
-        one = self._variant(ablation, variant)
-        return one["failures"], one["seeds"]
+        row = self._variant(ablation, variant)
+        return row["failures"], row["seeds"]
 
-    def fidelity(self, place: str, law: str) -> dict[str, Any]:
+    def fidelity(self, case: str, law: str) -> dict[str, Any]:
         """A row of the fidelity comparison."""
-        return _there(self._compared[place, law])
+        return _there(self._compared[case, law])
 
     def _variant(self, ablation: str, variant: str) -> dict[str, Any]:
         return _there(self._ablations[ablation])[variant]
@@ -49,41 +49,43 @@ def conclusions(compared: Rows, ablations: Rows) -> dict[str, list[str]]:
         KeyError: a sentence uses an ablation, a variant or a row that does not exist.
     """
     numbers = Numbers(compared, ablations)
-    return {kind: [said for one in sentences if (said := _said(one, numbers))] for kind, sentences in _KINDS.items()}
+    texts = {kind: [_text_of(sentence, numbers) for sentence in sentences] for kind, sentences in _KINDS.items()}
+    return {kind: list(filter(None, of_kind)) for kind, of_kind in texts.items()}
 
 
-def _said(sentence, numbers: Numbers) -> str:
+def _text_of(sentence, numbers: Numbers) -> str:
     try:
         return sentence(numbers)
     except NotRun:
         return ""
 
 
-def _there(found: Any) -> Any:
-    if found is None:
+def _there(value: Any) -> Any:
+    if value is None:
         raise NotRun
-    return found
+    return value
 
 
 def _windup(n: Numbers) -> str:
-    own, fed = n.median("A10", "RCAFC, 1.5 m/s^2"), n.median("A10", "RCAFC, command fed, 1.5 m/s^2")
-    without = n.median("A10", "RAFC, 1.5 m/s^2")
-    if not own < 0.01 * min(fed, without):
+    rcafc, fed = n.median("A10", "RCAFC, 1.5 m/s^2"), n.median("A10", "RCAFC, command fed, 1.5 m/s^2")
+    rafc = n.median("A10", "RAFC, 1.5 m/s^2")
+    if not rcafc < 0.01 * min(fed, rafc):
         return ""
     return (
         f"The applied input in the identification model. After a step of 2 m with |u| <= 1.5 m/s^2 the error of RCAFC "
-        f"is {own:.2g} m; with its own command in the model it is {fed:.3g} m, that of RAFC {without:.3g} m (A10)."
+        f"is {rcafc:.2g} m; with its own command in the model it is {fed:.3g} m, that of RAFC {rafc:.3g} m (A10)."
     )
 
 
 def _loss(n: Numbers) -> str:
-    none, one = (n.median("A13", f"Table 1, {what}") for what in ("none", "one off"))
+    none, one_off = (n.median("A13", f"Table 1, {what}") for what in ("none", "one off"))
     failed, seeds = n.failures("A13", "Table 1, one off")
-    if failed or not one < 0.01:
+    if failed or not one_off < 0.01:
         return ""
     return (
         f"Undetected loss of thrust. With one of ODIN's eight thrusters off, a random one for each of "
-        f"{seeds} seeds, no run ends early; the error grows from {none:.2g} to {one:.2g} (A13; thrusters without lag)."
+        f"{seeds} seeds, no run ends early; the error grows from {none:.2g} to {one_off:.2g} (A13; thrusters without "
+        "lag)."
     )
 
 
@@ -110,28 +112,29 @@ def _linear(n: Numbers) -> str:
 
 
 def _robust(n: Numbers) -> str:
-    own = n.median("A3", "robust")
-    one, plain, indi = (n.median("A3", f"robust{kind}") / own for kind in (", 1 set", "'s linear observer", "'s INDI"))
+    robust = n.median("A3", "robust")
+    kinds = (", 1 set", "'s linear observer", "'s INDI")
+    one_set, plain, indi = (n.median("A3", f"robust{kind}") / robust for kind in kinds)
     return (
         "Preset `robust` is neither fuzzy nor composite by default: no tracking error in the adaptation, no robust "
         "term, sets so wide that the basis is nearly constant. Relative to its tracking error that of one set is "
-        f"{one:.4f}, of a linear observer of the same poles {plain:.4f}, of INDI {indi:.4f} (A3; axes without lag)."
+        f"{one_set:.4f}, of a linear observer of the same poles {plain:.4f}, of INDI {indi:.4f} (A3; axes without lag)."
     )
 
 
 def _sets(n: Numbers) -> str:
-    one, five = (n.median("A2", name, "estimation_rms") for name in ("1 set", "5 sets"))
-    return f"Fuzzy sets. A single one, an integrator, has {one / five:.3f} times the error of five (A2, C5)."
+    one_set, five = (n.median("A2", name, "estimation_rms") for name in ("1 set", "5 sets"))
+    return f"Fuzzy sets. A single one, an integrator, has {one_set / five:.3f} times the error of five (A2, C5)."
 
 
 def _input(n: Numbers) -> str:
-    own, matched = (n.median("A1", name, "estimation_rms") for name in ("error", "state, matched"))
-    return f"Fuzzy input. The state has {matched / own:.3f} times the error at the same gamma |xi|^2 (A1, C5)."
+    error_input, matched = (n.median("A1", name, "estimation_rms") for name in ("error", "state, matched"))
+    return f"Fuzzy input. The state has {matched / error_input:.3f} times the error at the same gamma |xi|^2 (A1, C5)."
 
 
 def _robust_term(n: Numbers) -> str:
-    own, instead = n.median("A4", "with, exact"), n.median("A4", "PD instead, exact")
-    return f"The robust term. A PD of the same slope has {instead / own:.3f} times the error (A4)."
+    with_term, with_pd = n.median("A4", "with, exact"), n.median("A4", "PD instead, exact")
+    return f"The robust term. A PD of the same slope has {with_pd / with_term:.3f} times the error (A4)."
 
 
 def _tuned(n: Numbers) -> str:
@@ -152,10 +155,10 @@ def _motor(n: Numbers) -> str:
     paper, robust = n.fidelity("electromechanical", "rcafc"), n.fidelity("electromechanical", "robust")
     if paper["status"] == "completed":
         return ""
-    kept = robust["steady"]["tracking_rms"]
+    error = robust["steady"]["tracking_rms"]
     return (
         f"A motor. With all of Eqs. (8) to (11) Table 1 ends after {paper['diverged_at']:.2g} s; preset `robust`, "
-        f"which models the motor, tracks to {kept:.2g} without propeller speeds (20 s; 2,000 s: see the long runs)."
+        f"which models the motor, tracks to {error:.2g} without propeller speeds (20 s; 2,000 s: see the long runs)."
     )
 
 
@@ -178,10 +181,10 @@ def _noise(n: Numbers) -> str:
 
 def _drift(n: Numbers) -> str:
     lost, seeds = n.failures("A18", "nothing")
-    kept, weight = n.median("A18", "projection 6"), n.median("A18", "one set", "weights_peak")
+    projected, weight = n.median("A18", "projection 6"), n.median("A18", "one set", "weights_peak")
     return (
         f"Drift. With sets spaced 0.1 and 1 cm/s of noise {lost} of {seeds} runs end within 20 s; projected weights "
-        f"keep {kept:.2g} m, and a single set, the linear observer, does not drift (|theta| {weight:.2g}; A18)."
+        f"keep {projected:.2g} m, and a single set, the linear observer, does not drift (|theta| {weight:.2g}; A18)."
     )
 
 
@@ -211,10 +214,10 @@ def _at_sea(n: Numbers) -> str:
 
 def _navigation(n: Numbers) -> str:
     pid, robust = (n.fidelity("station", law) for law in ("pid", "robust"))
-    known = [n.fidelity("station_known", law) for law in ("pid", "robust")]
-    if not all(row["steady"] for row in (pid, robust, *known)):
+    exact = [n.fidelity("station_known", law) for law in ("pid", "robust")]
+    if not all(row["steady"] for row in (pid, robust, *exact)):
         return ""
-    without, ours = (row["position_rms"] for row in known)
+    without, ours = (row["position_rms"] for row in exact)
     centimetres = lambda metres: f"{100 * metres:.2g} cm"
     return (
         f"Limits of navigation. Station keeping in waves with position fixes of 5 cm, the error of navigation is "
@@ -228,11 +231,11 @@ def _recovery(n: Numbers) -> str:
     paper, robust = n.fidelity("overload", "rcafc"), n.fidelity("overload", "robust")
     if not (robust["steady"] and paper["steady"]):
         return ""
-    after = robust["steady"]["tracking_rms"]
-    how = "back at" if after < _RECOVERED else "not back yet, but at"
+    late_error = robust["steady"]["tracking_rms"]
+    how = "back at" if late_error < _RECOVERED else "not back yet, but at"
     return (
         f"An overload of 1.5 s. Beyond the authority of its motors at 24 V, the error of `robust` is up to "
-        f"{robust['largest_after']:.2g} m or rad, after 7.5 s {how} {after:.2g}; that of Table 1 is up to "
+        f"{robust['largest_after']:.2g} m or rad, after 7.5 s {how} {late_error:.2g}; that of Table 1 is up to "
         f"{paper['largest_after']:.2g}, then {paper['steady']['tracking_rms']:.2g}."
     )
 
@@ -257,11 +260,11 @@ def _slow_rate(n: Numbers) -> str:
 
 
 def _noisy_motor(n: Numbers) -> str:
-    own, searched = (n.median("A20", law, "input_variation") for law in ("robust", "robust, searched"))
-    if not own > 2 * searched:
+    robust, searched = (n.median("A20", law, "input_variation") for law in ("robust", "robust, searched"))
+    if not robust > 2 * searched:
         return ""
     return (
-        f"Unmodelled noise. With 2 mm/s of velocity noise the voltage of `robust` varies by {own:.2g} V/s; with a "
+        f"Unmodelled noise. With 2 mm/s of velocity noise the voltage of `robust` varies by {robust:.2g} V/s; with a "
         f"bandwidth and an actuator rate found by search by {searched:.2g} V/s (A20)."
     )
 

@@ -105,23 +105,24 @@ class ComparedRun(NamedTuple):
 
 def runs(quick: bool) -> list[ComparedRun]:
     """Every law in every setting, from the simplest to the most realistic; quick: the full motor model only."""
-    found, laws = [], [law for law in LAWS if law != "measured" or not quick]
+    compared = []
+    laws = [law for law in LAWS if law != "measured" or not quick]
     for fidelity in (WHOLE,) if quick else FIDELITIES:
         words = "full motor model, no limit" if fidelity == WHOLE else fidelity
-        shown = [law for law in laws if law != "measured" or fidelity == WHOLE]
-        found += [_of_odin(fidelity, words, law, {"kind": "u1"}, fidelity) for law in shown]
-    for place, (words, volts, scale) in _SUPPLIES.items():
-        found += [_of_odin(place, words, law, {"kind": "u1", "scale": scale}, supply=volts) for law in laws]
+        laws_of_fidelity = [law for law in laws if law != "measured" or fidelity == WHOLE]
+        compared += [_of_odin(fidelity, words, law, {"kind": "u1"}, fidelity) for law in laws_of_fidelity]
+    for case, (words, volts, scale) in _SUPPLIES.items():
+        compared += [_of_odin(case, words, law, {"kind": "u1", "scale": scale}, supply=volts) for law in laws]
     if quick:
-        return found
+        return compared
     words = "full motor model, 24 V, U1 x 0.3, overload of 1.5 s"
     overload = [_of_odin("overload", words, law, _OVERLOAD, supply=24.0) for law in ("rcafc", "robust")]
-    found += [one._replace(scenario=one.scenario | {"steady": {"start": _JUDGED}}) for one in overload]
+    compared += [run._replace(scenario=run.scenario | {"steady": {"start": _JUDGED}}) for run in overload]
     words = "BlueROV2 Heavy, T200s at 16 V, 100 Hz, current, waves, own sensors"
     for law, (name, controller) in _AT_SEA.items():
         described = {"description": f"{name}: BlueROV2 Heavy at sea, from its own sensors", "controller": controller}
-        found.append(ComparedRun("sea", words, law, name, W2 | described))
-    return found + [_of_station(place, law) for place in _STATION for law in _STATION_LAWS]
+        compared.append(ComparedRun("sea", words, law, name, W2 | described))
+    return compared + [_of_station(case, law) for case in _STATION for law in _STATION_LAWS]
 
 
 def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
@@ -129,31 +130,31 @@ def scenarios(quick: bool) -> dict[str, dict[str, Any]]:
     return {run.key: run.scenario for run in runs(quick)}
 
 
-def table(executed: Mapping[str, ScenarioResult], quick: bool) -> list[dict[str, Any]]:
+def table(results: Mapping[str, ScenarioResult], quick: bool) -> list[dict[str, Any]]:
     """One row per setting and law: ending and steady metrics."""
-    return [
-        {**run._asdict(), "scenario": f"scenarios/{run.key}.yaml", **_row(executed[run.key])} for run in runs(quick)
-    ]
+    return [{**run._asdict(), "scenario": f"scenarios/{run.key}.yaml", **_row(results[run.key])} for run in runs(quick)]
 
 
 def _of_odin(
-    place: str, words: str, law: str, load: Any, fidelity: str = WHOLE, supply: float | None = None
+    case: str, words: str, law: str, load: Any, fidelity: str = WHOLE, supply: float | None = None
 ) -> ComparedRun:
     name, controller = LAWS[law]
     sensor = {"speed_sensor": fidelity == "ideal" or law == "measured"}
-    one = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
-    one["controller"] = controller
+    data = scenario(f"{name}: {words}", fidelity=fidelity, loop=_SAMPLED, disturbance=load, model=sensor)
+    data["controller"] = controller
     if supply is not None:
-        one["plant"]["thruster"]["supply"] = supply
-    return ComparedRun(place, words, law, name, one)
+        data["plant"]["thruster"]["supply"] = supply
+    return ComparedRun(case, words, law, name, data)
 
 
-def _of_station(place: str, law: str) -> ComparedRun:
-    words, navigation, gains = _STATION[place]
+def _of_station(case: str, law: str) -> ComparedRun:
+    words, navigation, gains = _STATION[case]
     name, controller = _STATION_LAWS[law]
-    per_axis = {key: [one[0]] * 3 + [one[1]] * 3 if isinstance(one, tuple) else one for key, one in gains[law].items()}
+    per_axis = {
+        key: [gain[0]] * 3 + [gain[1]] * 3 if isinstance(gain, tuple) else gain for key, gain in gains[law].items()
+    }
     vehicle = lambda parameters: {"kind": "bluerov2_heavy", "parameters": parameters}
-    one = {
+    data = {
         "description": f"{name}: {words}",
         "plant": {"vehicle": vehicle("ng2024"), "thruster": {"kind": "t200", "supply": 16}, "ledger": False},
         "model": {"vehicle": vehicle("vonbenzon2022"), "rate_term": True},
@@ -164,7 +165,7 @@ def _of_station(place: str, law: str) -> ComparedRun:
         "loop": {"kind": "sampled", "dt": 0.01, "duration": 60.0, "record": 0.05},
         "steady": {"start": 30.0},
     }
-    return ComparedRun(place, words, law, name, one)
+    return ComparedRun(case, words, law, name, data)
 
 
 def _row(run: ScenarioResult) -> dict[str, Any]:

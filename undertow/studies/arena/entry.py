@@ -64,15 +64,15 @@ def prepare_entry(
     Raises:
         BadInput: the law accepts no task, or the campaign cannot be built.
     """
-    each = {cell: with_law(cell, law, gains) for cell in cells}
+    variants = {cell: with_law(cell, law, gains) for cell in cells}
     refused: dict[Cell, str] = {}
     try:
-        prepared = campaign_of(dict(itertools.chain(*(of_cell.items() for of_cell in each.values()))), trials)
+        prepared = campaign_of(dict(itertools.chain(*(of_cell.items() for of_cell in variants.values()))), trials)
     except BadInput:
-        refused = {cell: why for cell in cells if (why := _why_not(each[cell]))}
+        refused = {cell: why for cell in cells if (why := _why_not(variants[cell]))}
         if len(refused) in (0, len(cells)):
             raise
-        accepted = [of_cell.items() for cell, of_cell in each.items() if cell not in refused]
+        accepted = [of_cell.items() for cell, of_cell in variants.items() if cell not in refused]
         prepared = campaign_of(dict(itertools.chain(*accepted)), trials)
     sentences = {} if gains is None else gains.sentences
     return Entry(law.name, VERSION, law.changes["controller"], tuple(cells), refused, sentences), prepared
@@ -91,10 +91,10 @@ def campaign_of(variants: dict[str, Keys], trials: int) -> Prepared:
     return prepare_campaign(validate(text), text)
 
 
-def _why_not(each: dict[str, Keys]) -> str:
+def _why_not(variants: dict[str, Keys]) -> str:
     """Why one of the scenarios cannot be built; empty where all can."""
     try:
-        for keys in each.values():
+        for keys in variants.values():
             build(from_data(keys))
     except BadInput as error:
         return str(error)
@@ -115,16 +115,16 @@ def read_entry(folder: Path) -> Entry:
     """
     file = folder / ENTRY
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        version = found["version"]
-        whole: Callable[[Any], str] = lambda one: one if isinstance(one, str) else _fail(one)
+        data = json.loads(file.read_text(encoding="utf-8"))
+        version = data["version"]
+        as_text: Callable[[Any], str] = lambda value: value if isinstance(value, str) else _fail(value)
         entry = Entry(
-            whole(found["name"]),
+            as_text(data["name"]),
             int(version),
-            dict(found["controller"]),
-            tuple((whole(task), whole(vehicle)) for task, vehicle in found["cells"]),
-            {(whole(task), whole(vehicle)): whole(why) for task, vehicle, why in found["refused"]},
-            {whole(vehicle): whole(sentence) for vehicle, sentence in found["gains"].items()},
+            dict(data["controller"]),
+            tuple((as_text(task), as_text(vehicle)) for task, vehicle in data["cells"]),
+            {(as_text(task), as_text(vehicle)): as_text(why) for task, vehicle, why in data["refused"]},
+            {as_text(vehicle): as_text(sentence) for vehicle, sentence in data["gains"].items()},
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         hint = f"Remove the folder {folder}, and run the arena again for this law"
@@ -135,5 +135,5 @@ def read_entry(folder: Path) -> Entry:
     return entry
 
 
-def _fail(found: Any) -> str:
-    raise TypeError(f"{found!r} is no text")
+def _fail(value: Any) -> str:
+    raise TypeError(f"{value!r} is no text")

@@ -49,12 +49,14 @@ class Board(NamedTuple):
     @property
     def tasks(self) -> tuple[str, ...]:
         """Names of the tasks."""
-        return tuple(task for task in TASKS if any(one == task for one, _ in self.cells))
+        in_cells = {task for task, _ in self.cells}
+        return tuple(task for task in TASKS if task in in_cells)
 
     @property
     def vehicles(self) -> tuple[str, ...]:
         """Names of the vehicles."""
-        return tuple(vehicle for vehicle in VEHICLES if any(one == vehicle for _, one in self.cells))
+        in_cells = {vehicle for _, vehicle in self.cells}
+        return tuple(vehicle for vehicle in VEHICLES if vehicle in in_cells)
 
     def of_task(self, task: str) -> list[Cell]:
         """A task on all of its vehicles."""
@@ -66,7 +68,7 @@ class Board(NamedTuple):
 
     def data(self) -> dict[str, Any]:
         """The board as numbers, words and lists."""
-        return {"version": VERSION, "laws": [_data(one) for one in self.standings]}
+        return {"version": VERSION, "laws": [_data(standing) for standing in self.standings]}
 
 
 def board_of(out: Path) -> Board:
@@ -77,23 +79,23 @@ def board_of(out: Path) -> Board:
         OSError: results that cannot be read.
     """
     folders = sorted(path for path in (out / LAWS).iterdir() if path.is_dir() and (path / ENTRY).exists())
-    found = []
+    standings = []
     for folder in folders:
         entry = read_entry(folder)
         robustness = curves(folder / FOLDER) if (folder / FOLDER / STORE).exists() else {}
-        found.append(Standing(entry, score_of(entry, folder), robustness, _step(folder)))
-    cells = found[0].entry.cells
-    for one in found:
-        if one.entry.cells != cells:
+        standings.append(Standing(entry, score_of(entry, folder), robustness, _step(folder)))
+    cells = standings[0].entry.cells
+    for standing in standings:
+        if standing.entry.cells != cells:
             hint = "Choose another folder for other tasks or vehicles"
-            got = f"others for {one.entry.name} than for {found[0].entry.name}"
+            got = f"others for {standing.entry.name} than for {standings[0].entry.name}"
             raise BadInput("--out", "have the same tasks and vehicles for all laws", got, hint=hint)
-    return Board(tuple(ranked(found)), cells)
+    return Board(tuple(ranked(standings)), cells)
 
 
 def ranked(standings: Sequence[Standing]) -> list[Standing]:
     """Those that lose fewest vehicles first, and among those the one with the least error."""
-    return sorted(standings, key=lambda one: (one.score.lost, one.score.error))
+    return sorted(standings, key=lambda standing: (standing.score.lost, standing.score.error))
 
 
 _HEAD = ("law", "error / tolerance", "within tolerance", "lost", "against robust", "input variation (%/s)", "step (us)")
@@ -101,23 +103,23 @@ _HEAD = ("law", "error / tolerance", "within tolerance", "lost", "against robust
 
 def leader_rows(board: Board) -> TextTable:
     """The board, a row for each law."""
-    baseline = next((one.score for one in board.standings if one.entry.name == BASELINE), None)
+    baseline = next((standing.score for standing in board.standings if standing.entry.name == BASELINE), None)
     rows = []
-    for one in board.standings:
-        score = one.score
+    for standing in board.standings:
+        score = standing.score
         against = "-" if baseline is None else digits(score.error / baseline.error)
-        step = "-" if one.step is None else f"{digits(1e6 * one.step.median)}{_compiler(one.step)}"
+        step = "-" if standing.step is None else f"{digits(1e6 * standing.step.median)}{_compiler(standing.step)}"
         error = f"{digits(score.error)} [{digits(score.low)}, {digits(score.high)}]"
         shares = (f"{100 * score.within:.1f} %", f"{100 * score.lost:.1f} %")
-        rows.append((one.entry.name, error, *shares, against, digits(100 * score.activity), step))
+        rows.append((standing.entry.name, error, *shares, against, digits(100 * score.activity), step))
     return TextTable(_HEAD, rows)
 
 
 def task_rows(board: Board) -> TextTable:
     """Error of every law in every task, in tolerances: the geometric mean over the vehicles."""
     rows = [
-        (one.entry.name, *(digits(one.score.mean(board.of_task(task))) for task in board.tasks))
-        for one in board.standings
+        (standing.entry.name, *(digits(standing.score.mean(board.of_task(task))) for task in board.tasks))
+        for standing in board.standings
     ]
     return TextTable(("law", *(task.replace("_", " ") for task in board.tasks)), rows)
 
@@ -125,15 +127,15 @@ def task_rows(board: Board) -> TextTable:
 def vehicle_rows(board: Board) -> TextTable:
     """Error of every law on every vehicle, in tolerances: the geometric mean over the tasks."""
     rows = [
-        (one.entry.name, *(digits(one.score.mean(board.of_vehicle(vehicle))) for vehicle in board.vehicles))
-        for one in board.standings
+        (standing.entry.name, *(digits(standing.score.mean(board.of_vehicle(vehicle))) for vehicle in board.vehicles))
+        for standing in board.standings
     ]
     return TextTable(("law", *board.vehicles), rows)
 
 
 def ratio_rows(board: Board) -> TextTable:
     """Error of every law in every task / that of the baseline, as means over the vehicles; no rows without it."""
-    scores = {one.entry.name: one.score for one in board.standings}
+    scores = {standing.entry.name: standing.score for standing in board.standings}
     head = ("law", *(task.replace("_", " ") for task in board.tasks), "largest on one vehicle")
     if BASELINE not in scores:
         return TextTable(head, [])
@@ -147,19 +149,22 @@ def ratio_rows(board: Board) -> TextTable:
 
 def margin_rows(board: Board) -> TextTable:
     """The hardest level of every parameter up to which a law is within its tolerances."""
-    shown = [one for one in board.standings if one.robustness]
-    rows = [(one.entry.name, *(_level(one.robustness[name]) for name in PARAMETERS)) for one in shown]
-    return TextTable(("law", *(one.label for one in PARAMETERS.values())), rows)
+    rows = [
+        (standing.entry.name, *(_level(standing.robustness[name]) for name in PARAMETERS))
+        for standing in board.standings
+        if standing.robustness
+    ]
+    return TextTable(("law", *(parameter.label for parameter in PARAMETERS.values())), rows)
 
 
 def failures(board: Board) -> TextTable:
     """Every task and vehicle in which trials of a law failed or were refused."""
-    rows = [
-        (one.entry.name, *cell, ", ".join(f"{word.replace('_', ' ')} {count}" for word, count in result.failed.items()))
-        for one in board.standings
-        for cell, result in one.score.cells.items()
-        if result.failed
-    ]
+    rows = []
+    for standing in board.standings:
+        for cell, result in standing.score.cells.items():
+            counts = [f"{word.replace('_', ' ')} {count}" for word, count in result.failed.items()]
+            if counts:
+                rows.append((standing.entry.name, *cell, ", ".join(counts)))
     return TextTable(("law", "task", "vehicle", "failed trials"), rows)
 
 
@@ -169,12 +174,12 @@ def as_csv(board: Board) -> str:
     writer = csv.writer(text, lineterminator="\n")
     names = ("position_rms", "orientation_rms", "input_variation_share")
     writer.writerow(("law", "task", "vehicle", "error", *names, "failed", "trials"))
-    for one in board.standings:
-        for cell, result in one.score.cells.items():
+    for standing in board.standings:
+        for cell, result in standing.score.cells.items():
             columns = (result.position, result.orientation, result.activity)
             medians = [_median(column) for column in columns]
             failed = sum(result.failed.values())
-            writer.writerow((one.entry.name, *cell, repr(result.error), *medians, failed, len(result.errors)))
+            writer.writerow((standing.entry.name, *cell, repr(result.error), *medians, failed, len(result.errors)))
     return text.getvalue()
 
 
@@ -196,8 +201,8 @@ def _level(curve: RobustnessCurve) -> str:
 def _step(folder: Path) -> StepTime | None:
     """Computing time of a step; None where it was not measured, or the file is damaged."""
     try:
-        found = json.loads((folder / STEP).read_text(encoding="utf-8"))
-        return StepTime(float(found["median"]), str(found["backend"]))
+        data = json.loads((folder / STEP).read_text(encoding="utf-8"))
+        return StepTime(float(data["median"]), str(data["backend"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -206,12 +211,12 @@ def _compiler(step: StepTime) -> str:
     return "" if step.backend == "simd" else " (XLA)"
 
 
-def _data(one: Standing) -> dict[str, Any]:
-    score = one.score
+def _data(standing: Standing) -> dict[str, Any]:
+    score = standing.score
     return {
-        "name": one.entry.name,
-        "controller": one.entry.controller,
-        "gains": one.entry.gains,
+        "name": standing.entry.name,
+        "controller": standing.entry.controller,
+        "gains": standing.entry.gains,
         **{name: getattr(score, name) for name in ("error", "low", "high", "within", "lost", "activity")},
         "cells": [
             {
@@ -223,5 +228,5 @@ def _data(one: Standing) -> dict[str, Any]:
             }
             for (task, vehicle), result in score.cells.items()
         ],
-        "robustness": {name: curve.data() for name, curve in one.robustness.items()},
+        "robustness": {name: curve.data() for name, curve in standing.robustness.items()},
     }

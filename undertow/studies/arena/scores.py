@@ -86,9 +86,9 @@ def trial_errors(position: np.ndarray, orientation: np.ndarray, tolerances: Sequ
         orientation: rms angle, rad.
         tolerances: of both.
     """
-    both = np.stack([position / tolerances[0], orientation / tolerances[1]])
-    found = np.sqrt(np.mean(both**2, axis=0))
-    return np.where(np.isfinite(found), np.clip(found, FINEST, LOST), LOST)
+    in_tolerances = np.stack([position / tolerances[0], orientation / tolerances[1]])
+    errors = np.sqrt(np.mean(in_tolerances**2, axis=0))
+    return np.where(np.isfinite(errors), np.clip(errors, FINEST, LOST), LOST)
 
 
 def score_of(entry: Entry, folder: Path) -> Score:
@@ -103,9 +103,9 @@ def score_of(entry: Entry, folder: Path) -> Score:
         hint = f"Run the arena again for {entry.name} with --overwrite"
         raise BadInput("--out", "have results that can be read", str(error).partition(";")[0], hint=hint) from None
     trials = results.campaign.trials
-    every = {cell: _refused(trials * len(scenarios(*cell))) for cell in entry.refused}
-    every |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
-    return scored(entry.name, {cell: every[cell] for cell in entry.cells})
+    results_of_cell = {cell: _refused(trials * len(scenarios(*cell))) for cell in entry.refused}
+    results_of_cell |= _cells(entry.name, results, [cell for cell in entry.cells if cell not in entry.refused])
+    return scored(entry.name, {cell: results_of_cell[cell] for cell in entry.cells})
 
 
 def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
@@ -123,7 +123,7 @@ def scored(name: str, cells: dict[Cell, CellResult]) -> Score:
         float(high),
         float(np.mean(within)),
         float(np.mean(lost)),
-        geometric_mean([max(one, 1e-9) for one in active]),
+        geometric_mean([max(activity, 1e-9) for activity in active]),
         cells,
     )
 
@@ -147,25 +147,25 @@ def _cells(law: str, results: Results, cells: Sequence[Cell]) -> dict[Cell, Cell
     combinations, rows = results.combinations, results.rows
     names = {cell: tuple(scenarios(*cell)) for cell in cells}
     variants = range(sum(map(len, names.values())))
-    number = {name: place for place, (name,) in enumerate(map(results.named, variants))}
-    found = {}
+    number = {name: index for index, (name,) in enumerate(map(results.named, variants))}
+    by_cell = {}
     for cell in cells:
-        mine = np.isin(combinations, [number[name] for name in names[cell]])
-        if not mine.any():
+        in_cell = np.isin(combinations, [number[name] for name in names[cell]])
+        if not in_cell.any():
             hint = "Run the arena again for this law, which continues"
             raise BadInput("--out", "have trials of every task", f"none of {' on '.join(cell)} for {law}", hint=hint)
-        column = lambda name, mine=mine: rows[name].values[mine].astype(float)
-        status = rows["status"].values[mine]
+        column = lambda name, in_cell=in_cell: rows[name].values[in_cell].astype(float)
+        status = rows["status"].values[in_cell]
         position, orientation = map(column, METRICS)
         words = [_word(code) for code in status[status != int(Status.OK)].tolist()]
-        found[cell] = CellResult(
+        by_cell[cell] = CellResult(
             trial_errors(position, orientation, tolerances(*cell)),
             position,
             orientation,
             column("input_variation") / VEHICLES[cell[1]].limit,
             {word: words.count(word) for word in dict.fromkeys(words)},
         )
-    return found
+    return by_cell
 
 
 def _word(code: int) -> str:

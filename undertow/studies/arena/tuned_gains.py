@@ -47,5 +47,6 @@ def tuned_gains(
         scenario = from_data(training_keys(vehicle) | {"controller": law.changes["controller"]})
         stage = lambda words, vehicle=vehicle: say(f"{vehicle}: {words}")
         _, budgets = equal_budgets([law], scenario, budget, folder / vehicle, stage)
-        options[vehicle], sentences[vehicle] = budgets.laws[0].gains, budgets.laws[0].sentence
+        options[vehicle] = budgets.laws[0].gains
+        sentences[vehicle] = budgets.laws[0].sentence
     return TunedGains(options, sentences)

@@ -55,34 +55,34 @@ class TrialBatch(NamedTuple):
     batch: RunBatch
 
 
-def build_trial(several: Trials, part_cache: PartCache, row: int) -> Built:
+def build_trial(campaign_trials: Trials, part_cache: PartCache, row: int) -> Built:
     """One trial, ready to run.
 
     Raises:
         BadInput: its scenario cannot be built.
     """
-    with within(location=several.location, note=f"trial {row}"):
-        return build_data(several, part_cache, several.data(row))
+    with within(location=campaign_trials.location, note=f"trial {row}"):
+        return build_data(campaign_trials, part_cache, campaign_trials.data(row))
 
 
-def build_data(several: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
+def build_data(campaign_trials: Trials, part_cache: PartCache, data: dict[str, Any]) -> Built:
     """Build a scenario of the campaign.
 
     Raises:
         BadInput: the scenario cannot be built.
     """
-    return build(Text(data, "", several.scenario.folder, {}), part_cache)
+    return build(Text(data, "", campaign_trials.scenario.folder, {}), part_cache)
 
 
-def valid_trials(several: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
+def valid_trials(campaign_trials: Trials, part_cache: PartCache, rows: Iterable[int]) -> Iterator[tuple[int, Built]]:
     """Index and trial of each valid row, one at a time: a large task does not keep them all in memory."""
-    for place, row in enumerate(rows):
+    for index, row in enumerate(rows):
         with contextlib.suppress(BadInput):
-            yield place, build_trial(several, part_cache, row)
+            yield index, build_trial(campaign_trials, part_cache, row)
 
 
 def build_trials(
-    several: Trials,
+    campaign_trials: Trials,
     part_cache: PartCache,
     trials: np.ndarray,
     sampled: Mapping[str, list[Any]],
@@ -91,95 +91,106 @@ def build_trials(
     """The valid trials among some: those whose numbers can be traced together, the others each by itself.
 
     Args:
-        several: the trials of the campaign.
+        campaign_trials: the trials of the campaign.
         part_cache: parts that they share.
         trials: their numbers in the campaign.
         sampled: their sampled values, by key path.
         traceable: which kinds of trials can be traced, as far as known, completed here; a matter of the campaign only.
     """
-    varied = _fractions(several)
-    for kind, places in _by_kind(several, trials, sampled, varied).items():
+    varied = _fractions(campaign_trials)
+    for kind, places in _by_kind(campaign_trials, trials, sampled, varied).items():
         if kind not in traceable:
-            traceable[kind] = _traceable(several, part_cache, kind, varied)
+            traceable[kind] = _traceable(campaign_trials, part_cache, kind, varied)
         numbers = {key: np.array(sampled[key])[places] for key in varied}
-        found = _together(several, part_cache, trials[places], numbers) if traceable[kind] else None
-        if found is not None:
-            yield found._replace(places=places[found.places])
-            places = np.delete(places, found.places)
-        for place, built in valid_trials(several, part_cache, trials[places].tolist()):
-            yield TrialBatch(places[[place]], built, batch_of(prepare_trial(built, recorded(several.campaign, built))))
+        traced_batch = _together(campaign_trials, part_cache, trials[places], numbers) if traceable[kind] else None
+        if traced_batch is not None:
+            yield traced_batch._replace(places=places[traced_batch.places])
+            places = np.delete(places, traced_batch.places)
+        for index, built in valid_trials(campaign_trials, part_cache, trials[places].tolist()):
+            prepared = prepare_trial(built, recorded(campaign_trials.campaign, built))
+            yield TrialBatch(places[[index]], built, batch_of(prepared))
 
 
-def _fractions(several: Trials) -> list[str]:
+def _fractions(campaign_trials: Trials) -> list[str]:
     """Key paths of `vary` whose values are fractions; the others are counts, words or parts."""
     fraction = lambda spread: all(type(value) is float for value in spread.choice or ())
-    return [key for key, spread in several.campaign.vary.items() if fraction(spread)]
+    return [key for key, spread in campaign_trials.campaign.vary.items() if fraction(spread)]
 
 
 def _by_kind(
-    several: Trials, trials: np.ndarray, sampled: Mapping[str, list[Any]], varied: list[str]
+    campaign_trials: Trials, trials: np.ndarray, sampled: Mapping[str, list[Any]], varied: list[str]
 ) -> dict[TrialSignature, np.ndarray]:
     """Places of trials by kind: one combination of `cross`, and the same values where these are no fractions."""
-    others = [column for key, column in sampled.items() if key not in varied]
+    discrete_columns = [column for key, column in sampled.items() if key not in varied]
     groups: dict[TrialSignature, list[int]] = {}
-    for place, trial in enumerate(trials.tolist()):
-        kind = TrialSignature(trial % len(several.combinations), repr([column[place] for column in others]))
-        groups.setdefault(kind, []).append(place)
+    for index, trial in enumerate(trials.tolist()):
+        values = [column[index] for column in discrete_columns]
+        kind = TrialSignature(trial % len(campaign_trials.combinations), repr(values))
+        groups.setdefault(kind, []).append(index)
     return {kind: np.array(places) for kind, places in groups.items()}
 
 
-def _traceable(several: Trials, part_cache: PartCache, kind: TrialSignature, varied: list[str]) -> bool:
+def _traceable(campaign_trials: Trials, part_cache: PartCache, kind: TrialSignature, varied: list[str]) -> bool:
     """Whether the first trials of a kind have the same bits when they are built together and alone."""
     if any(key_path(key)[0] not in _TRACED for key in varied):
         return False
-    samples = np.arange(min(_SEARCHED, several.campaign.trials))
-    trials = samples * len(several.combinations) + kind.combination
-    sampled = several.sampled(trials)
-    alike = _by_kind(several, trials, sampled, varied).get(kind, samples[:0])[:_COMPARED]
-    if len(alike) < _COMPARED:
+    samples = np.arange(min(_SEARCHED, campaign_trials.campaign.trials))
+    trials = samples * len(campaign_trials.combinations) + kind.combination
+    sampled = campaign_trials.sampled(trials)
+    of_kind = _by_kind(campaign_trials, trials, sampled, varied).get(kind, samples[:0])[:_COMPARED]
+    if len(of_kind) < _COMPARED:
         return False
-    numbers = {key: np.array(sampled[key])[alike] for key in varied}
-    return _together(several, part_cache, trials[alike], numbers, _COMPARED) is not None
+    numbers = {key: np.array(sampled[key])[of_kind] for key in varied}
+    return _together(campaign_trials, part_cache, trials[of_kind], numbers, _COMPARED) is not None
 
 
 def _together(
-    several: Trials, part_cache: PartCache, trials: np.ndarray, varied: Mapping[str, np.ndarray], compared: int = 1
+    campaign_trials: Trials,
+    part_cache: PartCache,
+    trials: np.ndarray,
+    varied: Mapping[str, np.ndarray],
+    compared: int = 1,
 ) -> TrialBatch | None:
     """Those of some trials that meet all conditions; None where their numbers cannot be traced.
 
     Args:
-        several: the trials of the campaign.
+        campaign_trials: the trials of the campaign.
         part_cache: parts that they share.
         trials: their numbers in the campaign.
         varied: values of the keys that vary.
         compared: how many valid ones, from the first one on, are built alone too and have to have the same bits.
     """
-    alone = dict(itertools.islice(valid_trials(several, part_cache, trials.tolist()), compared))
-    if not alone:
+    built_alone = dict(itertools.islice(valid_trials(campaign_trials, part_cache, trials.tolist()), compared))
+    if not built_alone:
         return None
-    first = alone[min(alone)]
-    batch = batch_of(prepare_trial(first, recorded(several.campaign, first)))
+    first = built_alone[min(built_alone)]
+    batch = batch_of(prepare_trial(first, recorded(campaign_trials.campaign, first)))
     try:
         form = structure(batch.first.run)
         numbers, conditions = _traced(part_cache, first, varied, form) if varied else (batch.numbers.copy(), [])
     except Exception:  # whatever a constructor, of a user's own too, does with numbers that are not known
         return None
-    numbers[-1] = np.stack([np.zeros_like(several.seeds(trials)), several.seeds(trials)], axis=1)  # the random keys
-    good = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
-    for place in np.flatnonzero(good[: max(alone) + 1]).tolist():
-        if place not in alone or not _same(batch.first.run, numbers, place, loop_run(alone[place])):
+    seeds = campaign_trials.seeds(trials)
+    numbers[-1] = np.stack([np.zeros_like(seeds), seeds], axis=1)  # the random keys
+    valid = np.logical_and.reduce([np.ones(len(trials), dtype=bool), *conditions])
+    # Every valid trial up to the last one built alone has to agree: one that only tracing accepts, or that differs in
+    # one bit, shows that the numbers of this kind cannot be traced.
+    for index in np.flatnonzero(valid[: max(built_alone) + 1]).tolist():
+        if index not in built_alone or not _same(batch.first.run, numbers, index, loop_run(built_alone[index])):
             return None
-    places = np.flatnonzero(good)
-    own = [None if number is None else number[places] for number in numbers]
-    return TrialBatch(places, first, batch._replace(numbers=own, size=len(places)))
+    places = np.flatnonzero(valid)
+    batch_numbers = [None if number is None else number[places] for number in numbers]
+    return TrialBatch(places, first, batch._replace(numbers=batch_numbers, size=len(places)))
 
 
-def _same(first: Any, numbers: list[np.ndarray | None], place: int, alone: Any) -> bool:
+def _same(first: Any, numbers: list[np.ndarray | None], index: int, built_alone: Any) -> bool:
     """Whether a trial has the same bits as when it is built alone."""
-    if structure(first) != structure(alone):
+    if structure(first) != structure(built_alone):
         return False
-    here = [leaf if number is None else number[place] for leaf, number in zip(numbers_of(first), numbers, strict=True)]
-    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in zip(here, numbers_of(alone), strict=True))
+    pairs = zip(numbers_of(first), numbers, strict=True)
+    batch_leaves = [leaf if number is None else number[index] for leaf, number in pairs]
+    of_both = zip(batch_leaves, numbers_of(built_alone), strict=True)
+    return all(np.asarray(a).tobytes() == np.asarray(b).tobytes() for a, b in of_both)
 
 
 def _traced(
@@ -200,8 +211,8 @@ def _traced(
         return [leaf for leaf in numbers_of(run) if isinstance(leaf, Tracer)], conditions
 
     with runtime.in_precision("float64"):
-        found, conditions = jax.vmap(numbers)(dict(varied))
-    columns = map(np.asarray, found)
+        traced_leaves, conditions = jax.vmap(numbers)(dict(varied))
+    columns = map(np.asarray, traced_leaves)
     return [next(columns) if varies else None for varies in vary], list(map(np.asarray, conditions))
 
 
@@ -209,12 +220,12 @@ def with_value(node: Any, path: tuple[str | int, ...], value: Any) -> Any:
     """A scenario, or what is in it, with another value at a path; a list of numbers becomes an array."""
     if not path:
         return value
-    step, *rest = path
+    step, *inner_path = path
     if isinstance(node, BaseModel):
-        return node.model_copy(update={str(step): with_value(getattr(node, str(step)), tuple(rest), value)})
+        return node.model_copy(update={str(step): with_value(getattr(node, str(step)), tuple(inner_path), value)})
     if isinstance(node, jax.Array):
         return node.at[step].set(value)
     inner = node.copy()
-    inner[step] = with_value(node[step], tuple(rest), value)
+    inner[step] = with_value(node[step], tuple(inner_path), value)
     numeric = isinstance(inner, list) and all(isinstance(entry, float | int | Tracer) for entry in inner)
     return jnp.stack([as_array(entry) for entry in inner]) if numeric else inner

@@ -35,23 +35,23 @@ class Distribution(Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _by_its_name(cls, given: Any) -> Any:
-        if not isinstance(given, dict) or {"distribution", "kind", "type"} & set(given):
-            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+    def _by_its_name(cls, value: Any) -> Any:
+        if not isinstance(value, dict) or {"distribution", "kind", "type"} & set(value):
+            low, high = value if isinstance(value, list) and len(value) == 2 else ("low", "high")
             raise ValueError(f"be a distribution with its numbers, such as {{uniform: [{low}, {high}]}}")
-        return given
+        return value
 
     @model_validator(mode="after")
     def _one(self) -> "Distribution":
-        given = [name for name in type(self).model_fields if getattr(self, name) is not None]
-        if len(given) != 1:
+        distribution_names = [name for name in type(self).model_fields if getattr(self, name) is not None]
+        if len(distribution_names) != 1:
             raise ValueError("have one of uniform, log_uniform, normal, choice")
-        pair = getattr(self, given[0])
-        if given[0] in ("uniform", "log_uniform") and not pair[0] < pair[1]:
+        pair = getattr(self, distribution_names[0])
+        if distribution_names[0] in ("uniform", "log_uniform") and not pair[0] < pair[1]:
             raise ValueError("have low below high")
-        if given[0] == "log_uniform" and not pair[0] > 0:
+        if distribution_names[0] == "log_uniform" and not pair[0] > 0:
             raise ValueError("have positive bounds")
-        if given[0] == "normal" and not pair[1] >= 0:
+        if distribution_names[0] == "normal" and not pair[1] >= 0:
             raise ValueError("have a standard deviation that is not negative")
         return self
 
@@ -63,10 +63,10 @@ class CampaignRequirement(RunRequirement, title="Requirement"):
 
     @field_validator("share")
     @classmethod
-    def _provable(cls, given: float) -> float:
-        if given >= 1:
+    def _provable(cls, share: float) -> float:
+        if share >= 1:
             raise ValueError("be less than 1, because no number of trials can demonstrate 100 %; 0.99, for example")
-        return given
+        return share
 
 
 class RecordedSignals(Strict, title="Series"):
@@ -81,10 +81,10 @@ class RecordedSignals(Strict, title="Series"):
 
     @field_validator("signals")
     @classmethod
-    def _once(cls, given: list[str]) -> list[str]:
-        if len(set(given)) < len(given):
+    def _once(cls, signals: list[str]) -> list[str]:
+        if len(set(signals)) < len(signals):
             raise ValueError("name every signal once")
-        return given
+        return signals
 
 
 class Campaign(Strict):
@@ -120,20 +120,20 @@ class Campaign(Strict):
 
     @field_validator("scenario", mode="before")
     @classmethod
-    def _file_or_mapping(cls, given: Any) -> Any:
-        if not isinstance(given, str | dict):
+    def _file_or_mapping(cls, value: Any) -> Any:
+        if not isinstance(value, str | dict):
             raise ValueError("be the name of a file, or a mapping of keys to values")
-        return given
+        return value
 
     @field_validator("cross", mode="before")
     @classmethod
-    def _named(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            return given
-        for key, values in given.items():
+    def _named(cls, sweeps: Any) -> Any:
+        if not isinstance(sweeps, dict):
+            return sweeps
+        for key, values in sweeps.items():
             if not isinstance(values, list | dict):
                 raise ValueError(f"have a list of values for `{key}`, or values by names")
-        return {key: by_name(values) if isinstance(values, list) else values for key, values in given.items()}
+        return {key: by_name(values) if isinstance(values, list) else values for key, values in sweeps.items()}
 
     @property
     def axes(self) -> dict[str, dict[str, Any]]:
@@ -143,7 +143,8 @@ class Campaign(Strict):
     @property
     def formulas(self) -> dict[str, str]:
         """Temporal formulas of the requirements, by name."""
-        return {name: one.formula for name, one in self.requirements.items() if one.formula is not None}
+        formulas = {name: requirement.formula for name, requirement in self.requirements.items()}
+        return {name: formula for name, formula in formulas.items() if formula is not None}
 
     @property
     def keys(self) -> list[str]:
@@ -196,23 +197,24 @@ def validate(text: Text) -> Campaign:
         name = text.name or "NAME.yaml"
         raise BadInput(name, "be a campaign", f"a {kind}", hint=_REMEDIES[kind].format(name=name))
     try:
-        found = Campaign.model_validate(text.data)
+        campaign = Campaign.model_validate(text.data)
     except ValidationError as errors:
         raise complaint(errors, text, Campaign) from None
-    pairs = [(section, key) for section in ("vary", "cross") for key in getattr(found, section)]
+    pairs = [(section, key) for section in ("vary", "cross") for key in getattr(campaign, section)]
+    varied_keys = [key for _, key in pairs]
     for section, key in pairs:
-        _check_key(section, key, [other for _, other in pairs], text.where((section, key)))
-    if found.variants and VARIANT in found.cross:
+        _check_key(section, key, varied_keys, text.where((section, key)))
+    if campaign.variants and VARIANT in campaign.cross:
         raise BadInput(f"cross.{VARIANT}", "be left out beside `variants`", where=text.where(("cross", VARIANT)))
-    for name, variant in found.variants.items():
+    for name, variant in campaign.variants.items():
         for key in variant:
-            _check_key("variants", key, [*found.vary, key], text.where(("variants", name, key)))
-    for key, entries in found.cross.items():
+            _check_key("variants", key, [*campaign.vary, key], text.where(("variants", name, key)))
+    for key, entries in campaign.cross.items():
         _check_entries(key, entries, text.where(("cross", key)))
-    return found
+    return campaign
 
 
-def _check_key(section: str, key: str, every: list[str], where: str) -> None:
+def _check_key(section: str, key: str, varied_keys: list[str], where: str) -> None:
     """A key path of `vary` or `cross`."""
     if not _PATH.fullmatch(key):
         must = "be a key path such as plant.vehicle.mass or initial.position[0]"
@@ -222,13 +224,13 @@ def _check_key(section: str, key: str, every: list[str], where: str) -> None:
     if key == "seed":
         hint = "Every trial has its own seed, which follows from the `seed` of the campaign"
         raise BadInput(f"{section}.seed", "be left out", hint=hint, where=where)
-    if every.count(key) > 1:
+    if varied_keys.count(key) > 1:
         raise BadInput(
             f"{section if section == 'variants' else 'cross'}.{key}", "not be in `vary` as well", where=where
         )
-    for other in every:
-        if other.startswith((f"{key}.", f"{key}[")):
-            raise BadInput(other, f"not be given together with {key}, which contains it", where=where)
+    for other_key in varied_keys:
+        if other_key.startswith((f"{key}.", f"{key}[")):
+            raise BadInput(other_key, f"not be given together with {key}, which contains it", where=where)
 
 
 def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
@@ -239,10 +241,10 @@ def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:
     if set(entries) <= set(Distribution.model_fields):
         hint = f"Distributions belong to `vary`. Here, write `{key}: [first, second]`, or names and values"
         raise BadInput(name, "be a list, or values by names", f"{next(iter(entries))} alone", hint=hint, where=where)
-    known: dict[str, str] = {}
+    words_by_value: dict[str, str] = {}
     for word, entry in entries.items():
-        same = known.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
-        if same != word:
+        first_word = words_by_value.setdefault(repr(float(entry) if isinstance(entry, int) else entry), word)
+        if first_word != word:
             raise BadInput(name, "have entries that differ", f"twice {words(entry)}", where=where)
 
 

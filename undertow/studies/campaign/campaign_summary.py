@@ -24,10 +24,10 @@ _CORRELATED = 100_000
 
 def quantiles(values: np.ndarray) -> dict[str, float]:
     """5 %, 50 % and 95 % quantiles of numbers, without undefined ones; some may be infinite."""
-    known = values[~np.isnan(values)]
-    method: Any = "linear" if np.isfinite(known).all() else "higher"
-    found = np.quantile(known, QUANTILES, method=method) if known.size else np.full(len(QUANTILES), np.nan)
-    return dict(zip(map(str, QUANTILES), found.tolist(), strict=True))
+    defined = values[~np.isnan(values)]
+    method: Any = "linear" if np.isfinite(defined).all() else "higher"
+    estimates = np.quantile(defined, QUANTILES, method=method) if defined.size else np.full(len(QUANTILES), np.nan)
+    return dict(zip(map(str, QUANTILES), estimates.tolist(), strict=True))
 
 
 def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float, float]:
@@ -60,7 +60,7 @@ def correlations(results: Results, realized: Mapping[str, np.ndarray]) -> dict[s
         realized: see `realized_scalars`; one value per completed trial.
     """
     sampled = {key: results.rows[f"vary:{key}"] for key in results.campaign.vary}
-    columns = {key: one.values[results.lasted] for key, one in sampled.items() if "choices" not in one.attrs}
+    columns = {key: column.values[results.lasted] for key, column in sampled.items() if "choices" not in column.attrs}
     of_vary = _correlations(results, columns)
     of_seeds = _correlations(results, realized)
     effect = lambda key: max(map(abs, of_seeds[key].values()))
@@ -71,27 +71,28 @@ def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[s
     """Input -> metric -> rank correlation, for columns with one value per completed trial."""
     from scipy.stats import spearmanr  # takes as long to import as all else here
 
-    found: dict[str, dict[str, float]] = {}
+    by_input: dict[str, dict[str, float]] = {}
     numbers = results.combinations[results.lasted][:_CORRELATED]
     columns = {key: column[:_CORRELATED] for key, column in columns.items()}
     metrics = {name: results.rows[name].values[results.lasted][:_CORRELATED] for name in results.metrics}
     for (key, column), (name, values) in itertools.product(columns.items(), metrics.items()):
-        known = np.isfinite(column) & np.isfinite(values)
-        groups = [known & (numbers == number) for number in np.unique(numbers)]
+        defined = np.isfinite(column) & np.isfinite(values)
+        groups = [defined & (numbers == number) for number in np.unique(numbers)]
         pairs = [(column[group], values[group]) for group in groups]
-        each = [
-            float(spearmanr(*pair)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
-            for pair in pairs
-            if all(len(one) > 2 and np.ptp(one) > 0 for one in pair)
+        # Without three points, or where one of the two is constant, there is no rank correlation.
+        coefficients = [
+            float(spearmanr(x, y)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
+            for x, y in pairs
+            if len(x) > 2 and np.ptp(x) > 0 and np.ptp(y) > 0
         ]
-        if each:
-            found.setdefault(key, {})[name] = sum(each) / len(each)
-    return found
+        if coefficients:
+            by_input.setdefault(key, {})[name] = sum(coefficients) / len(coefficients)
+    return by_input
 
 
 def by_choice(results: Results) -> dict[str, dict[str, Any]]:
     """Trials, failures and metrics for every entry of a choice, over all combinations."""
-    found: dict[str, dict[str, Any]] = {}
+    by_key: dict[str, dict[str, Any]] = {}
     for key in results.campaign.vary:
         column = results.rows[f"vary:{key}"]
         for i, word in enumerate(column.attrs.get("choices", ())):
@@ -99,14 +100,14 @@ def by_choice(results: Results) -> dict[str, dict[str, Any]]:
             lasted, failed = chosen & results.lasted, chosen & results.ran & ~results.lasted
             metrics = defined_quantiles(results.rows, results.metrics, lasted)
             counts = {"trials": int(chosen.sum()), "failed": int(failed.sum())}
-            found.setdefault(key, {})[word] = counts | {"metrics": metrics}
-    return found
+            by_key.setdefault(key, {})[word] = counts | {"metrics": metrics}
+    return by_key
 
 
 _WORST = 5
 
 
-def summary(results: Results, several: Trials) -> dict[str, Any]:
+def summary(results: Results, campaign_trials: Trials) -> dict[str, Any]:
     """The contents of summary.json; the trials tell why some were invalid."""
     trials = results.rows["trial"].values
     invalid, lasted = trials[~results.ran], trials[results.lasted]
@@ -114,11 +115,11 @@ def summary(results: Results, several: Trials) -> dict[str, Any]:
         "trials": results.total,
         "done": results.rows.sizes["trial"],
         "status": endings(results.rows),
-        "nominal_model": several.nominal_model(),
+        "nominal_model": campaign_trials.nominal_model(),
         "by_xla": int((results.rows["backend"].values == XLA).sum()),
-        "invalid": [one._asdict() for one in reasons(several, invalid)],  # pyright: ignore[reportArgumentType] - an array serves as rows
+        "invalid": [group._asdict() for group in reasons(campaign_trials, invalid)],  # pyright: ignore[reportArgumentType] - an array serves as rows
         "combinations": [_combination(results, number) for number in np.unique(results.combinations)],
-        "sensitivity": correlations(results, realized_scalars(several, lasted)),  # pyright: ignore[reportArgumentType] - likewise
+        "sensitivity": correlations(results, realized_scalars(campaign_trials, lasted)),  # pyright: ignore[reportArgumentType] - likewise
         "choices": by_choice(results),
         "worst": [int(trial) for trial in _worst(results)],
     }
@@ -132,9 +133,9 @@ def endings(rows: xr.Dataset) -> dict[str, int]:
 
 def _combination(results: Results, number: int) -> dict[str, Any]:
     """Distributions and requirements of one combination of `cross`."""
-    own = results.combinations == number
-    rows = results.rows if own.all() else results.rows.isel(trial=own)
-    lasted, ran = results.lasted[own], results.ran[own]
+    selected = results.combinations == number
+    rows = results.rows if selected.all() else results.rows.isel(trial=selected)
+    lasted, ran = results.lasted[selected], results.ran[selected]
     return {
         "values": dict(zip(results.campaign.axes, results.named(number), strict=True)),
         "trials": int(lasted.size),

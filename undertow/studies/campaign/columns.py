@@ -63,15 +63,16 @@ FLAGS = Label(("task",), {"long_name": "1 for tasks that are written"}, "uint8")
 _DTYPES = {"trial": "uint32", "seed": "uint32", "status": "int8", "backend": "int8", "success": "int8"}
 
 
-def labels(several: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
+def labels(campaign_trials: Trials, built: Built, metrics: Mapping[str, Metric]) -> dict[str, Label]:
     """Labels of all columns, by name; `built` is one of the trials, `metrics` are those that any of them may have."""
-    found, along = trial_labels(several.campaign, metrics), (*several.campaign.axes, SAMPLES)
+    columns = trial_labels(campaign_trials.campaign, metrics)
+    dimensions = (*campaign_trials.campaign.axes, SAMPLES)
     loop = built.closed_loop
-    for name in several.campaign.series.signals if several.campaign.series else ():
+    for name in campaign_trials.campaign.series.signals if campaign_trials.campaign.series else ():
         signal = loop.signals()[name]
-        said = _said(*dataset.meaning(signal, loop.plant)) | {"comment": _AFTER}
-        found[f"series:{name}"] = Label((*along, *dataset.dimensions(signal)), said)
-    return found
+        attributes = _said(*dataset.meaning(signal, loop.plant)) | {"comment": _AFTER}
+        columns[f"series:{name}"] = Label((*dimensions, *dataset.dimensions(signal)), attributes)
+    return columns
 
 
 def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str, Label]:
@@ -81,23 +82,25 @@ def trial_labels(campaign: Campaign, metrics: Mapping[str, Metric]) -> dict[str,
         f"vary:{key}": {"long_name": key} if entries is None else {"long_name": key, "choices": list(entries)}
         for key, entries in varied_keys(campaign)
     }
-    along, of_trials = (*campaign.axes, SAMPLES), sampled | ALWAYS | of_metrics
-    return {name: Label(along, said, _DTYPES.get(name, "float64")) for name, said in of_trials.items()}
+    dimensions = (*campaign.axes, SAMPLES)
+    of_trials = sampled | ALWAYS | of_metrics
+    return {name: Label(dimensions, attributes, _DTYPES.get(name, "float64")) for name, attributes in of_trials.items()}
 
 
-def coordinates(several: Trials, built: Built) -> dict[str, xr.Variable]:
+def coordinates(campaign_trials: Trials, built: Built) -> dict[str, xr.Variable]:
     """Coordinates of the dimensions: values of `cross`, or their names; and those of recorded series."""
-    axes = several.campaign.axes
-    found = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in axes.items()}
-    if several.campaign.series is None:
-        return found
-    times = prepare_trial(built, several.campaign.series).plan.times()
-    return found | dataset.coordinates(times, built.closed_loop.plant)
+    axes = campaign_trials.campaign.axes
+    variables = {key: xr.Variable((key,), _swept(entries), {"long_name": key}) for key, entries in axes.items()}
+    if campaign_trials.campaign.series is None:
+        return variables
+    times = prepare_trial(built, campaign_trials.campaign.series).plan.times()
+    return variables | dataset.coordinates(times, built.closed_loop.plant)
 
 
 def _swept(entries: dict[str, Any]) -> np.ndarray:
     """The values where they are unnamed numbers or booleans; otherwise their names."""
-    values, named = list(entries.values()), any(name != words(value) for name, value in entries.items())
+    values = list(entries.values())
+    named = any(name != words(value) for name, value in entries.items())
     if not named and all(isinstance(value, bool) for value in values):
         return np.array(values)
     return np.array(values, dtype=float) if not named and all(map(is_number, values)) else np.array(list(entries))

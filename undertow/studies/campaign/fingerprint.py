@@ -18,16 +18,16 @@ class Identity(NamedTuple):
     asked: str  # the complete campaign file; requirements may change
     attributes: dict[str, str]  # must be equal in a store that is resumed
 
-    def check_same(self, found: Mapping[str, Any], folder: Path) -> None:
+    def check_same(self, stored: Mapping[str, Any], folder: Path) -> None:
         """Check by its attributes that the store in a folder belongs to this campaign, or to one with fewer samples.
 
         Raises:
             BadInput: it belongs to another campaign.
         """
-        other = [key for key, value in self.attributes.items() if found.get(key) != value]
+        differing = [key for key, value in self.attributes.items() if stored.get(key) != value]
         try:
-            why = self._why(other[0], found) if other else self._fewer(found)
-            why = why or ("" if isinstance(found["chunk"], list) else "its attributes are damaged: `chunk`")
+            why = self._why(differing[0], stored) if differing else self._fewer(stored)
+            why = why or ("" if isinstance(stored["chunk"], list) else "its attributes are damaged: `chunk`")
         except (KeyError, TypeError, ValueError, AttributeError, BadInput) as error:
             why = f"its attributes are damaged: {type(error).__name__}, {error}"
         if why:
@@ -35,44 +35,44 @@ class Identity(NamedTuple):
             must = "be the folder of the same campaign, by the same versions"
             raise BadInput("--out", must, f"another one's: {why} ({folder})", hint=hint)
 
-    def _why(self, key: str, found: Mapping[str, Any]) -> str:
+    def _why(self, key: str, stored: Mapping[str, Any]) -> str:
         """The difference that an attribute indicates."""
         if key == "campaign_hash":
-            return difference(_decisive(str(found["campaign"])), _decisive(self.asked))
+            return difference(_decisive(str(stored["campaign"])), _decisive(self.asked))
         if key == "scenario_hash":
             return "a file that the scenario names had other contents"
-        return f"`{key}` was {found.get(key)}, is {self.attributes[key]}"
+        return f"`{key}` was {stored.get(key)}, is {self.attributes[key]}"
 
-    def _fewer(self, found: Mapping[str, Any]) -> str:
+    def _fewer(self, stored: Mapping[str, Any]) -> str:
         """A sentence where there would be fewer samples than before; otherwise empty."""
-        before, now = samples(str(found["campaign"])), samples(self.asked)
+        before, now = samples(str(stored["campaign"])), samples(self.asked)
         return f"`trials` was {before}, is {now}" if now < before else ""
 
 
-def identity(asked: str, named: Sequence[Mapping[str, Any]]) -> Identity:
+def identity(campaign_text: str, named: Sequence[Mapping[str, Any]]) -> Identity:
     """Fingerprint of a campaign: of its complete file, and of scenarios with the contents of all files they name.
 
     These files may change too.
     """
-    deciding = {"campaign": _decisive(asked), "scenario": _as_floats(list(named))}
+    deciding = {"campaign": _decisive(campaign_text), "scenario": _as_floats(list(named))}
     hashes = {f"{name}_hash": text_hash(json.dumps(data, sort_keys=True)) for name, data in deciding.items()}
-    return Identity(asked, hashes | versions())
+    return Identity(campaign_text, hashes | versions())
 
 
-def samples(asked: str) -> int:
+def samples(campaign_text: str) -> int:
     """Number of samples of a campaign."""
-    return _plain(asked)["trials"]
+    return _plain(campaign_text)["trials"]
 
 
-def _decisive(asked: str) -> dict[str, Any]:
+def _decisive(campaign_text: str) -> dict[str, Any]:
     """The part of a campaign file that determines the rows, without bounds of metrics; 2 and 2.0 are equal.
 
     The number of samples is part of it only for a Latin hypercube, where every point depends on it. The order of keys
     is part of it because it determines the numbers of the trials.
     """
-    required = _plain(asked)["requirements"].items()
-    formulas = {name: one["formula"] for name, one in required if "formula" in one}
-    data: dict[str, Any] = {**_plain(asked), "requirements": formulas}
+    required = _plain(campaign_text)["requirements"].items()
+    formulas = {name: requirement["formula"] for name, requirement in required if "formula" in requirement}
+    data: dict[str, Any] = {**_plain(campaign_text), "requirements": formulas}
     orders = {"vary": data["vary"], "cross": data["cross"]}
     orders |= {f"cross.{key}": entries for key, entries in data["cross"].items()}
     data |= {f"order of {name}": ", ".join(entries) for name, entries in orders.items()}
@@ -82,16 +82,16 @@ def _decisive(asked: str) -> dict[str, Any]:
 
 def _as_floats(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _as_floats(one) for key, one in value.items()}
+        return {key: _as_floats(entry) for key, entry in value.items()}
     if isinstance(value, list):
-        return [_as_floats(one) for one in value]
+        return [_as_floats(entry) for entry in value]
     return float(value) if is_number(value) else value
 
 
 # The stored file and the current one: parsing is slow for large sweeps.
 @functools.lru_cache(maxsize=2)
-def _plain(asked: str) -> dict[str, Any]:
-    return parse(asked, "", Path(), file="campaign").data
+def _plain(campaign_text: str) -> dict[str, Any]:
+    return parse(campaign_text, "", Path(), file="campaign").data
 
 
 def difference(before: Any, now: Any, path: str = "") -> str:
@@ -101,9 +101,9 @@ def difference(before: Any, now: Any, path: str = "") -> str:
             if before.get(key) != now.get(key):
                 return difference(before.get(key), now.get(key), f"{path}.{key}".lstrip("."))
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        for i, (one, other) in enumerate(zip(before, now, strict=True)):
-            if one != other:
-                return difference(one, other, f"{path}[{i}]")
+        for i, (old_entry, new_entry) in enumerate(zip(before, now, strict=True)):
+            if old_entry != new_entry:
+                return difference(old_entry, new_entry, f"{path}[{i}]")
     return f"`{path}` was {_word(before)}, is {_word(now)}"
 
 

@@ -26,7 +26,7 @@ def words(value: Any) -> str:
     """A value of a scenario in one line; a part by its kind and options."""
     if isinstance(value, dict):
         kind = [str(value["kind"])] if "kind" in value else []
-        return " ".join(kind + [f"{key}={words(one)}" for key, one in value.items() if key != "kind"])
+        return " ".join(kind + [f"{key}={words(option)}" for key, option in value.items() if key != "kind"])
     if isinstance(value, list):
         return f"[{', '.join(map(words, value))}]"
     return str(value)

@@ -50,48 +50,49 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     Raises:
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
-    several = trials(campaign, source, allow_code)
-    check_kind(several.scenario, "scenario", source.where(("scenario",)))
-    text, folder = whole(campaign, several.scenario.data), several.scenario.folder
-    here = tasks.site(text, str(folder))
-    firsts = [_first(several, here, combination) for combination in range(len(several.combinations))]
+    campaign_trials = trials(campaign, source, allow_code)
+    check_kind(campaign_trials.scenario, "scenario", source.where(("scenario",)))
+    text = whole(campaign, campaign_trials.scenario.data)
+    folder = campaign_trials.scenario.folder
+    context = tasks.site(text, str(folder))
+    firsts = [_first(campaign_trials, context, combination) for combination in range(len(campaign_trials.combinations))]
     with within(location=source.location):
-        _check_shapes(campaign, here.probes().values())
-    metrics = here.metrics()
+        _check_shapes(campaign, context.probes().values())
+    metrics = context.metrics()
     advice: dict[str, str] = {}
     for row, built in firsts:
         with within(location=source.location):
             _check(campaign, built, metrics)
-        with within(location=several.location):
-            found = (*built.advice(), *vehicle_advice(built))
-        for one in found:
-            advice.setdefault(one.sentence, f"trial {row}: {one.sentence}")
+        with within(location=campaign_trials.location):
+            trial_advice = (*built.advice(), *vehicle_advice(built))
+        for warning in trial_advice:
+            advice.setdefault(warning.sentence, f"trial {row}: {warning.sentence}")
     by_simd = any(built.scenario.loop.backend == "simd" for _, built in firsts)
     why = unavailable() if by_simd else ""
     slower = (f"trials are computed by backend xla, which is slower: {why}",) if why else ()
-    advice_given = (*slower, *too_few(campaign), *_invalid(several, here), *advice.values())
-    named = (*(built.resolved for _, built in firsts), *(built.resolved for built in here.alternatives()))
-    return Prepared(several, text, folder, firsts[0][1], metrics, named, advice_given)
+    advice_given = (*slower, *too_few(campaign), *_invalid(campaign_trials, context), *advice.values())
+    named = (*(built.resolved for _, built in firsts), *(built.resolved for built in context.alternatives()))
+    return Prepared(campaign_trials, text, folder, firsts[0][1], metrics, named, advice_given)
 
 
-def _invalid(several: Trials, here: tasks.Site) -> tuple[str, ...]:
+def _invalid(campaign_trials: Trials, context: tasks.Site) -> tuple[str, ...]:
     """Why some of the first trials cannot be built."""
-    rows = several.probes()
-    found = reasons(several, [row for row in rows if row not in here.probes()])
-    return tuple(f"{one.trials} of the first {len(rows)} trials are invalid: {one.why}" for one in found)
+    rows = campaign_trials.probes()
+    groups = reasons(campaign_trials, [row for row in rows if row not in context.probes()])
+    return tuple(f"{group.trials} of the first {len(rows)} trials are invalid: {group.why}" for group in groups)
 
 
-def _first(several: Trials, here: tasks.Site, combination: int) -> tuple[int, Built]:
+def _first(campaign_trials: Trials, context: tasks.Site, combination: int) -> tuple[int, Built]:
     """The first trial of a combination that can be built.
 
     Raises:
         BadInput: none of the first trials can be built; the error of the first one.
     """
-    rows = several.first(combination)
+    rows = campaign_trials.first(combination)
     for row in rows:
-        if row in here.probes():
-            return row, here.probes()[row]
-    return rows[0], build_trial(several, here.part_cache, rows[0])
+        if row in context.probes():
+            return row, context.probes()[row]
+    return rows[0], build_trial(campaign_trials, context.part_cache, rows[0])
 
 
 def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> None:
@@ -117,13 +118,13 @@ def _check(campaign: Campaign, built: Built, metrics: Mapping[str, Metric]) -> N
         raise BadInput("series.every", f"be at most the duration ({loop.duration:g} s)", f"{campaign.series.every:g} s")
 
 
-def _check_shapes(campaign: Campaign, several: Iterable[Built]) -> None:
+def _check_shapes(campaign: Campaign, first_trials: Iterable[Built]) -> None:
     """Check that series have the same shape in all trials, because one array holds them."""
     if campaign.series is None and not campaign.formulas:
         return
     hint = "Leave it out, or run a separate campaign for each of them"
     name = "series" if campaign.series is not None else f"requirements.{next(iter(campaign.formulas))}"
-    loops = [built.closed_loop for built in several]
+    loops = [built.closed_loop for built in first_trials]
     if len({(loop.plant.outputs, loop.plant.inputs()) for loop in loops}) > 1:
         raise BadInput(name, "be of plants with the same outputs and inputs", "of several", hint=hint)
     if (

@@ -34,7 +34,7 @@ _LONGEST = 16
 _OTHERS = range(1, 5)
 
 
-def realized_scalars(several: Trials, rows: Sequence[int]) -> dict[str, np.ndarray]:
+def realized_scalars(campaign_trials: Trials, rows: Sequence[int]) -> dict[str, np.ndarray]:
     """Scalars that the seed determines, by key path and kind of part: `navigation.sensors[1].offset[0] (dvl)`.
 
     These are the entries of what disturbance and faults realize and of the state in which the navigation filter starts.
@@ -42,17 +42,19 @@ def realized_scalars(several: Trials, rows: Sequence[int]) -> dict[str, np.ndarr
     `|navigation.sensors[1].offset[0]| (dvl)`.
 
     Args:
-        several: the trials.
+        campaign_trials: the trials.
         rows: numbers of valid trials; only the first 500 are built again.
 
     Returns:
         One value per row: NaN where a trial has no such scalar, or was not built again.
     """
-    part_cache, random, found = PartCache(), set[str](), dict[tuple[str, str], np.ndarray]()
-    probes = {*rows[:1], *several.probes()}
+    part_cache = PartCache()
+    random = set[str]()
+    columns = dict[tuple[str, str], np.ndarray]()
+    probes = {*rows[:1], *campaign_trials.probes()}
     with runtime.on_processor(), contextlib.suppress(BadInput):  # a file that the scenario names may be gone by now
-        for place, row in enumerate(rows[:MOST]):
-            built = build_trial(several, part_cache, int(row))
+        for index, row in enumerate(rows[:MOST]):
+            built = build_trial(campaign_trials, part_cache, int(row))
             if row in probes:
                 random |= _random(built)
             elif not random:  # no part of the scenario is random
@@ -60,8 +62,8 @@ def realized_scalars(several: Trials, rows: Sequence[int]) -> dict[str, np.ndarr
             for name, values in _realized(built).items() if random else ():
                 for i, value in enumerate(np.atleast_1d(values) if name in random else ()):
                     entry = f"{name}[{i}]" if values.ndim else name, _kind(built.resolved, name)
-                    found.setdefault(entry, np.full(len(rows), np.nan))[place] = value
-    return {name: column for entry, values in found.items() for name, column in _signed_and_size(*entry, values)}
+                    columns.setdefault(entry, np.full(len(rows), np.nan))[index] = value
+    return {name: column for entry, values in columns.items() for name, column in _signed_and_size(*entry, values)}
 
 
 def _signed_and_size(name: str, kind: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -74,15 +76,17 @@ def _random(built: Built) -> set[str]:
     """Names of the arrays that depend on the seed."""
     if not _realized(built, trace=True):  # which takes no compiling
         return set()
-    own, others = _realized(built), [_realized(built, number) for number in _OTHERS]
-    return {name for name, values in own.items() if any((values != other[name]).any() for other in others)}
+    scalars = _realized(built)
+    of_other_seeds = [_realized(built, number) for number in _OTHERS]
+    differs = lambda name: any((scalars[name] != realization[name]).any() for realization in of_other_seeds)
+    return {name for name in scalars if differs(name)}
 
 
 @in_its_precision
-def _realized(built: Built, other: int = 0, trace: bool = False) -> dict[str, Any]:
+def _realized(built: Built, seed_number: int = 0, trace: bool = False) -> dict[str, Any]:
     """Short arrays of the realization, by key path; those of another seed where a number is given; or their shapes."""
     run = loop_run(built)
-    key = jax.random.fold_in(run.key, other) if other else run.key
+    key = jax.random.fold_in(run.key, seed_number) if seed_number else run.key
     tree = eqx.filter_eval_shape(_start, run.loop, run.start, key) if trace else _compiled(run.loop, run.start, key)
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
     short = lambda leaf: (

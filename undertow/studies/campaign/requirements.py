@@ -26,7 +26,8 @@ def formulas_of(campaign: Campaign, built: Built) -> tuple[temporal.Requirement,
     if not campaign.formulas:
         return ()
     with within("requirements"):
-        loop, duration = built.closed_loop, built.scenario.loop.duration
+        loop = built.closed_loop
+        duration = built.scenario.loop.duration
         return temporal.requirements_of(campaign.formulas, {}, loop, {}, duration)
 
 
@@ -56,14 +57,14 @@ def recorded(campaign: Campaign, built: Built) -> RecordedSignals | None:
     needed = temporal.needed_signals(formulas_of(campaign, built))
     if not needed:
         return campaign.series
-    asked = campaign.series.signals if campaign.series is not None else []
-    return RecordedSignals(signals=list(dict.fromkeys([*asked, *needed])), every=built.scenario.loop.record)
+    signals = campaign.series.signals if campaign.series is not None else []
+    return RecordedSignals(signals=list(dict.fromkeys([*signals, *needed])), every=built.scenario.loop.record)
 
 
 def formula_metrics(campaign: Campaign) -> dict[str, Metric]:
     """Metrics that hold the robustness of the formulas, by name."""
-    said = "robustness of the requirement `{}`: signed distance to its violation, as a share of the bound"
-    return {name: Metric("", said.format(text)) for name, text in campaign.formulas.items()}
+    meaning = "robustness of the requirement `{}`: signed distance to its violation, as a share of the bound"
+    return {name: Metric("", meaning.format(text)) for name, text in campaign.formulas.items()}
 
 
 def robustness(
@@ -76,20 +77,21 @@ def robustness(
         built: each trial, or one of the same kind.
         series, status, ended: results of the trials.
     """
-    found = {name: np.full(len(built), np.nan) for name in campaign.formulas}
-    if not found:
-        return found
+    by_name = {name: np.full(len(built), np.nan) for name in campaign.formulas}
+    if not by_name:
+        return by_name
     required: dict[int, tuple[temporal.Requirement, ...]] = {}
-    for row, one in enumerate(built):
-        if id(one) not in required:
-            required[id(one)] = formulas_of(campaign, one)
-        asked, loop = required[id(one)], one.scenario.loop
-        needed = temporal.needed_signals(asked)
+    for row, trial in enumerate(built):
+        if id(trial) not in required:
+            required[id(trial)] = formulas_of(campaign, trial)
+        requirements = required[id(trial)]
+        loop = trial.scenario.loop
+        needed = temporal.needed_signals(requirements)
         signals = temporal.contiguous({name: series[name][row] for name in needed}, needed)
-        how = (int(status[row]), float(ended[row]), loop.duration)
-        for name, judged in temporal.judged(asked, signals, record_period(loop), {}, *how).items():
-            found[name][row] = judged.robustness
-    return found
+        ending = (int(status[row]), float(ended[row]), loop.duration)
+        for name, judgement in temporal.judged(requirements, signals, record_period(loop), {}, *ending).items():
+            by_name[name][row] = judgement.robustness
+    return by_name
 
 
 def verdict(rows: xr.Dataset, name: str, required: CampaignRequirement) -> dict[str, Any]:
@@ -102,15 +104,16 @@ def verdict(rows: xr.Dataset, name: str, required: CampaignRequirement) -> dict[
 
     values = rows[name].values
     keeps = values > 0 if required.below is None else values < required.below
-    kept, count = int(keeps.sum()), max(1, rows.sizes["trial"])
-    interval = binomtest(kept, count).proportion_ci(_CONFIDENCE, method="exact")
+    passed = int(keeps.sum())
+    count = max(1, rows.sizes["trial"])
+    interval = binomtest(passed, count).proportion_ci(_CONFIDENCE, method="exact")
     holds = "holds" if interval.low >= required.share else "fails" if interval.high < required.share else "open"
     return {
         "metric": name,
         "below": required.below,
         "formula": required.formula,
         "share": required.share,
-        "kept": kept / count,
+        "kept": passed / count,
         "interval": [float(interval.low), float(interval.high)],
         "verdict": holds,
     }

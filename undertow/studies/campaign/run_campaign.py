@@ -43,18 +43,18 @@ def run_campaign(prepared: Prepared, out: Path, executor: Executor, watch: Watch
         BadInput: the folder holds another campaign.
         OSError: the disk is full, or the cluster is lost; finished tasks are kept.
     """
-    several, text, folder = prepared.trials, prepared.text, prepared.folder
+    campaign_trials, text, folder = prepared.trials, prepared.text, prepared.folder
     store = Store(
         out / STORE,
-        layout(several.campaign),
+        layout(campaign_trials.campaign),
         identity(text, prepared.named),
-        labels(several, prepared.first, prepared.metrics),
-        coordinates(several, prepared.first),
+        labels(campaign_trials, prepared.first, prepared.metrics),
+        coordinates(campaign_trials, prepared.first),
         {METRICS: json.dumps({name: list(metric) for name, metric in prepared.metrics.items()})},
     )
     try:
         missing = store.missing()
-        tally = Tally(several.number, several.number - sum(map(store.layout.count, missing)), 0, 0)
+        tally = Tally(campaign_trials.number, campaign_trials.number - sum(map(store.layout.count, missing)), 0, 0)
         watch(tally)
         work = [(text, str(folder), store.layout, number) for number in missing]
         for i, columns in executor(tasks.run_block, work):

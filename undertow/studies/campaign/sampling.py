@@ -50,7 +50,8 @@ class Samples:
         return _entries(self._seeds, _BLOCK, samples)
 
     def _make_points(self, block: int) -> Float[np.ndarray, "rows k"]:
-        seed, dimensions = self._campaign.seed, len(self._campaign.vary)
+        seed = self._campaign.seed
+        dimensions = len(self._campaign.vary)
         if not dimensions:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":
@@ -69,15 +70,15 @@ class Samples:
         return np.random.default_rng([self._campaign.seed, _SEEDS, block]).integers(0, 2**32, _BLOCK, dtype=np.uint32)
 
 
-def _entries(made: Callable[[int], np.ndarray], size: int, samples: np.ndarray) -> np.ndarray:
+def _entries(make_block: Callable[[int], np.ndarray], size: int, samples: np.ndarray) -> np.ndarray:
     """Entries of a sequence that is made in blocks of a size."""
     blocks, rows = np.divmod(samples, size)
-    whole = made(int(blocks[0]) if len(blocks) else 0)
-    found = np.empty((len(samples), *whole.shape[1:]), dtype=whole.dtype)
+    first_block = make_block(int(blocks[0]) if len(blocks) else 0)
+    entries = np.empty((len(samples), *first_block.shape[1:]), dtype=first_block.dtype)
     for block in np.unique(blocks):
-        here = blocks == block
-        found[here] = made(int(block))[rows[here]]
-    return found
+        in_block = blocks == block
+        entries[in_block] = make_block(int(block))[rows[in_block]]
+    return entries
 
 
 def quantiles(spread: Distribution, shares: Float[np.ndarray, " n"]) -> list[Any]:

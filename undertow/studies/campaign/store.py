@@ -39,7 +39,8 @@ def opened(path: Path) -> Any:
     try:
         return zarr.open_group(path, mode="a")
     except Exception as error:  # whatever zarr says of metadata that is no JSON, or not of a group
-        got, hint = f"{path.parent}: zarr.json is damaged ({error})", "Use --overwrite to start again"
+        got = f"{path.parent}: zarr.json is damaged ({error})"
+        hint = "Use --overwrite to start again"
         raise BadInput("--out", "hold a store that can be read", got, hint=hint) from error
 
 
@@ -73,12 +74,12 @@ def check_array(array: Any, label: Label, chunks: tuple[int, ...], path: Path) -
         BadInput: the metadata differ.
     """
     chunks = (*chunks, *array.shape[len(chunks) :])
-    made = new_array(zarr.open_group(MemoryStore()), "made", array.shape, chunks, label)
-    found, expected = array.metadata.to_dict(), made.metadata.to_dict()
-    written = lambda value: json.dumps(value, sort_keys=True, default=str)
-    other = [key for key in expected | found if written(found.get(key)) != written(expected.get(key))]
-    if other:
-        got = f"{path / array.basename / 'zarr.json'} with another {', '.join(other)}"
+    expected_array = new_array(zarr.open_group(MemoryStore()), "made", array.shape, chunks, label)
+    stored, expected = array.metadata.to_dict(), expected_array.metadata.to_dict()
+    serialized = lambda value: json.dumps(value, sort_keys=True, default=str)
+    differing = [key for key in expected | stored if serialized(stored.get(key)) != serialized(expected.get(key))]
+    if differing:
+        got = f"{path / array.basename / 'zarr.json'} with another {', '.join(differing)}"
         hint = f"Restore it, or remove {array.basename}/ and use --resume to compute it again"
         raise BadInput("--out", "hold a store as it was written", got, hint=hint)
 
@@ -88,11 +89,11 @@ def flags(array: Any, count: int) -> np.ndarray:
     try:
         return np.asarray(array[:count]) != 0
     except Exception:  # whatever a codec says of a torn chunk: it is looked for
-        found = np.zeros(count, dtype=bool)
+        done = np.zeros(count, dtype=bool)
         for task in range(count):
             with contextlib.suppress(Exception):
-                found[task] = array[task] != 0
-        return found
+                done[task] = array[task] != 0
+        return done
 
 
 def new_array(group: Any, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], label: Label) -> Any:
@@ -150,29 +151,29 @@ class Store:
 
     def _open(self, identity: Identity, coordinates: Mapping[str, xr.Variable], attributes: Mapping[str, str]) -> None:
         """Open the arrays of an earlier process, and create the missing ones."""
-        for left in self._path.rglob("*.partial"):  # from a process killed while zarr wrote a file
-            left.unlink()
+        for partial_file in self._path.rglob("*.partial"):  # from a process killed while zarr wrote a file
+            partial_file.unlink()
         self._group = opened(self._path)
-        known = dict(self._group.attrs)
-        if known:
-            identity.check_same(known, self._path.parent)
-            self.layout = self.layout._replace(chunk=tuple(known["chunk"]))
+        stored_attributes = dict(self._group.attrs)
+        if stored_attributes:
+            identity.check_same(stored_attributes, self._path.parent)
+            self.layout = self.layout._replace(chunk=tuple(stored_attributes["chunk"]))
         # Asking zarr for an array takes as long as writing it.
-        found = {name: found_array(self._group, name) for name in (DONE, *self._labels)}
-        self._arrays = {name: array for name, array in found.items() if array is not None}
+        stored_arrays = {name: found_array(self._group, name) for name in (DONE, *self._labels)}
+        self._arrays = {name: array for name, array in stored_arrays.items() if array is not None}
         for name, array in self._arrays.items():
             label, chunk = (FLAGS, (1,)) if name == DONE else (self._labels[name], self.layout.chunk)
             check_array(array, label, chunk, self._path)
-        if known:
-            self._grow(samples(known["campaign"]))
-        if known.get("campaign") != identity.asked:
+        if stored_attributes:
+            self._grow(samples(stored_attributes["campaign"]))
+        if stored_attributes.get("campaign") != identity.asked:
             # In one write, so that no process is killed between two; and last, because growing may be interrupted.
-            asked = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
-            self._group.update_attributes({**attributes, **identity.attributes, **asked})
+            campaign_attributes = {"campaign": identity.asked, "chunk": list(self.layout.chunk)}
+            self._group.update_attributes({**attributes, **identity.attributes, **campaign_attributes})
         # Always: an earlier process may have been killed before it wrote the values.
-        for name, one in coordinates.items():
-            label = Label((name,), one.attrs, one.dtype.str)
-            new_array(self._group, name, one.shape, one.shape, label)[:] = one.values
+        for name, variable in coordinates.items():
+            label = Label((name,), variable.attrs, variable.dtype.str)
+            new_array(self._group, name, variable.shape, variable.shape, label)[:] = variable.values
         if DONE not in self._arrays:
             self._arrays[DONE] = new_array(self._group, DONE, (self.layout.tasks,), (1,), FLAGS)
         self._settle(*self._arrays, *coordinates)
@@ -183,8 +184,8 @@ class Store:
             for task in self.layout._replace(samples=before).partial():
                 self._arrays[DONE][task] = 0
         for name, array in self._arrays.items():
-            own = (self.layout.tasks,) if name == DONE else self.layout.shape
-            shape = (*own, *array.shape[len(own) :])
+            leading = (self.layout.tasks,) if name == DONE else self.layout.shape
+            shape = (*leading, *array.shape[len(leading) :])
             if array.shape != shape:
                 array.resize(shape)
 
@@ -200,14 +201,14 @@ class Store:
             OSError: for example, the disk is full; the task then counts as not done.
         """
         region = self.layout.region(task)
-        covered = [one.stop - one.start for one in region]
+        block_shape = [span.stop - span.start for span in region]
         for name, values in columns.items():
-            each = values.shape[1:]
+            trial_shape = values.shape[1:]
             if name not in self._arrays:
-                shape, chunks = (*self.layout.shape, *each), (*self.layout.chunk, *each)
+                shape, chunks = (*self.layout.shape, *trial_shape), (*self.layout.chunk, *trial_shape)
                 self._arrays[name] = new_array(self._group, name, shape, chunks, self._labels[name])
                 self._settle(name)
-            self._arrays[name][region] = values.reshape(*covered, *each)
+            self._arrays[name][region] = values.reshape(*block_shape, *trial_shape)
         self._arrays[DONE][task] = 1
 
     def close(self) -> None:

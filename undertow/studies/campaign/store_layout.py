@@ -40,12 +40,12 @@ class StoreLayout(NamedTuple):
 
     def region(self, task: int) -> tuple[slice, ...]:
         """What the block of a task covers."""
-        covered = zip(self.block(task), self.chunk, self.shape, strict=True)
-        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in covered)
+        axes = zip(self.block(task), self.chunk, self.shape, strict=True)
+        return tuple(slice(i * step, min((i + 1) * step, size)) for i, step, size in axes)
 
     def count(self, task: int) -> int:
         """Trials of a task."""
-        return math.prod(covered.stop - covered.start for covered in self.region(task))
+        return math.prod(span.stop - span.start for span in self.region(task))
 
     def trials(self, task: int) -> Int[np.ndarray, " trials"]:
         """Numbers of the trials of a task, in the order of its block."""
@@ -62,7 +62,8 @@ class StoreLayout(NamedTuple):
 
 def layout(campaign: Campaign) -> StoreLayout:
     """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples."""
-    swept, most = tuple(len(entries) for entries in campaign.axes.values()), campaign.trials_per_task
+    swept = tuple(len(entries) for entries in campaign.axes.values())
+    most = campaign.trials_per_task
     chunk = [min(most, max(campaign.trials, most // math.prod(swept)))]
     for count in reversed(swept):
         chunk.insert(0, min(count, most // math.prod(chunk)) or 1)

@@ -35,8 +35,8 @@ class Results(NamedTuple):
     @property
     def metrics(self) -> list[str]:
         """Metrics that are defined for at least one completed trial, in the order of tables."""
-        known = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
-        return [name for name in self.known if known(name)]
+        defined = lambda name: name in self.rows and not np.isnan(self.rows[name].values[self.lasted]).all()
+        return [name for name in self.known if defined(name)]
 
     @property
     def tracking(self) -> list[str]:
@@ -77,12 +77,12 @@ class Results(NamedTuple):
     def sampled(self, trial: int) -> dict[str, Any]:
         """Sampled values of a trial, by key path: numbers, or the labels of choices."""
         row = self.rows.sel(trial=trial)
-        found = {}
+        sampled = {}
         for key in self.campaign.vary:
             column = row[f"vary:{key}"]
             choices = column.attrs.get("choices")
-            found[key] = choices[int(column)] if choices else float(column)
-        return found
+            sampled[key] = choices[int(column)] if choices else float(column)
+        return sampled
 
 
 def load(folder: Path) -> Results:
@@ -100,14 +100,14 @@ def load(folder: Path) -> Results:
             raise FileNotFoundError(path)  # from a process killed before its first write
         campaign, _ = read_text(str(group.attrs["campaign"]), Path())
         stored = layout(campaign)._replace(chunk=tuple(group.attrs["chunk"]))
-        known = {name: Metric(*one) for name, one in json.loads(str(group.attrs.get(METRICS, "{}"))).items()}
-        labels = trial_labels(campaign, known)
+        metrics = {name: Metric(*fields) for name, fields in json.loads(str(group.attrs.get(METRICS, "{}"))).items()}
+        labels = trial_labels(campaign, metrics)
         for name, label in {**labels, DONE: FLAGS}.items():
             if name in group:
                 check_array(group[name], label, (1,) if name == DONE else stored.chunk, path)
         rows = _rows(group, campaign, stored, labels)
         done = _done(group, campaign, stored, path, labels)
-        return Results(campaign, rows if done.all() else rows.isel(trial=done), known)
+        return Results(campaign, rows if done.all() else rows.isel(trial=done), metrics)
     except (FileNotFoundError, BadInput):
         raise
     except Exception as error:  # zarr raises many kinds of errors for damaged files
@@ -119,7 +119,8 @@ def _rows(group: Any, campaign: Campaign, stored: StoreLayout, names: Iterable[s
 
     Arrays may be longer while a process makes room for more samples.
     """
-    axes, region = (*campaign.axes, SAMPLES), tuple(slice(0, size) for size in stored.shape)
+    axes = (*campaign.axes, SAMPLES)
+    region = tuple(slice(0, size) for size in stored.shape)
     arrays = {name: group[name] for name in names if name in group and name != "trial"}
     rows = xr.Dataset({name: (axes, array[region], dict(array.attrs)) for name, array in arrays.items()})
     if arrays:

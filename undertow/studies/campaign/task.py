@@ -43,21 +43,24 @@ class Site(NamedTuple):
 
     def metrics(self) -> dict[str, Metric]:
         """Metrics that any of the trials may have. Each has a column, which is NaN where a trial has no such metric."""
-        found: dict[str, Metric] = {}
+        metrics: dict[str, Metric] = {}
         for built in (*self.probes().values(), *self.alternatives()):
-            found = gathered_meanings(built.closed_loop, built.metrics) | found
-        return found | formula_metrics(self.trials.campaign)
+            metrics = gathered_meanings(built.closed_loop, built.metrics) | metrics
+        return metrics | formula_metrics(self.trials.campaign)
 
 
 @functools.lru_cache(maxsize=2)
 def site(text: str, folder: str) -> Site:
     """The campaign of this text in this process; relative paths in it start at the folder."""
-    several, part_cache = trials(*read_text(text, Path(folder))), PartCache()
-    rows = several.probes()
-    probes = functools.cache(lambda: {rows[place]: built for place, built in valid_trials(several, part_cache, rows)})
-    others = functools.cache(lambda: list(_alternatives(several, part_cache)))
+    campaign_trials = trials(*read_text(text, Path(folder)))
+    part_cache = PartCache()
+    rows = campaign_trials.probes()
+    probes = functools.cache(
+        lambda: {rows[index]: built for index, built in valid_trials(campaign_trials, part_cache, rows)}
+    )
+    alternatives = functools.cache(lambda: list(_alternatives(campaign_trials, part_cache)))
     programs = ProgramCache(lambda: [prepare_trial(built, None) for built in probes().values()], gpu=True)
-    return Site(several, part_cache, programs, {}, probes, others)
+    return Site(campaign_trials, part_cache, programs, {}, probes, alternatives)
 
 
 def run_block(text: str, folder: str, layout: StoreLayout, task: int) -> dict[str, np.ndarray]:
@@ -71,73 +74,74 @@ def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndar
         return _ran(site(text, folder), rows)
 
 
-def _ran(here: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
+def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
     trials = np.array(rows, dtype=np.int64)
-    sampled = here.trials.sampled(trials)
-    columns = {f"vary:{key}": column for key, column in _columns(here.trials, sampled)}
-    columns["trial"], columns["seed"] = trials.astype(np.uint32), here.trials.seeds(trials)
-    where: list[int] = []
+    sampled = context.trials.sampled(trials)
+    columns = {f"vary:{key}": column for key, column in _columns(context.trials, sampled)}
+    columns["trial"] = trials.astype(np.uint32)
+    columns["seed"] = context.trials.seeds(trials)
+    result_rows: list[int] = []
     criteria: list[Mapping[str, float]] = []
     firsts: list[Built] = []
 
     def batches() -> Iterator[RunBatch]:
-        for found in build_trials(here.trials, here.part_cache, trials, sampled, here.traceable):
-            where.extend(found.places.tolist())
-            firsts.extend([found.first] * len(found.places))
-            judged = found.first.window()[0] < found.first.scenario.loop.duration
-            criteria.extend([found.first.resolved["success"] if judged else {}] * len(found.places))
-            yield found.batch
+        for trial_batch in build_trials(context.trials, context.part_cache, trials, sampled, context.traceable):
+            result_rows.extend(trial_batch.places.tolist())
+            firsts.extend([trial_batch.first] * len(trial_batch.places))
+            is_judged = trial_batch.first.window()[0] < trial_batch.first.scenario.loop.duration
+            criteria.extend([trial_batch.first.resolved["success"] if is_judged else {}] * len(trial_batch.places))
+            yield trial_batch.batch
 
-    campaign = here.trials.campaign
-    asked = recorded(campaign, next(iter(here.probes().values()))) if campaign.formulas else campaign.series
-    result = run_prepared(batches(), here.programs)
+    campaign = context.trials.campaign
+    series = recorded(campaign, next(iter(context.probes().values()))) if campaign.formulas else campaign.series
+    result = run_prepared(batches(), context.programs)
     if result is None:  # no trials: the arrays of one trial, cut to length zero
-        one_trial = run_prepared([prepare_trial(next(iter(here.probes().values())), asked)], here.programs)
+        one_trial = run_prepared([prepare_trial(next(iter(context.probes().values())), series)], context.programs)
         result = jax.tree.map(lambda values: values[:0], one_trial)
     robust = robustness(campaign, firsts, result.series, result.status, result.ended)
-    scatter = functools.partial(_scatter, len(rows), where)
+    scatter = functools.partial(_scatter, len(rows), result_rows)
     columns["status"] = scatter(result.status, INVALID)
     columns["ended"] = scatter(result.ended, np.nan)
     columns["backend"] = scatter(result.backend, INVALID)
     columns["success"] = scatter(_success(criteria, result.metrics), NOT_JUDGED)
-    undefined = np.full(len(where), np.nan)
-    found = {name: result.metrics.get(name, undefined) for name in here.metrics()}
-    found |= robust
-    kept = campaign.series.signals if campaign.series is not None else ()
-    found |= {f"series:{name}": result.series[name] for name in kept}
+    undefined = np.full(len(result_rows), np.nan)
+    result_columns = {name: result.metrics.get(name, undefined) for name in context.metrics()}
+    result_columns |= robust
+    series_names = campaign.series.signals if campaign.series is not None else ()
+    result_columns |= {f"series:{name}": result.series[name] for name in series_names}
     if "precision" in campaign.keys:  # one array holds both
-        found = {name: values.astype(np.float64) for name, values in found.items()}
-    return columns | {name: scatter(values, np.nan) for name, values in found.items()}
+        result_columns = {name: values.astype(np.float64) for name, values in result_columns.items()}
+    return columns | {name: scatter(values, np.nan) for name, values in result_columns.items()}
 
 
-def _alternatives(several: Trials, part_cache: PartCache) -> Iterator[Built]:
+def _alternatives(campaign_trials: Trials, part_cache: PartCache) -> Iterator[Built]:
     """They may name other files, and have metrics of their own."""
-    for data in several.alternatives():
+    for data in campaign_trials.alternatives():
         with contextlib.suppress(BadInput):
-            yield build_data(several, part_cache, data)
+            yield build_data(campaign_trials, part_cache, data)
 
 
 def _success(criteria: Sequence[Mapping[str, float]], metrics: Mapping[str, np.ndarray]) -> np.ndarray:
     """1 where all that a trial is judged by stays below its limit, 0 where not, `NOT_JUDGED` without a criterion."""
-    found = np.full(len(criteria), NOT_JUDGED, dtype=np.int8)
+    success = np.full(len(criteria), NOT_JUDGED, dtype=np.int8)
     for i, criterion in enumerate(criteria):
         if criterion:  # what is not defined, as in a run that failed, is NaN and below nothing
-            found[i] = all(name in metrics and metrics[name][i] < most for name, most in criterion.items())
-    return found
+            success[i] = all(name in metrics and metrics[name][i] < most for name, most in criterion.items())
+    return success
 
 
-def _columns(several: Trials, sampled: Mapping[str, list[Any]]) -> Iterable[tuple[str, np.ndarray]]:
+def _columns(campaign_trials: Trials, sampled: Mapping[str, list[Any]]) -> Iterable[tuple[str, np.ndarray]]:
     """Sampled values; the index of the choice where they are not numbers."""
-    for key, entries in varied_keys(several.campaign):
+    for key, entries in varied_keys(campaign_trials.campaign):
         pick: Any = float if entries is None else list(entries.values()).index
         yield key, np.array([pick(value) for value in sampled[key]], dtype=float)
 
 
-def _scatter(count: int, where: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
+def _scatter(count: int, rows: list[int], values: np.ndarray, empty: Any) -> np.ndarray:
     """An array with values at their rows and `empty` elsewhere."""
-    whole = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
-    whole[where] = values
-    return whole
+    column = np.full((count, *values.shape[1:]), empty, dtype=values.dtype)
+    column[rows] = values
+    return column
 
 
 # Trials that are built again: each takes milliseconds.
@@ -151,17 +155,19 @@ class InvalidTrials(NamedTuple):
     trials: int
 
 
-def reasons(several: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
+def reasons(campaign_trials: Trials, rows: Sequence[int]) -> tuple[InvalidTrials, ...]:
     """The reasons why trials are invalid, the most frequent first.
 
     Args:
-        several: the trials.
+        campaign_trials: the trials.
         rows: numbers of the invalid trials; only the first 200 are built again.
     """
-    part_cache, found = PartCache(), dict[tuple[str, str], list[str]]()
+    part_cache = PartCache()
+    messages_by_cause = dict[tuple[str, str], list[str]]()
     for row in rows[:_MOST]:
         try:
-            build_trial(several, part_cache, int(row))
+            build_trial(campaign_trials, part_cache, int(row))
         except BadInput as error:
-            found.setdefault((error.name, error.must), []).append(str(error))
-    return tuple(InvalidTrials(each[0], len(each)) for each in sorted(found.values(), key=len, reverse=True))
+            messages_by_cause.setdefault((error.name, error.must), []).append(str(error))
+    most_frequent_first = sorted(messages_by_cause.values(), key=len, reverse=True)
+    return tuple(InvalidTrials(messages[0], len(messages)) for messages in most_frequent_first)

@@ -113,12 +113,12 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
 
 
 def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
-    given = campaign.scenario
-    if isinstance(given, str):
+    scenario = campaign.scenario
+    if isinstance(scenario, str):
         with within(location=text.location):
-            found = read(text.folder / given, "scenario", allow_code)
-            if "scenario" in found.data:
-                raise BadInput("scenario", "be the file of a scenario", f"{given}, a campaign")
-        return found
+            scenario_text = read(text.folder / scenario, "scenario", allow_code)
+            if "scenario" in scenario_text.data:
+                raise BadInput("scenario", "be the file of a scenario", f"{scenario}, a campaign")
+        return scenario_text
     lines = {path[1:]: line for path, line in text.lines.items() if path[0] == "scenario"}
-    return Text(given, text.name, text.folder, lines)
+    return Text(scenario, text.name, text.folder, lines)

@@ -15,7 +15,9 @@ from undertow.studies.campaign.labels import is_number
 _SETS = "parameters"
 
 
-def varied_scenario(data: Mapping[str, Any], values: Mapping[str, Any], known: Container[str] = ()) -> dict[str, Any]:
+def varied_scenario(
+    data: Mapping[str, Any], values: Mapping[str, Any], known_keys: Container[str] = ()
+) -> dict[str, Any]:
     """A scenario with other values, whose nominal model keeps the numbers that the plant had.
 
     Another part, such as another vehicle, is known to the controller. With `model: {follow: true}`, or a `model.plant`
@@ -24,7 +26,7 @@ def varied_scenario(data: Mapping[str, Any], values: Mapping[str, Any], known: C
     Args:
         data: the scenario.
         values: by key path.
-        known: key paths whose values the controller knows in any case.
+        known_keys: key paths whose values the controller knows in any case.
 
     Raises:
         BadInput: a key path leads to nothing of the scenario.
@@ -33,7 +35,7 @@ def varied_scenario(data: Mapping[str, Any], values: Mapping[str, Any], known: C
     for key, value in values.items():
         put_value(varied, key, copy.deepcopy(value))
     model = varied.get("model") or {}
-    unknown = _unknown(values, known)
+    unknown = _unknown(values, known_keys)
     if not isinstance(model, dict) or model.get("follow") or "plant" in model or not unknown:
         return varied
     nominal = {"plant": copy.deepcopy(data.get("plant", {}))}
@@ -43,9 +45,9 @@ def varied_scenario(data: Mapping[str, Any], values: Mapping[str, Any], known: C
     return varied | {"model": {**model, "plant": nominal["plant"]}}
 
 
-def nominal_model_sentence(data: Mapping[str, Any], values: Mapping[str, Any], known: Container[str] = ()) -> str:
+def nominal_model_sentence(data: Mapping[str, Any], values: Mapping[str, Any], known_keys: Container[str] = ()) -> str:
     """Sentence on what the controller knows of the numbers of the plant that vary; empty where none do."""
-    varied = [f"`{key}`" for key in _unknown(values, known)]
+    varied = [f"`{key}`" for key in _unknown(values, known_keys)]
     if not varied:
         return ""
     keys = " and ".join(filter(None, (", ".join(varied[:-1]), varied[-1])))
@@ -55,9 +57,9 @@ def nominal_model_sentence(data: Mapping[str, Any], values: Mapping[str, Any], k
     return f"The controller knows the nominal plant of the scenario: {keys} {verb} in the simulated plant alone."
 
 
-def _unknown(values: Mapping[str, Any], known: Container[str]) -> list[str]:
+def _unknown(values: Mapping[str, Any], known_keys: Container[str]) -> list[str]:
     """Key paths of values that a controller does not know: numbers and published parameter sets of the plant."""
-    return [key for key, value in values.items() if key not in known and _is_number_of_plant(key, value)]
+    return [key for key, value in values.items() if key not in known_keys and _is_number_of_plant(key, value)]
 
 
 def _is_number_of_plant(key: str, value: Any) -> bool:
@@ -91,20 +93,20 @@ def _elsewhere(word: str, data: dict[str, Any]) -> str:
     if word in Scenario.model_fields:
         return ""
     paths = {path.rpartition(".")[2]: path for path in _lists(data, "")}
-    near = get_close_matches(word, list(paths), n=1)
-    return f"Did you mean `{paths[near[0]]}`?" if near else ""
+    matches = get_close_matches(word, list(paths), n=1)
+    return f"Did you mean `{paths[matches[0]]}`?" if matches else ""
 
 
 def _lists(node: Any, path: str) -> Iterator[str]:
     """Key paths of all lists below a node."""
     pairs = node.items() if isinstance(node, dict) else ()
     if isinstance(node, list):
-        pairs = ((i, one) for i, one in enumerate(node) if isinstance(one, dict))
-    for step, one in pairs:
+        pairs = ((i, child) for i, child in enumerate(node) if isinstance(child, dict))
+    for step, child in pairs:
         inner = f"{path}[{step}]" if isinstance(step, int) else f"{path}.{step}".lstrip(".")
-        if isinstance(one, list):
+        if isinstance(child, list):
             yield inner
-        yield from _lists(one, inner)
+        yield from _lists(child, inner)
 
 
 def _entry(node: Any, step: str | int, key: str) -> Any:

@@ -30,19 +30,19 @@ def _row(law: TunedLaw) -> tuple[str, ...]:
 
 def budget_sentences(budgets: EqualBudgets) -> list[str]:
     """The budget, what the laws were tuned on, what they are judged on, and which were not tuned."""
-    said = [
+    sentences = [
         "Every controller was tuned by mutation and selection (`undertow tune --method evolution`) with "
         f"{budgets.budget} evaluations of its gains."
     ]
     if budgets.train is not None and budgets.held_out is not None:
-        said[0] += f" Training: {_words(budgets.train)}. Held out: {_words(budgets.held_out)}."
-        said += [
+        sentences[0] += f" Training: {_words(budgets.train)}. Held out: {_words(budgets.held_out)}."
+        sentences += [
             "The trials of the tables and figures are held out too: they have seeds of their own, and where the "
             "scenario has several parameter sets or waves, held-out sets and wave heights (section Configuration). The "
             "nominal model of the controllers stays the same."
         ]
-    said += [f"{law.name} is judged as it is: {law.untuned}." for law in budgets.laws if law.untuned]
-    return said
+    sentences += [f"{law.name} is judged as it is: {law.untuned}." for law in budgets.laws if law.untuned]
+    return sentences
 
 
 def _words(runs: Runs) -> str:

@@ -35,11 +35,11 @@ class Candidate(NamedTuple):
     source: Path | None
 
 
-def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Candidate]:
+def controllers(entries: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Candidate]:
     """Controllers that are compared on one scenario.
 
     Args:
-        given: entries such as `robust`, `pid`, `./mine.py:smc`, `tuned.yaml`, `scenario` or `NAME=ENTRY`; or name ->
+        entries: such as `robust`, `pid`, `./mine.py:smc`, `tuned.yaml`, `scenario` or `NAME=ENTRY`; or name ->
             entry, where an entry may also be a mapping like the key `controller` of a scenario.
         scenario: the scenario.
         path: its file, for the entry `scenario`; None where it has none.
@@ -47,22 +47,22 @@ def controllers(given: Sequence[str] | Mapping[str, Any], scenario: Text, path: 
     Raises:
         BadInput: fewer than two, or one of them is no controller.
     """
-    pairs = given.items() if isinstance(given, Mapping) else map(_split, given)
-    own = lambda name: _own(name, scenario, path)
-    found = [own(name) if entry == OWN else _controller(name, entry) for name, entry in pairs]
-    if len(found) < 2:
+    pairs = entries.items() if isinstance(entries, Mapping) else map(_split, entries)
+    scenario_candidate = lambda name: _own(name, scenario, path)
+    candidates = [scenario_candidate(name) if entry == OWN else _controller(name, entry) for name, entry in pairs]
+    if len(candidates) < 2:
         hint = "For example: --controllers robust,pid. The word `scenario` stands for the scenario's own controller"
-        raise BadInput("--controllers", "name at least two controllers", len(found), hint=hint)
-    return _unique(found)
+        raise BadInput("--controllers", "name at least two controllers", len(candidates), hint=hint)
+    return _unique(candidates)
 
 
-def laws(given: Sequence[str]) -> list[Candidate]:
+def laws(entries: Sequence[str]) -> list[Candidate]:
     """Controllers that need no scenario: entries as of `controllers`, but for `scenario`.
 
     Raises:
         BadInput: one of them is no controller.
     """
-    return _unique([_controller(name, entry) for name, entry in map(_split, given)])
+    return _unique([_controller(name, entry) for name, entry in map(_split, entries)])
 
 
 def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candidate], dict[str, list[str]]]:
@@ -81,38 +81,40 @@ def scenarios(paths: Sequence[Path], allow_code: bool) -> tuple[Text, list[Candi
             hint = "A campaign file is compared alone: its own `cross` or `variants`, or with --controllers"
             raise BadInput(str(path), "be a scenario where several are given", "a campaign", hint=hint)
     resolved = [build(text).resolved for text in texts]
-    whole = [_flat(each) for each in resolved]
-    keys = dict.fromkeys(key for each in whole for key in each)
-    different = [key for key in keys if any(each.get(key) != whole[0].get(key) for each in whole)]
-    alike = [path.stem for path in paths]
-    names = [f"{path.parent.name}/{path.stem}" if alike.count(path.stem) > 1 else path.stem for path in paths]
+    flat_scenarios = [_flat(data) for data in resolved]
+    keys = dict.fromkeys(key for data in flat_scenarios for key in data)
+    differs = lambda key: any(data.get(key) != flat_scenarios[0].get(key) for data in flat_scenarios)
+    different = [key for key in keys if differs(key)]
+    stems = [path.stem for path in paths]
+    names = [f"{path.parent.name}/{path.stem}" if stems.count(path.stem) > 1 else path.stem for path in paths]
     # A scenario may be without metrics of its own, faults and a supervisor.
-    found = [
-        Candidate(name, {key: each.get(key, None if key == "supervisor" else []) for key in different}, path)
-        for name, each, path in zip(names, whole, paths, strict=True)
-    ]
-    return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(found), _differing(texts)
+    empty_values = {key: None if key == "supervisor" else [] for key in different}
+    candidates = []
+    for name, data, path in zip(names, flat_scenarios, paths, strict=True):
+        changes = {key: data.get(key, empty_values[key]) for key in different}
+        candidates.append(Candidate(name, changes, path))
+    return from_data(resolved[0])._replace(folder=texts[0].folder), _unique(candidates), _differing(texts)
 
 
 def _differing(texts: Sequence[Text]) -> dict[str, list[str]]:
     """Key -> its value in each scenario as the user wrote it, for the keys that differ."""
-    written = [_flat(validate(text).model_dump()) for text in texts]
-    keys = dict.fromkeys(key for each in written for key in each)
-    shown = {key: [words(each.get(key, "not given")) or "none" for each in written] for key in keys}
-    return {key: values for key, values in shown.items() if len(set(values)) > 1}
+    flat_scenarios = [_flat(validate(text).model_dump()) for text in texts]
+    keys = dict.fromkeys(key for data in flat_scenarios for key in data)
+    values_by_key = {key: [words(data.get(key, "not given")) or "none" for data in flat_scenarios] for key in keys}
+    return {key: values for key, values in values_by_key.items() if len(set(values)) > 1}
 
 
 def _flat(data: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a scenario that decide its runs; those of sections that are no parts one by one, as `loop.dt`."""
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key, value in data.items():
         if key in _NOT_COMPARED:
             continue
         if key in ("loop", "steady") and isinstance(value, Mapping):
-            found |= {f"{key}.{inner}": one for inner, one in value.items()}
+            flat |= {f"{key}.{inner}": inner_value for inner, inner_value in value.items()}
         else:
-            found[key] = value
-    return found
+            flat[key] = value
+    return flat
 
 
 def _split(entry: str) -> tuple[str, str]:
@@ -161,9 +163,9 @@ def _named(entry: str) -> dict[str, Any]:
     if entry in presets or entry in parts:
         return catalogue.spelled_out("controllers", {"kind": entry})
     hint = f"Name the function as well: {entry}:FUNCTION" if entry.endswith(".py") else ""
-    known = [*presets, *parts, OWN]
+    choices = [*presets, *parts, OWN]
     must = "name presets, controllers, ./file.py:function or scenario files"
-    raise BadInput("--controllers", must, entry, hint=hint or did_you_mean(entry, known))
+    raise BadInput("--controllers", must, entry, hint=hint or did_you_mean(entry, choices))
 
 
 def label(part: Mapping[str, Any]) -> str:
@@ -181,10 +183,10 @@ def in_letters(name: str) -> str:
     return re.sub(r"[^a-zA-Z0-9_-]+", "-", name).strip("-")
 
 
-def _unique(found: Sequence[Candidate]) -> list[Candidate]:
+def _unique(candidates: Sequence[Candidate]) -> list[Candidate]:
     """With a number behind names that occur again."""
     names: list[str] = []
-    for one in found:
-        number = 1 + sum(other.name == one.name for other in found[: len(names)])
-        names.append(one.name if number == 1 else f"{one.name} {number}")
-    return [one._replace(name=name) for one, name in zip(found, names, strict=True)]
+    for candidate in candidates:
+        number = 1 + sum(earlier.name == candidate.name for earlier in candidates[: len(names)])
+        names.append(candidate.name if number == 1 else f"{candidate.name} {number}")
+    return [candidate._replace(name=name) for candidate, name in zip(candidates, names, strict=True)]

@@ -83,8 +83,8 @@ def read_comparison(folder: Path, results: Results, ready: PreparedComparison) -
     (axis,) = results.campaign.axes
     named = {ready.dimension: np.array(ready.names)}
     dataset = dataset.rename({axis: ready.dimension} if axis != ready.dimension else {}).assign_coords(named)
-    own = [name for name in results.metrics if name not in MEANINGS]
-    metrics = [name for name in (*_COMPARED, *own) if name in results.metrics]
+    custom_metrics = [name for name in results.metrics if name not in MEANINGS]
+    metrics = [name for name in (*_COMPARED, *custom_metrics) if name in results.metrics]
     tuning = {name: note.sentence for name, note in zip(ready.names, ready.notes, strict=True)}
     findings = find(dataset, ready.dimension, metrics, tuning, ready.differing)
     return Comparison(dataset, findings._replace(nominal_model=ready.prepared.trials.nominal_model()))
@@ -116,16 +116,16 @@ def compare(
         BadInput: anything wrong with the scenario, the controllers or the number of trials.
     """
 
-    given: Any = scenario
+    sources: Any = scenario
     if isinstance(scenario, str | Path):
-        given = [Path(scenario)]
+        sources = [Path(scenario)]
     elif not isinstance(scenario, Mapping):
-        given = list(map(Path, scenario))
-    with tempfile.TemporaryDirectory() as kept:
+        sources = list(map(Path, scenario))
+    with tempfile.TemporaryDirectory() as tuning_folder:
         tuner = None
         if tune is not None:
-            tuner = lambda candidates, base: equal_budgets(candidates, base, tune, Path(kept))
-        ready = prepare_comparison(given, controllers, trials, allow_code, tuner)
+            tuner = lambda candidates, base: equal_budgets(candidates, base, tune, Path(tuning_folder))
+        ready = prepare_comparison(sources, controllers, trials, allow_code, tuner)
     for sentence in ready.advice:
         warnings.warn(sentence, stacklevel=2)
     with tempfile.TemporaryDirectory() as folder, make_executor(None, workers or os.cpu_count() or 1) as executor:

@@ -103,7 +103,7 @@ class EqualBudgets(NamedTuple):
 
     def data(self) -> dict[str, Any]:
         """The same as numbers, words and lists; equal for equal results."""
-        sets = {name: one and one._asdict() for name, one in (("train", self.train), ("held_out", self.held_out))}
+        sets = {name: runs and runs._asdict() for name, runs in (("train", self.train), ("held_out", self.held_out))}
         return {"budget": self.budget, "method": METHOD, "laws": [law._asdict() for law in self.laws], **sets}
 
 
@@ -142,69 +142,79 @@ def equal_budgets(
     """
     check_budget(budget)
     folder.mkdir(parents=True, exist_ok=True)
-    found: list[TunedLaw] = []
+    tuned_laws: list[TunedLaw] = []
     sets: dict[str, Any] = {}
-    for number, one in enumerate(candidates):
-        entry = _tuned(one, _scenario_with(one, scenario), budget, folder / file_stem(number, one.name), say)
+    for number, candidate in enumerate(candidates):
+        file = folder / file_stem(number, candidate.name)
+        entry = _tuned(candidate, _scenario_with(candidate, scenario), budget, file, say)
         sets = entry.pop("sets") or sets
         costs: Any = {name: tuple(entry[name]) for name in ("train", "held_out") if entry[name] is not None}
-        found.append(TunedLaw(**{**entry, **costs}))
-    changed = [one._replace(changes=_with_gains(one, law)) for one, law in zip(candidates, found, strict=True)]
+        tuned_laws.append(TunedLaw(**{**entry, **costs}))
+    pairs = zip(candidates, tuned_laws, strict=True)
+    changed = [candidate._replace(changes=_with_gains(candidate, law)) for candidate, law in pairs]
     runs = {
-        name: Runs(**each | {"sizes": tuple(each["sizes"]), "sets": tuple(each["sets"])}) for name, each in sets.items()
+        name: Runs(**data | {"sizes": tuple(data["sizes"]), "sets": tuple(data["sets"])}) for name, data in sets.items()
     }
-    return changed, EqualBudgets(budget, tuple(found), runs.get("train"), runs.get("held_out"))
+    return changed, EqualBudgets(budget, tuple(tuned_laws), runs.get("train"), runs.get("held_out"))
 
 
-def _with_gains(one: Candidate, law: TunedLaw) -> dict[str, Any]:
-    return one.changes | {"controller": one.changes["controller"] | law.gains}
+def _with_gains(candidate: Candidate, law: TunedLaw) -> dict[str, Any]:
+    return candidate.changes | {"controller": candidate.changes["controller"] | law.gains}
 
 
-def _scenario_with(one: Candidate, scenario: Text) -> Text:
+def _scenario_with(candidate: Candidate, scenario: Text) -> Text:
     """The scenario with the controller of a candidate."""
-    data, part = dict(scenario.data), one.changes["controller"]
-    asked = data.get("tune")
-    if isinstance(asked, dict) and "parameters" in asked:
-        own = part_of(validate(scenario).controller, scenario.folder)
-        if any(own.get(key) != part.get(key) for key in ("kind", "preset")):
-            data["tune"] = {key: value for key, value in asked.items() if key != "parameters"}
-    return scenario._replace(data=data | one.changes)
+    data = dict(scenario.data)
+    part = candidate.changes["controller"]
+    tune_section = data.get("tune")
+    if isinstance(tune_section, dict) and "parameters" in tune_section:
+        scenario_controller = part_of(validate(scenario).controller, scenario.folder)
+        if any(scenario_controller.get(key) != part.get(key) for key in ("kind", "preset")):
+            data["tune"] = {key: value for key, value in tune_section.items() if key != "parameters"}
+    return scenario._replace(data=data | candidate.changes)
 
 
-def _tuned(one: Candidate, text: Text, budget: int, file: Path, say: Say) -> dict[str, Any]:
+def _tuned(candidate: Candidate, text: Text, budget: int, file: Path, say: Say) -> dict[str, Any]:
     """The entry of a law: from its file, or tuned now and written."""
-    say(f"{one.name}: building")
+    say(f"{candidate.name}: building")
     built = build(text)
-    about = text_hash(
+    fingerprint = text_hash(
         dump({"evaluations": budget, "tune": built.scenario.tune.model_dump(), **built.resolved} | versions())
     )
     finished, checkpoint = file.with_suffix(".json"), file.with_suffix(".jsonl")
     if finished.exists():
-        return _read(finished, about)
-    begun = checkpoint.exists()
+        return _read(finished, fingerprint)
+    interrupted = checkpoint.exists()
     untuned = "" if is_tunable(built) else _NO_GAINS
     entry: dict[str, Any] | None = None
     if not untuned:
-        watch = lambda best, count: say(f"{one.name}: {count} of {budget} evaluations, best cost {best.cost:.4g}")
-        stage = lambda words: say(f"{one.name}: {words}")
+        watch = lambda best, count: say(f"{candidate.name}: {count} of {budget} evaluations, best cost {best.cost:.4g}")
+        stage = lambda words: say(f"{candidate.name}: {words}")
         try:
-            run = tune(text, checkpoint, method=METHOD, evaluations=budget, resume=begun, say=stage, watch=watch)
-            entry = _entry(one.name, run)
+            run = tune(text, checkpoint, method=METHOD, evaluations=budget, resume=interrupted, say=stage, watch=watch)
+            entry = _entry(candidate.name, run)
         except NoCertificate:
             untuned = _DIVERGED
     if entry is None:
-        nothing = dict.fromkeys(("train", "held_out", "radius", "sets"))
-        entry = {"name": one.name, "gains": {}, "untuned": untuned, "parameters": 0, "evaluations": 0, **nothing}
-    write_whole(finished, to_json({"about": about, **entry}, indent=1) + "\n")
+        empty_fields = dict.fromkeys(("train", "held_out", "radius", "sets"))
+        entry = {
+            "name": candidate.name,
+            "gains": {},
+            "untuned": untuned,
+            "parameters": 0,
+            "evaluations": 0,
+            **empty_fields,
+        }
+    write_whole(finished, to_json({"about": fingerprint, **entry}, indent=1) + "\n")
     checkpoint.unlink(missing_ok=True)
-    return _read(finished, about)
+    return _read(finished, fingerprint)
 
 
 def _entry(name: str, run: Tuned) -> dict[str, Any]:
     """What is kept of a tuning; nothing that depends on the speed of the machine."""
-    given, *_, best = run.evaluated
-    if best.train_cost > given.train_cost:  # by rounding, or because the given gains are outside the ranges
-        best = given
+    initial, *_, best = run.evaluated
+    if best.train_cost > initial.train_cost:  # by rounding, or because the given gains are outside the ranges
+        best = initial
     gains = run.problem.gains(best.options) if best.options is not None else {}
     return {
         "name": name,
@@ -212,8 +222,8 @@ def _entry(name: str, run: Tuned) -> dict[str, Any]:
         "untuned": "",
         "parameters": len(run.problem.parameters),
         "evaluations": run.evaluations,
-        "train": [given.train_cost, best.train_cost],
-        "held_out": [given.held_out_cost, best.held_out_cost],
+        "train": [initial.train_cost, best.train_cost],
+        "held_out": [initial.held_out_cost, best.held_out_cost],
         "radius": best.certificate.worst,
         "sets": {"train": _runs(run.problem.train), "held_out": _runs(run.problem.held_out)},
     }
@@ -225,18 +235,18 @@ def _runs(trials: PlantVariants) -> dict[str, Any]:
     return {"seeds": trials.number // max(1, len(sets)), "sizes": sizes, "sets": sets, "runs": trials.number}
 
 
-def _read(file: Path, about: str) -> dict[str, Any]:
+def _read(file: Path, fingerprint: str) -> dict[str, Any]:
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        other = found.pop("about") != about
+        entry = json.loads(file.read_text(encoding="utf-8"))
+        mismatch = entry.pop("about") != fingerprint
     except (OSError, ValueError, KeyError, AttributeError) as error:
         raise BadInput("--resume", "find tunings that can be read", f"{file}: {error!r}", hint="Remove it") from None
-    if other:
+    if mismatch:
         hint = "Choose another folder, or start again with --overwrite"
         raise BadInput(
             "--resume", "continue with the same scenario, budget and versions", "given with others", hint=hint
         )
-    return found
+    return entry
 
 
 def _short(value: Any) -> str:

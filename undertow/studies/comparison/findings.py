@@ -80,17 +80,21 @@ class Findings(NamedTuple):
 
     def against(self, candidate: str, baseline: str) -> list[PairedDifference]:
         """Differences between two candidates, one per metric."""
-        return [one for one in self.differences if (one.candidate, one.baseline) == (candidate, baseline)]
+        pair = (candidate, baseline)
+        return [difference for difference in self.differences if (difference.candidate, difference.baseline) == pair]
 
     def data(self) -> dict[str, Any]:
         """The same as numbers, words and lists."""
         plain = self._asdict() | {"names": list(self.names)}
         plain["medians"] = {
-            metric: {name: one._asdict() for name, one in each.items()} for metric, each in self.medians.items()
+            metric: {name: median._asdict() for name, median in by_name.items()}
+            for metric, by_name in self.medians.items()
         }
-        plain["differences"] = [one._asdict() | {"established": one.established} for one in self.differences]
-        plain["completions"] = [one._asdict() for one in self.completions]
-        plain["fronts"] = [one.data() for one in self.fronts]
+        plain["differences"] = [
+            difference._asdict() | {"established": difference.established} for difference in self.differences
+        ]
+        plain["completions"] = [completion._asdict() for completion in self.completions]
+        plain["fronts"] = [front.data() for front in self.fronts]
         return plain
 
 
@@ -100,18 +104,19 @@ def find(
     """The findings in the columns of a comparison, which have the dimensions `dimension` and `sample`."""
     names = tuple(map(str, dataset[dimension].values))
     rows = {name: dataset.isel({dimension: i}) for i, name in enumerate(names)}
-    lasted = {name: one["status"].values == int(Status.OK) for name, one in rows.items()}
+    lasted = {name: trials["status"].values == int(Status.OK) for name, trials in rows.items()}
     values = {
-        metric: {name: np.where(lasted[name], one[metric].values, np.nan) for name, one in rows.items()}
+        metric: {name: np.where(lasted[name], trials[metric].values, np.nan) for name, trials in rows.items()}
         for metric in metrics
     }
-    alike = all(_constant(one) for each in values.values() for one in each.values())
-    all_equal = alike and (bool(values) or dataset.sizes[SAMPLES] == 1)
+    constant = all(_constant(column) for by_name in values.values() for column in by_name.values())
+    all_equal = constant and (bool(values) or dataset.sizes[SAMPLES] == 1)
     if all_equal:  # many copies of one trial prove no more than that trial
-        values = {metric: {name: one[:1] for name, one in each.items()} for metric, each in values.items()}
-    ended = {name: one["ended"].values[~lasted[name]] for name, one in rows.items()}
-    medians = {metric: {name: _median(one) for name, one in each.items()} for metric, each in values.items()}
-    plain = {metric: {name: one.value for name, one in each.items()} for metric, each in medians.items()}
+        values = {metric: {name: column[:1] for name, column in by_name.items()} for metric, by_name in values.items()}
+    failure_times = {name: trials["ended"].values[~lasted[name]] for name, trials in rows.items()}
+    medians = {metric: _medians(by_name) for metric, by_name in values.items()}
+    plain = {metric: {name: median.value for name, median in by_name.items()} for metric, by_name in medians.items()}
+    finite = {metric: by_name for metric, by_name in values.items() if _finite(by_name)}
     return Findings(
         dimension=dimension,
         names=names,
@@ -119,32 +124,36 @@ def find(
         all_equal=all_equal,
         units={metric: dataset[metric].attrs["units"].removesuffix("1") for metric in metrics},
         medians=medians,
-        differences=tuple(differences({metric: each for metric, each in values.items() if _finite(each)})),
+        differences=tuple(differences(finite)),
         completions=tuple(completions(lasted)) if not all_equal else (),
-        endings={name: _counts(one["status"].values, ENDINGS) for name, one in rows.items()},
-        failed_at={name: float(np.median(each)) if each.size else math.nan for name, each in ended.items()},
-        successes={name: _successes(one["success"].values) for name, one in rows.items()},
+        endings={name: _counts(trials["status"].values, ENDINGS) for name, trials in rows.items()},
+        failed_at={name: float(np.median(times)) if times.size else math.nan for name, times in failure_times.items()},
+        successes={name: _successes(trials["success"].values) for name, trials in rows.items()},
         tuning=dict(tuning),
         differing=dict(differing),
-        fronts=fronts(plain, {name: bool(each.all()) for name, each in lasted.items()}),
+        fronts=fronts(plain, {name: bool(completed.all()) for name, completed in lasted.items()}),
     )
 
 
 def _finite(by_name: Mapping[str, np.ndarray]) -> bool:
     """Whether no value is infinite: to leave out the trials that do not settle would favour who does not."""
-    return not any(np.isinf(one).any() for one in by_name.values())
+    return not any(np.isinf(values).any() for values in by_name.values())
 
 
 def _constant(values: np.ndarray) -> bool:
     return bool((values == values[0]).all() or np.isnan(values).all())
 
 
+def _medians(by_name: Mapping[str, np.ndarray]) -> dict[str, Median]:
+    return {name: _median(values) for name, values in by_name.items()}
+
+
 def _median(values: np.ndarray) -> Median:
-    known = values[~np.isnan(values)]
-    if not known.size:
+    defined = values[~np.isnan(values)]
+    if not defined.size:
         return Median(math.nan, math.nan, math.nan, 0)
-    low, high = median_interval(known) if known.size >= FEWEST else (math.nan, math.nan)
-    return Median(float(np.median(known)), low, high, known.size)
+    low, high = median_interval(defined) if defined.size >= FEWEST else (math.nan, math.nan)
+    return Median(float(np.median(defined)), low, high, defined.size)
 
 
 def _counts(codes: np.ndarray, words: Mapping[int, str]) -> dict[str, int]:

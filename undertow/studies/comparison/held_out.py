@@ -25,26 +25,29 @@ def held_out(text: Text, scenario: Text, budgets: EqualBudgets) -> Text:
     if budgets.held_out is None:
         return text
     data = dict(text.data) if "scenario" in text.data else {"scenario": text.data}
-    asked, vary = data.get("vary") or {}, {}
+    user_vary = data.get("vary") or {}
+    vary = {}
     resolved = build(scenario).resolved
     sets = budgets.held_out.sets
-    if len(sets) > 1 and not any(key.startswith("plant.vehicle") or key == "plant" for key in asked):
+    if len(sets) > 1 and not any(key.startswith("plant.vehicle") or key == "plant" for key in user_vary):
         vary[SET] = {"choice": list(sets)}
     low, high = min(budgets.held_out.sizes), max(budgets.held_out.sizes)
     for key, height in _heights(scenario.data.get("disturbance"), resolved["disturbance"]).items():
-        if low < high and height > 0 and not any(key.startswith(other) for other in asked):
+        if low < high and height > 0 and not any(key.startswith(user_key) for user_key in user_vary):
             vary[key] = {"uniform": [low * height, high * height]}
-    lines = text.lines if "scenario" in text.data else {("scenario", *place): one for place, one in text.lines.items()}
-    return text._replace(data=data | {"vary": {**asked, **vary}}, lines=lines)
+    lines = text.lines
+    if "scenario" not in text.data:
+        lines = {("scenario", *key_path): line for key_path, line in lines.items()}
+    return text._replace(data=data | {"vary": {**user_vary, **vary}}, lines=lines)
 
 
-def _heights(written: Any, resolved: Any) -> dict[str, float]:
+def _heights(as_written: Any, resolved: Any) -> dict[str, float]:
     """Key path -> wave height, m, of every disturbance with waves."""
-    listed = isinstance(written, list)
+    listed = isinstance(as_written, list)
     entries = resolved if isinstance(resolved, list) else [resolved]
-    place = lambda number: f"disturbance[{number}]" if listed else "disturbance"
+    location = lambda number: f"disturbance[{number}]" if listed else "disturbance"
     return {
-        f"{place(number)}.{_HEIGHT}": float(one[_HEIGHT])
-        for number, one in enumerate(entries)
-        if one.get("kind") == _WAVES and isinstance(one.get(_HEIGHT), int | float)
+        f"{location(number)}.{_HEIGHT}": float(entry[_HEIGHT])
+        for number, entry in enumerate(entries)
+        if entry.get("kind") == _WAVES and isinstance(entry.get(_HEIGHT), int | float)
     }

@@ -75,13 +75,16 @@ class Completion(NamedTuple):
 
 def completions(completed: Mapping[str, np.ndarray]) -> list[Completion]:
     """How the completed trials of every two candidates differ; one entry per sample, in the same order."""
-    found = []
+    uncorrected = []
     for baseline, candidate in itertools.combinations(completed, 2):
-        alone = int((completed[candidate] & ~completed[baseline]).sum())
-        other = int((completed[baseline] & ~completed[candidate]).sum())
-        p = float(binomtest(alone, alone + other).pvalue) if alone + other else math.nan
-        found.append(Completion(candidate, baseline, alone, other, p, math.nan))
-    return [one._replace(p_holm=p) for one, p in zip(found, holm([one.p for one in found]), strict=True)]
+        candidate_only = int((completed[candidate] & ~completed[baseline]).sum())
+        baseline_only = int((completed[baseline] & ~completed[candidate]).sum())
+        # McNemar: only the trials that one of the two completed tell them apart, each with even odds if they are equal.
+        discordant = candidate_only + baseline_only
+        p = float(binomtest(candidate_only, discordant).pvalue) if discordant else math.nan
+        uncorrected.append(Completion(candidate, baseline, candidate_only, baseline_only, p, math.nan))
+    corrected = holm([completion.p for completion in uncorrected])
+    return [completion._replace(p_holm=p) for completion, p in zip(uncorrected, corrected, strict=True)]
 
 
 def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[PairedDifference]:
@@ -91,34 +94,36 @@ def differences(values: Mapping[str, Mapping[str, np.ndarray]]) -> list[PairedDi
         values: metric -> candidate -> value of each sample, the same samples in the same order; NaN where the trial
             failed or has no such metric.
     """
-    names = dict.fromkeys(name for each in values.values() for name in each)
-    found = [
+    names = dict.fromkeys(name for columns in values.values() for name in columns)
+    uncorrected = [
         _difference(metric, candidate, baseline, by_name[candidate], by_name[baseline])
         for baseline, candidate in itertools.combinations(names, 2)
         for metric, by_name in values.items()
     ]
-    corrected = holm([one.p for one in found])
-    return [one._replace(p_holm=p) for one, p in zip(found, corrected, strict=True)]
+    corrected = holm([difference.p for difference in uncorrected])
+    return [difference._replace(p_holm=p) for difference, p in zip(uncorrected, corrected, strict=True)]
 
 
 def _difference(metric: str, candidate: str, baseline: str, first: np.ndarray, second: np.ndarray) -> PairedDifference:
-    both = np.isfinite(first) & np.isfinite(second)
-    first, second = first[both], second[both]
-    apart = first - second
-    low, high = median_interval(apart)
+    finite = np.isfinite(first) & np.isfinite(second)
+    first, second = first[finite], second[finite]
+    pair_differences = first - second
+    low, high = median_interval(pair_differences)
     return PairedDifference(
         metric=metric,
         candidate=candidate,
         baseline=baseline,
-        pairs=int(both.sum()),
-        left_out=int((~both).sum()),
-        median=float(np.median(apart)) if apart.size else math.nan,
+        pairs=int(finite.sum()),
+        left_out=int((~finite).sum()),
+        median=float(np.median(pair_differences)) if pair_differences.size else math.nan,
         low=low,
         high=high,
-        relative=float(np.median(apart / second)) if apart.size and (second > 0).all() else math.nan,
-        smaller=int((apart < 0).sum()),
-        larger=int((apart > 0).sum()),
-        p=rank_test(apart),
+        relative=float(np.median(pair_differences / second))
+        if pair_differences.size and (second > 0).all()
+        else math.nan,
+        smaller=int((pair_differences < 0).sum()),
+        larger=int((pair_differences > 0).sum()),
+        p=rank_test(pair_differences),
         p_holm=math.nan,
     )
 
@@ -127,7 +132,7 @@ def median_interval(values: np.ndarray) -> tuple[float, float]:
     """95 % bootstrap interval of the median (percentiles of 2000 resamples); NaN for fewer than six values."""
     if values.size < FEWEST:
         return math.nan, math.nan
-    found: Any = bootstrap(
+    result: Any = bootstrap(
         (values,),
         np.median,
         n_resamples=_RESAMPLES,
@@ -136,21 +141,23 @@ def median_interval(values: np.ndarray) -> tuple[float, float]:
         method="percentile",
         rng=np.random.default_rng(_SEED),
     )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
-def rank_test(apart: np.ndarray) -> float:
+def rank_test(pair_differences: np.ndarray) -> float:
     """Two-sided p of the Wilcoxon signed-rank test (1945); NaN where all are zero, and for fewer than six values."""
-    if apart.size < FEWEST or not apart.any():
+    if pair_differences.size < FEWEST or not pair_differences.any():
         return math.nan
-    return float(wilcoxon(apart).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
+    return float(wilcoxon(pair_differences).pvalue)  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def holm(several: Sequence[float]) -> list[float]:
+def holm(p_values: Sequence[float]) -> list[float]:
     """p values with the step-down correction of Holm (1979) for all tests that were made; NaN stands for none."""
-    known = [i for i, p in enumerate(several) if not math.isnan(p)]
-    corrected, largest = list(several), 0.0
-    for rank, i in enumerate(sorted(known, key=lambda i: several[i])):
-        largest = max(largest, min(1.0, (len(known) - rank) * several[i]))
+    tested = [i for i, p in enumerate(p_values) if not math.isnan(p)]
+    corrected = list(p_values)
+    largest = 0.0
+    # The smallest p is multiplied by the number of tests, the next by one less, and so on; none falls below an earlier.
+    for rank, i in enumerate(sorted(tested, key=lambda i: p_values[i])):
+        largest = max(largest, min(1.0, (len(tested) - rank) * p_values[i]))
         corrected[i] = largest
     return corrected

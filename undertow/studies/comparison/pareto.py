@@ -36,11 +36,12 @@ class Front(NamedTuple):
 
 def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
     """Which points no other point dominates, for two numbers of which less is better; equal points are all kept."""
-    several = np.asarray(points, dtype=float).reshape(-1, 2)
-    no_worse = (several[:, None] <= several[None]).all(-1)
-    better = (several[:, None] < several[None]).any(-1)
+    costs = np.asarray(points, dtype=float).reshape(-1, 2)
+    # Of every pair: the first axis is the point that may dominate, the second the one that may be dominated.
+    no_worse = (costs[:, None] <= costs[None]).all(-1)
+    better = (costs[:, None] < costs[None]).any(-1)
     dominated = np.logical_or.reduce(no_worse & better, axis=0)
-    return [not one for one in dominated]
+    return [not is_dominated for is_dominated in dominated]
 
 
 def fronts(medians: Mapping[str, Mapping[str, float]], complete: Mapping[str, bool]) -> tuple[Front, ...]:
@@ -52,14 +53,15 @@ def fronts(medians: Mapping[str, Mapping[str, float]], complete: Mapping[str, bo
     """
     errors = [name for name in ERRORS if name in medians] or [name for name in OTHERWISE if name in medians]
     pairs = [(error, effort) for error in errors for effort in EFFORTS if effort in medians]
-    found = [_front(error, effort, medians, complete) for error, effort in pairs]
-    return tuple(one for one in found if len(set(one.points.values())) > 1)
+    candidates = [_front(error, effort, medians, complete) for error, effort in pairs]
+    return tuple(front for front in candidates if len(set(front.points.values())) > 1)
 
 
 def _front(error: str, effort: str, medians: Mapping[str, Mapping[str, float]], complete: Mapping[str, bool]) -> Front:
-    both = {name: (medians[error][name], medians[effort][name]) for name in complete}
-    points = {name: point for name, point in both.items() if all(map(math.isfinite, point))}
+    pairs = {name: (medians[error][name], medians[effort][name]) for name in complete}
+    points = {name: point for name, point in pairs.items() if all(map(math.isfinite, point))}
     judged = [name for name in points if complete[name]]
-    kept = [name for name, keeps in zip(judged, on_front([points[name] for name in judged]), strict=True) if keeps]
-    ordered = tuple(sorted(kept, key=lambda name: points[name]))
+    flags = on_front([points[name] for name in judged])
+    non_dominated = [name for name, is_on_front in zip(judged, flags, strict=True) if is_on_front]
+    ordered = tuple(sorted(non_dominated, key=lambda name: points[name]))
     return Front(error, effort, points, ordered, tuple(name for name in points if not complete[name]))

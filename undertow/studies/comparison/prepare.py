@@ -67,7 +67,7 @@ class PreparedComparison(NamedTuple):
         return self.prepared.trials.campaign
 
 
-class _Asked(NamedTuple):
+class _Request(NamedTuple):
     """The campaign that the user asked for."""
 
     text: Text
@@ -81,7 +81,7 @@ Tuner = Callable[[Sequence[Candidate], Text], tuple[list[Candidate], EqualBudget
 
 
 def prepare_comparison(
-    given: Sequence[Path] | Mapping[str, Any],
+    sources: Sequence[Path] | Mapping[str, Any],
     entries: Sequence[str] | Mapping[str, Any] | None = None,
     trials: int | None = None,
     allow_code: bool = False,
@@ -90,7 +90,7 @@ def prepare_comparison(
     """A comparison of controllers on one scenario, of several scenarios, or of what a campaign file sweeps.
 
     Args:
-        given: files of scenarios, of one campaign, or a scenario as data.
+        sources: files of scenarios, of one campaign, or a scenario as data.
         entries: controllers, see `controllers`; None for several scenarios, or for a campaign with one axis.
         trials: number of samples; None for that of the campaign file, else 20. One where nothing is random.
         allow_code: whether the code that an earlier run.nc names may run.
@@ -99,42 +99,48 @@ def prepare_comparison(
     Raises:
         BadInput: anything wrong with the scenarios, the controllers or the number of trials.
     """
-    asked = _asked(given, entries, allow_code, tuner)
-    source = asked.text._replace(data=asked.text.data | ({} if trials is None else {"trials": trials}))
+    request = _read_request(sources, entries, allow_code, tuner)
+    source = request.text._replace(data=request.text.data | ({} if trials is None else {"trials": trials}))
     campaign = validate(source)
     prepared, advice = _prepared(campaign, source, allow_code)
     if not campaign.vary and not any(map(_random, _firsts(prepared))):
         prepared, advice = _prepared(campaign.model_copy(update={"trials": 1}), source, allow_code)
         advice += (f"{NOT_RANDOM}. {VARY}",)
-    names, built = tuple(next(iter(campaign.axes.values()))), _firsts(prepared)
-    pairs = enumerate(zip(built, asked.sources, strict=True))
-    notes = tuple(_note(prepared, number, one, file) for number, (one, file) in pairs)
-    if asked.budgets is not None:
-        notes = tuple(TuningNote(law.sentence, not law.untuned) for law in asked.budgets.laws)
-    advice = (*prepared.advice, *advice, *(_fair(names, notes) if asked.budgets is None else ()))
-    return PreparedComparison(prepared, asked.dimension, names, built, notes, asked.differing, advice, asked.budgets)
+    names = tuple(next(iter(campaign.axes.values())))
+    built = _firsts(prepared)
+    pairs = enumerate(zip(built, request.sources, strict=True))
+    notes = tuple(_note(prepared, number, trial, file) for number, (trial, file) in pairs)
+    if request.budgets is not None:
+        notes = tuple(TuningNote(law.sentence, not law.untuned) for law in request.budgets.laws)
+    advice = (*prepared.advice, *advice, *(_fair(names, notes) if request.budgets is None else ()))
+    return PreparedComparison(
+        prepared, request.dimension, names, built, notes, request.differing, advice, request.budgets
+    )
 
 
-def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: bool, tuner: Tuner | None) -> _Asked:
+def _read_request(
+    sources: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: bool, tuner: Tuner | None
+) -> _Request:
     budgets = None
     if tuner is not None and entries is None:
         raise BadInput("--tune", "be given with --controllers, whose gains are tuned", "given without")
     differing: dict[str, list[str]] = {}
-    dimension, path = "controller", None
-    if not isinstance(given, Mapping) and len(given) > 1:
+    dimension = "controller"
+    path = None
+    if not isinstance(sources, Mapping) and len(sources) > 1:
         if entries is not None:
-            strays = [str(path) for path in given[1:] if not path.suffix and not path.exists()]
+            strays = [str(path) for path in sources[1:] if not path.suffix and not path.exists()]
             hint = "Compare several controllers on one scenario, or several scenarios as they are"
             if strays:
                 hint = f"Separate the controllers by commas: --controllers {','.join([*map(str, entries), *strays])}"
-            raise BadInput("--controllers", "be given with one scenario only", f"{len(given)} scenarios", hint=hint)
-        text, found, differing = scenarios(given, allow_code)
+            raise BadInput("--controllers", "be given with one scenario only", f"{len(sources)} scenarios", hint=hint)
+        text, candidates, differing = scenarios(sources, allow_code)
         dimension = "scenario"
     else:
-        if isinstance(given, Mapping):
-            text = from_data(given)
+        if isinstance(sources, Mapping):
+            text = from_data(sources)
         else:
-            path = given[0]
+            path = sources[0]
             text = read(path, allow_code=allow_code)
         if "scenario" in text.data and entries is None:
             return _of_file(text)
@@ -142,19 +148,19 @@ def _asked(given: Sequence[Path] | Mapping[str, Any], entries: Any, allow_code: 
             hint = "For example: --controllers robust,pid; or a second scenario file"
             raise BadInput("--controllers", "name what is compared", "not given", hint=hint)
         base = _scenario_of(text, allow_code)
-        found = controllers(entries, base, path)
+        candidates = controllers(entries, base, path)
         if tuner is not None:
-            found, budgets = tuner(found, base)
+            candidates, budgets = tuner(candidates, base)
             text = held_out(text, base, budgets)
     if "scenario" not in text.data:
-        lines = {("scenario", *place): line for place, line in text.lines.items()}
+        lines = {("scenario", *key_path): line for key_path, line in text.lines.items()}
         text = text._replace(data={"scenario": text.data}, lines=lines)
-    variants = {"variants": {one.name: one.changes for one in found}}
+    variants = {"variants": {candidate.name: candidate.changes for candidate in candidates}}
     text = text._replace(data={"trials": TRIALS} | text.data | variants | {"requirements": {}})
-    return _Asked(text, dimension, [one.source for one in found], differing, budgets)
+    return _Request(text, dimension, [candidate.source for candidate in candidates], differing, budgets)
 
 
-def _of_file(text: Text) -> _Asked:
+def _of_file(text: Text) -> _Request:
     """What a campaign file sweeps."""
     text = text._replace(data={"trials": TRIALS} | text.data | {"requirements": {}})
     axes = validate(text).axes
@@ -163,7 +169,7 @@ def _of_file(text: Text) -> _Asked:
         hint = "Give --controllers, or sweep one key by `cross`, or by `variants`, with two values or more"
         raise BadInput(text.name, "have one axis with what is compared", got, hint=hint)
     ((axis, entries),) = axes.items()
-    return _Asked(text, axis, [None] * len(entries), {})
+    return _Request(text, axis, [None] * len(entries), {})
 
 
 def _scenario_of(text: Text, allow_code: bool) -> Text:
@@ -179,9 +185,9 @@ def _scenario_of(text: Text, allow_code: bool) -> Text:
 
 def _note(prepared: Prepared, number: int, built: Built, source: Path | None) -> TuningNote:
     """How the gains of a candidate came about."""
-    given = prepared.trials.data(number).get("controller", {})
+    controller = prepared.trials.data(number).get("controller", {})
     return tuning_note(
-        schema.named_law(given), built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source
+        schema.named_law(controller), built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source
     )
 
 
@@ -198,20 +204,21 @@ def _prepared(campaign: Campaign, source: Text, allow_code: bool) -> tuple[Prepa
 def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
     """The campaign with a record of errors and positions."""
     loop = schema.validate(trials_of(campaign, source, allow_code).scenario).loop
-    every = loop.dt * max(1, round(loop.duration / loop.dt / _RECORDS))
-    asked = campaign.series
-    if asked is not None and whole_steps(asked.every, loop.dt):
-        every = asked.every
-    signals = list(dict.fromkeys([*(asked.signals if asked else ()), *_SIGNALS]))
-    return Campaign.model_validate(campaign.model_dump() | {"series": {"signals": signals, "every": every}})
+    record_period = loop.dt * max(1, round(loop.duration / loop.dt / _RECORDS))
+    series = campaign.series
+    if series is not None and whole_steps(series.every, loop.dt):
+        record_period = series.every
+    signals = list(dict.fromkeys([*(series.signals if series else ()), *_SIGNALS]))
+    return Campaign.model_validate(campaign.model_dump() | {"series": {"signals": signals, "every": record_period}})
 
 
 def _firsts(prepared: Prepared) -> tuple[Built, ...]:
     """The first valid trial of each candidate."""
-    several, probes = prepared.trials, tasks.site(prepared.text, str(prepared.folder)).probes()
+    campaign_trials = prepared.trials
+    probes = tasks.site(prepared.text, str(prepared.folder)).probes()
     return tuple(
-        next(probes[row] for row in several.first(number) if row in probes)
-        for number in range(len(several.combinations))
+        next(probes[row] for row in campaign_trials.first(number) if row in probes)
+        for number in range(len(campaign_trials.combinations))
     )
 
 
@@ -219,7 +226,7 @@ def _firsts(prepared: Prepared) -> tuple[Built, ...]:
 def _random(built: Built) -> bool:
     """Whether a run depends on its seed: whether its random parts differ for two seeds."""
     first, second = (jax.tree.leaves(built.closed_loop.realize(key_of_seed(seed))[1:]) for seed in (1, 2))
-    return any(not np.array_equal(one, other) for one, other in zip(first, second, strict=True))
+    return any(not np.array_equal(leaf, other_leaf) for leaf, other_leaf in zip(first, second, strict=True))
 
 
 def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
@@ -227,5 +234,6 @@ def _fair(names: Sequence[str], notes: Sequence[TuningNote]) -> tuple[str, ...]:
     rivals = [name for name, note in zip(names, notes, strict=True) if not note.tuned]
     if not rivals:
         return ()
-    said = f"{', '.join(rivals)} {'is' if len(rivals) == 1 else 'are'} not tuned for this scenario"
-    return (f"{said}; with untuned gains a comparison says little about the laws themselves (docs/how-to/compare.md)",)
+    sentence = f"{', '.join(rivals)} {'is' if len(rivals) == 1 else 'are'} not tuned for this scenario"
+    sentence += "; with untuned gains a comparison says little about the laws themselves (docs/how-to/compare.md)"
+    return (sentence,)

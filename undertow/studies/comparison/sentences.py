@@ -15,42 +15,47 @@ HOW = (
 )
 
 
-def sentences(found: Findings) -> list[str]:
+def sentences(findings: Findings) -> list[str]:
     """Sentences on the nominal model and on failures, one for every two candidates, then the Pareto fronts."""
-    failures = [sentence for name in found.names if (sentence := failed(found, name))]
-    alone = [_alone(one) for one in found.completions if one.only_candidate or one.only_baseline]
-    known = [found.nominal_model] if found.nominal_model else []
-    return [*known, *failures, *alone, *(_between(found, *pair) for pair in found.pairs()), *map(_front, found.fronts)]
+    failures = [sentence for name in findings.names if (sentence := failed(findings, name))]
+    alone = [
+        _alone(completion)
+        for completion in findings.completions
+        if completion.only_candidate or completion.only_baseline
+    ]
+    nominal_model = [findings.nominal_model] if findings.nominal_model else []
+    between = [_between(findings, *pair) for pair in findings.pairs()]
+    return [*nominal_model, *failures, *alone, *between, *map(_front, findings.fronts)]
 
 
-def failed(found: Findings, name: str) -> str:
+def failed(findings: Findings, name: str) -> str:
     """How the failed and invalid trials of a candidate ended; empty without any."""
-    others = {word: number for word, number in found.endings[name].items() if word != COMPLETED}
-    if not others:
+    unfinished = {word: number for word, number in findings.endings[name].items() if word != COMPLETED}
+    if not unfinished:
         return ""
-    causes = ", ".join(f"{word.replace('_', ' ')} {number}" for word, number in others.items())
-    when = found.failed_at[name]
+    causes = ", ".join(f"{word.replace('_', ' ')} {number}" for word, number in unfinished.items())
+    when = findings.failed_at[name]
     after = "" if math.isnan(when) else f", median time {when:.3g} s"
-    return f"{name} did not complete {sum(others.values())} of {found.trials} trials ({causes}{after})."
+    return f"{name} did not complete {sum(unfinished.values())} of {findings.trials} trials ({causes}{after})."
 
 
-def _alone(one: Completion) -> str:
-    verb = "is established" if one.p_holm < LEVEL else "is not established"
+def _alone(completion: Completion) -> str:
+    verb = "is established" if completion.p_holm < LEVEL else "is not established"
+    candidate, baseline = completion.candidate, completion.baseline
     return (
-        f"{one.candidate} completed {one.only_candidate} trials that {one.baseline} did not, and {one.baseline} "
-        f"{one.only_baseline} that {one.candidate} did not; this difference {verb} (McNemar's exact test, "
-        f"p = {one.p_holm:.2g})."
+        f"{candidate} completed {completion.only_candidate} trials that {baseline} did not, and {baseline} "
+        f"{completion.only_baseline} that {candidate} did not; this difference {verb} (McNemar's exact test, "
+        f"p = {completion.p_holm:.2g})."
     )
 
 
-def _front(one: Front) -> str:
-    others = [name for name in one.points if name not in one.front and name not in one.incomplete]
-    said = (
-        f"Pareto front of {metric_name(one.error)} against {metric_name(one.effort)}: {', '.join(one.front) or 'none'}"
-    )
-    said += f"; dominated: {', '.join(others)}" if others else ""
-    missing = f"; not judged because trials failed: {', '.join(one.incomplete)}" if one.incomplete else ""
-    return f"{said}{missing}."
+def _front(front: Front) -> str:
+    dominated = [name for name in front.points if name not in front.front and name not in front.incomplete]
+    metrics = f"{metric_name(front.error)} against {metric_name(front.effort)}"
+    sentence = f"Pareto front of {metrics}: {', '.join(front.front) or 'none'}"
+    sentence += f"; dominated: {', '.join(dominated)}" if dominated else ""
+    missing = f"; not judged because trials failed: {', '.join(front.incomplete)}" if front.incomplete else ""
+    return f"{sentence}{missing}."
 
 
 def metric_name(metric: str) -> str:
@@ -71,42 +76,49 @@ def digits(value: float) -> str:
     return f"{value:.3g}" if not 1000 <= abs(value) < math.inf else f"{value:.0f}"
 
 
-def relative(one: PairedDifference, unit: str) -> str:
+def relative(difference: PairedDifference, unit: str) -> str:
     """Median difference in percent of the baseline; in the unit of the metric where the baseline has zeros."""
-    if math.isnan(one.relative):
-        return f"{'+' if one.median > 0 else ''}{shown(one.median, unit)}"
-    sign = "+" if one.relative > 0 else ""
-    return f"{sign}{digits(100 * one.relative)} %"
+    if math.isnan(difference.relative):
+        return f"{'+' if difference.median > 0 else ''}{shown(difference.median, unit)}"
+    sign = "+" if difference.relative > 0 else ""
+    return f"{sign}{digits(100 * difference.relative)} %"
 
 
-def _between(found: Findings, candidate: str, baseline: str) -> str:
-    several = [one for one in found.against(candidate, baseline) if one.pairs]
-    said = f"{candidate} against {baseline}"
-    if not several:
-        return f"{said}: there is no trial that both completed."
-    pairs = max(one.pairs for one in several)
-    said += f" ({pairs} {'pair' if pairs == 1 else 'pairs'})"
-    if not any(one.smaller or one.larger for one in several):
-        return f"{said}: all differences are zero."
-    if found.all_equal:
-        parts = [f"{metric_name(one.metric)} {relative(one, found.units[one.metric])}" for one in several]
-        return f"{said}: {', '.join(parts)}. All trials are equal, so that nothing is established by statistics."
-    if pairs < (needed := _needed(found)):
-        return f"{said}: too few to establish a difference; at least {needed} pairs are needed."
-    smaller = [_counted(found, one, one.smaller) for one in several if one.established and one.median < 0]
-    larger = [_counted(found, one, one.larger) for one in several if one.established and one.median > 0]
-    others = [metric_name(one.metric) for one in several if not one.established]
+def _between(findings: Findings, candidate: str, baseline: str) -> str:
+    differences = [difference for difference in findings.against(candidate, baseline) if difference.pairs]
+    sentence = f"{candidate} against {baseline}"
+    if not differences:
+        return f"{sentence}: there is no trial that both completed."
+    pairs = max(difference.pairs for difference in differences)
+    sentence += f" ({pairs} {'pair' if pairs == 1 else 'pairs'})"
+    if not any(difference.smaller or difference.larger for difference in differences):
+        return f"{sentence}: all differences are zero."
+    if findings.all_equal:
+        sizes = [relative(difference, findings.units[difference.metric]) for difference in differences]
+        parts = [
+            f"{metric_name(difference.metric)} {size}" for difference, size in zip(differences, sizes, strict=True)
+        ]
+        return f"{sentence}: {', '.join(parts)}. All trials are equal, so that nothing is established by statistics."
+    if pairs < (needed := _needed(findings)):
+        return f"{sentence}: too few to establish a difference; at least {needed} pairs are needed."
+    established = [difference for difference in differences if difference.established]
+    smaller = [
+        _counted(findings, difference, difference.smaller) for difference in established if difference.median < 0
+    ]
+    larger = [_counted(findings, difference, difference.larger) for difference in established if difference.median > 0]
+    undecided = [metric_name(difference.metric) for difference in differences if not difference.established]
     parts = [f"smaller {', '.join(smaller)}"] if smaller else []
     parts += [f"larger {', '.join(larger)}"] if larger else []
-    parts += [f"no difference is established in {', '.join(others)}"] if others else []
-    return f"{said}: {'; '.join(parts)}."
+    parts += [f"no difference is established in {', '.join(undecided)}"] if undecided else []
+    return f"{sentence}: {'; '.join(parts)}."
 
 
-def _needed(found: Findings) -> int:
+def _needed(findings: Findings) -> int:
     """Pairs from which on the smallest p of the rank test, 2^(1 - n), is below 5 % after correction for all tests."""
-    tests = sum(bool(one.smaller or one.larger) for one in found.differences)
+    tests = sum(bool(difference.smaller or difference.larger) for difference in findings.differences)
     return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)
 
 
-def _counted(found: Findings, one: PairedDifference, number: int) -> str:
-    return f"{metric_name(one.metric)} ({relative(one, found.units[one.metric])}, in {number} of {one.pairs})"
+def _counted(findings: Findings, difference: PairedDifference, number: int) -> str:
+    size = relative(difference, findings.units[difference.metric])
+    return f"{metric_name(difference.metric)} ({size}, in {number} of {difference.pairs})"

@@ -38,7 +38,7 @@ class StepTime(NamedTuple):
 
 def step_times(built: Mapping[str, Built]) -> dict[str, StepTime]:
     """Time of a step of every law, by name. It depends on the machine and on what else runs there."""
-    return {name: step_time(one) for name, one in built.items()}
+    return {name: step_time(trial) for name, trial in built.items()}
 
 
 @in_its_precision
@@ -46,25 +46,32 @@ def step_time(built: Built) -> StepTime:
     """Time of a step of the law of a scenario, at rest at the origin of the reference."""
     loop, dt = built.closed_loop, built.scenario.loop.dt
     law, plant = loop.controller, loop.plant
-    numbers, rest = eqx.partition(law, eqx.is_array)
-    own = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
+    numbers, structure = eqx.partition(law, eqx.is_array)
+    copy_arrays = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
     y = plant.output(jnp.zeros(()), plant.initial_state())
     if law.takes_raw_readings:
         y = y._replace(health=jnp.ones(plant.inputs()))
     target: Target = loop.reference.at(jnp.zeros(()))
-    applied, interval = jnp.zeros(plant.inputs()), jnp.asarray(dt)
+    applied = jnp.zeros(plant.inputs())
+    interval = jnp.asarray(dt)
     memory, _ = first_step(law, y, target)
 
     def step(numbers: Any, memory: Any, inputs: Any) -> tuple[Any, Any]:
         measured, desired, was_applied, elapsed = inputs
-        return next_step(eqx.combine(numbers, rest), memory, measured, desired, was_applied, elapsed)
+        return next_step(eqx.combine(numbers, structure), memory, measured, desired, was_applied, elapsed)
 
-    compiled = CompiledStep(step, own(numbers), own(memory), own((y, target, applied, interval)))
-    taken, begun = [], time.perf_counter()
+    compiled = CompiledStep(
+        step, copy_arrays(numbers), copy_arrays(memory), copy_arrays((y, target, applied, interval))
+    )
+    durations = []
+    measurement_start = time.perf_counter()
     for _ in range(_BEFORE):
         compiled()
-    while len(taken) < _CALLS and time.perf_counter() - begun < _LONGEST:
+    while len(durations) < _CALLS and time.perf_counter() - measurement_start < _LONGEST:
         start = time.perf_counter()
         compiled()
-        taken.append(time.perf_counter() - start)
-    return StepTime(statistics.median(taken) if taken else (time.perf_counter() - begun) / _BEFORE, compiled.backend)
+        durations.append(time.perf_counter() - start)
+    return StepTime(
+        statistics.median(durations) if durations else (time.perf_counter() - measurement_start) / _BEFORE,
+        compiled.backend,
+    )

@@ -29,64 +29,65 @@ class TextTable(NamedTuple):
 
 
 def medians(
-    found: Findings, times: Mapping[str, StepTime] | None = None, number: Callable[[float], str] = digits
+    findings: Findings, times: Mapping[str, StepTime] | None = None, number: Callable[[float], str] = digits
 ) -> TextTable:
     """Metrics by candidate, below the number of completed trials.
 
     Args:
-        found: what a comparison found.
+        findings: of the comparison.
         times: computing time of a step of each law, for a last row; None where it was not measured.
         number: how a number is written.
     """
-    first = found.names[0]
-    rows = [("completed trials", *(f"{found.completed(name)} of {found.trials}" for name in found.names))]
-    if any(judged for _, judged in found.successes.values()):
-        kept = (found.successes[name] for name in found.names)
-        rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in kept)))
-    for metric, by_name in found.medians.items():
-        marked = {one.candidate for one in found.differences if one.baseline == first and _is(one, metric)}
-        unit = found.units[metric]
-        cells = (f"{median(by_name[name], unit, number)}{'*' * (name in marked)}" for name in found.names)
-        rows.append((titled(found, metric), *cells))
+    first = findings.names[0]
+    rows = [("completed trials", *(f"{findings.completed(name)} of {findings.trials}" for name in findings.names))]
+    if any(judged for _, judged in findings.successes.values()):
+        successes = (findings.successes[name] for name in findings.names)
+        rows.append(("within the criterion of success", *(f"{within} of {judged}" for within, judged in successes)))
+    for metric, by_name in findings.medians.items():
+        of_metric = [difference for difference in findings.differences if _is(difference, metric)]
+        marked = {difference.candidate for difference in of_metric if difference.baseline == first}
+        unit = findings.units[metric]
+        cells = (f"{median(by_name[name], unit, number)}{'*' * (name in marked)}" for name in findings.names)
+        rows.append((titled(findings, metric), *cells))
     if times:
-        rows.append((STEP, *(_time(times.get(name)) for name in found.names)))
-    return TextTable(("metric", *found.names), rows)
+        rows.append((STEP, *(_time(times.get(name)) for name in findings.names)))
+    return TextTable(("metric", *findings.names), rows)
 
 
-def _time(one: StepTime | None) -> str:
+def _time(step_time: StepTime | None) -> str:
     """A time in microseconds, marked where the step could not be compiled by the batch compiler."""
-    if one is None:
+    if step_time is None:
         return _NOTHING
-    return f"{digits(1e6 * one.median)}{'' if one.backend == 'simd' else ' (XLA)'}"
+    return f"{digits(1e6 * step_time.median)}{'' if step_time.backend == 'simd' else ' (XLA)'}"
 
 
-def paired(found: Findings, number: Callable[[float], str] = digits) -> TextTable:
+def paired(findings: Findings, number: Callable[[float], str] = digits) -> TextTable:
     """Differences of every two candidates in every metric."""
     rows = []
-    for one in found.differences:
-        unit = found.units[one.metric]
-        of = lambda count, one=one: f"{count} of {one.pairs}"
+    for difference in findings.differences:
+        unit = findings.units[difference.metric]
+        of = lambda count, difference=difference: f"{count} of {difference.pairs}"
         rows.append(
             (
-                f"{one.candidate} - {one.baseline}",
-                titled(found, one.metric),
-                median(Median(one.median, one.low, one.high, one.pairs), unit, number),
-                _NOTHING if math.isnan(one.relative) else relative(one, unit),
-                of(one.smaller),
-                _NOTHING if math.isnan(one.p_holm) else digits(one.p_holm),
-                "yes" if one.established else "no",
+                f"{difference.candidate} - {difference.baseline}",
+                titled(findings, difference.metric),
+                median(Median(difference.median, difference.low, difference.high, difference.pairs), unit, number),
+                _NOTHING if math.isnan(difference.relative) else relative(difference, unit),
+                of(difference.smaller),
+                _NOTHING if math.isnan(difference.p_holm) else digits(difference.p_holm),
+                "yes" if difference.established else "no",
             )
         )
     head = ("pair", "metric", "median difference", "relative", "smaller in", "p (Holm)", "established")
     return TextTable(head, rows)
 
 
-def median(one: Median, unit: str, number: Callable[[float], str] = digits) -> str:
+def median(estimate: Median, unit: str, number: Callable[[float], str] = digits) -> str:
     """A median with its interval, in the unit of tables for people."""
-    if math.isnan(one.value):
+    if math.isnan(estimate.value):
         return _NOTHING
-    value, low, high = (value_in(each, unit, number) for each in one[:3])
-    return value if math.isnan(one.low) else f"{value} [{low}, {high}]"
+    value, low, high = (value_in(quantity, unit, number) for quantity in estimate[:3])
+    return value if math.isnan(estimate.low) else f"{value} [{low}, {high}]"
 
 
 def value_in(value: float, unit: str, number: Callable[[float], str] = digits) -> str:
@@ -94,23 +95,23 @@ def value_in(value: float, unit: str, number: Callable[[float], str] = digits) -
     return infinite(unit) if math.isinf(value) else number(for_people(value, unit)[0])
 
 
-def titled(found: Findings, metric: str) -> str:
+def titled(findings: Findings, metric: str) -> str:
     """A metric with its unit."""
-    unit = for_people(0.0, found.units[metric])[1]
+    unit = for_people(0.0, findings.units[metric])[1]
     return f"{titled_name(metric)} ({unit})" if unit else titled_name(metric)
 
 
-def _is(one: PairedDifference, metric: str) -> bool:
-    return one.metric == metric and one.established
+def _is(difference: PairedDifference, metric: str) -> bool:
+    return difference.metric == metric and difference.established
 
 
-def table(found: Findings, style: str) -> str:
+def table(findings: Findings, style: str) -> str:
     """Both tables in one of `STYLES`."""
-    return STYLES[style](found)
+    return STYLES[style](findings)
 
 
-def _markdown(found: Findings) -> str:
-    parts = [_markdown_rows(medians(found)), f"{NOTE}\n", _markdown_rows(paired(found))]
+def _markdown(findings: Findings) -> str:
+    parts = [_markdown_rows(medians(findings)), f"{NOTE}\n", _markdown_rows(paired(findings))]
     return "\n".join(parts)
 
 
@@ -120,11 +121,11 @@ def _markdown_rows(rows: TextTable) -> str:
     return "".join([line(rows.head), ruler, *map(line, rows.rows)])
 
 
-def _latex(found: Findings) -> str:
+def _latex(findings: Findings) -> str:
     pairs = "Paired differences: median over the trials that both completed [95 % interval]."
     lines = ["% Needs \\usepackage{booktabs,tabularx}. Wide tables fit on a page as table* or within landscape.", ""]
-    lines += [*_floating(medians(found, number=even_digits), NOTE, "medians"), ""]
-    return "\n".join([*lines, *_floating(paired(found, number=even_digits), pairs, "differences")]) + "\n"
+    lines += [*_floating(medians(findings, number=even_digits), NOTE, "medians"), ""]
+    return "\n".join([*lines, *_floating(paired(findings, number=even_digits), pairs, "differences")]) + "\n"
 
 
 def even_digits(value: float) -> str:
@@ -154,30 +155,37 @@ _SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textas
 def _escaped(cell: str) -> str:
     """A cell as LaTeX: minus signs, powers of ten, exponents of units and special characters."""
 
-    def written(found: re.Match) -> str:
-        if found["mantissa"]:
-            return rf"${found['sign']}{found['mantissa']} \times 10^{{{int(found['power'])}}}$"
-        if found["minus"]:
+    def written(match: re.Match) -> str:
+        if match["mantissa"]:
+            return rf"${match['sign']}{match['mantissa']} \times 10^{{{int(match['power'])}}}$"
+        if match["minus"]:
             return "$-$"
-        if found["infinite"]:
+        if match["infinite"]:
             return r"$\infty$"
-        if found["exponent"]:
-            return f"$^{{{found['exponent']}}}$"
-        return _SPECIAL.get(found["special"], f"\\{found['special']}")
+        if match["exponent"]:
+            return f"$^{{{match['exponent']}}}$"
+        return _SPECIAL.get(match["special"], f"\\{match['special']}")
 
     return _LATEX.sub(written, cell)
 
 
-def _csv(found: Findings) -> str:
+def _csv(findings: Findings) -> str:
     stream = io.StringIO()
     fields = [name for name in PairedDifference._fields if name != "metric"]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["metric", "unit", "candidate_median", "baseline_median", *fields, "established"])
-    for one in found.differences:
-        by_name = found.medians[one.metric]
-        values = [by_name[one.candidate].value, by_name[one.baseline].value]
+    for difference in findings.differences:
+        metric = difference.metric
+        by_name = findings.medians[metric]
+        values = [by_name[difference.candidate].value, by_name[difference.baseline].value]
         writer.writerow(
-            [one.metric, found.units[one.metric], *values, *(getattr(one, name) for name in fields), one.established]
+            [
+                metric,
+                findings.units[metric],
+                *values,
+                *(getattr(difference, name) for name in fields),
+                difference.established,
+            ]
         )
     return stream.getvalue()
 

@@ -40,15 +40,16 @@ def tuning_note(
     searched = _searched(part, source)
     if searched is not None:
         return searched
-    kind, preset, given, main = _given(part, law, dt, folder)
-    short, where = kind.rpartition("/")[2], f" in {source}" if source else ""
-    options = ", ".join(f"{name} {words(value)}" for name, value in given.items())
+    kind, preset, gains, main = _given(part, law, dt, folder)
+    short = kind.rpartition("/")[2]
+    source_words = f" in {source}" if source else ""
+    options = ", ".join(f"{name} {words(value)}" for name, value in gains.items())
     if main is not None:
         instead = {main, *law_of(kind, preset, law).instead.get(main, ())}
-        if not instead & set(given):
-            return TuningNote(f"{_RULE}{f', with {options} given{where}' if given else ''}", True)
-    if given:
-        return TuningNote(f"gains given{where} ({options}), not tuned by `undertow tune`", False)
+        if not instead & set(gains):
+            return TuningNote(f"{_RULE}{f', with {options} given{source_words}' if gains else ''}", True)
+    if gains:
+        return TuningNote(f"gains given{source_words} ({options}), not tuned by `undertow tune`", False)
     if (kind, preset) == _TABLE_1:
         return TuningNote("gains of Table 1 of the paper, not tuned for this scenario", False)
     return TuningNote(f"default gains of `{short}`, not tuned", False)
@@ -66,33 +67,33 @@ def _given(
     presets = catalogue.presets_of(function)
     preset = part.get("preset", catalogue.usual_preset(function)) if presets else None
     defaults = inspect.signature(presets[preset] if preset else function).parameters
-    known = law_of(kind, preset, law)
-    tunable = [name.partition("[")[0] for name in known.ranges(dt)]
-    ours = kind in catalogue.names("controllers")
-    ruled = [name for name in tunable[:1] if ours and name in defaults and defaults[name].default is None]
+    law_parameters = law_of(kind, preset, law)
+    tunable = [name.partition("[")[0] for name in law_parameters.ranges(dt)]
+    in_catalogue = kind in catalogue.names("controllers")
+    ruled = [name for name in tunable[:1] if in_catalogue and name in defaults and defaults[name].default is None]
     names = set(tunable)
-    names |= {other for several in known.instead.values() for other in several}
+    names |= {option for equivalents in law_parameters.instead.values() for option in equivalents}
     gains = [name for name in part if name in names or (not names and name not in _NO_GAINS)]
     changed = lambda name: name not in defaults or factory.listed(defaults[name].default) != part[name]
-    given = {name: part[name] for name in gains if part[name] is not None and changed(name)}
-    return kind, preset, given, ruled[0] if ruled else None
+    changed_gains = {name: part[name] for name in gains if part[name] is not None and changed(name)}
+    return kind, preset, changed_gains, ruled[0] if ruled else None
 
 
 def _searched(part: Mapping[str, Any], source: Path | None) -> TuningNote | None:
     """What tuning.json beside a scenario says, if its gains are those of the controller; None otherwise."""
     try:
-        found = json.loads((source or Path()).with_name("tuning.json").read_text(encoding="utf-8"))
-        kept = found["gains"][found["kept"]]
-        if any(part.get(name) != value for name, value in kept["options"].items()):
+        tuning = json.loads((source or Path()).with_name("tuning.json").read_text(encoding="utf-8"))
+        gains = tuning["gains"][tuning["kept"]]
+        if any(part.get(name) != value for name, value in gains["options"].items()):
             return None
-        cost, before = kept["held_out_cost"], found["gains"]["given"]["held_out_cost"]
+        cost, before = gains["held_out_cost"], tuning["gains"]["given"]["held_out_cost"]
         relation = f"{times_other(cost, before)} with the gains before"
-        if found["kept"] == "given":
+        if tuning["kept"] == "given":
             relation = "the gains before, which no others that were found are better than"
-        said = f"{found['evaluations']} evaluations in {found['elapsed']:.0f} s"
+        effort = f"{tuning['evaluations']} evaluations in {tuning['elapsed']:.0f} s"
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError):
         return None  # of another program, or none
-    ending = "" if found.get("finished") else ", stopped by its time budget"
+    ending = "" if tuning.get("finished") else ", stopped by its time budget"
     return TuningNote(
-        f"tuned by `undertow tune` ({found['method']}, {said}{ending}; held-out cost {cost:.3g}, {relation})", True
+        f"tuned by `undertow tune` ({tuning['method']}, {effort}{ending}; held-out cost {cost:.3g}, {relation})", True
     )

@@ -64,12 +64,12 @@ class Box(NamedTuple):
 
     def of_cube(self, points: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p k"]:
         """Departures of points of the unit cube, uniform in the numbers themselves."""
-        found = []
+        columns = []
         for axis, share in zip(self.axes, np.asarray(points).T, strict=True):
-            away = axis.low + share * (axis.high - axis.low) - axis.nominal
-            below, above = axis.nominal - axis.low, axis.high - axis.nominal
-            found.append(np.where(away < 0, away / (below or 1.0), away / (above or 1.0)))
-        return np.stack(found, axis=-1)
+            offset = axis.low + share * (axis.high - axis.low) - axis.nominal
+            room_below, room_above = axis.nominal - axis.low, axis.high - axis.nominal
+            columns.append(np.where(offset < 0, offset / (room_below or 1.0), offset / (room_above or 1.0)))
+        return np.stack(columns, axis=-1)
 
     def to_cube(self, departures: Float[np.ndarray, "p k"]) -> Float[np.ndarray, "p k"]:
         """Points of the unit cube of departures."""
@@ -78,11 +78,11 @@ class Box(NamedTuple):
 
     def values(self, departure: Float[np.ndarray, " k"]) -> dict[str, float | int]:
         """Numbers of a departure by key path; clipped, so that rounding leads to no value outside the bounds."""
-        found: dict[str, float | int] = {}
+        numbers: dict[str, float | int] = {}
         for axis, away in zip(self.axes, departure.tolist(), strict=True):
             value = min(max(float(axis.value(away)), axis.low), axis.high)
-            found[axis.key] = round(value) if axis.integer else value
-        return found
+            numbers[axis.key] = round(value) if axis.integer else value
+        return numbers
 
     def size(self, departures: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "..."]:
         """Euclidean norm of departures: 1 is one number at its bound."""
@@ -107,7 +107,8 @@ def box_of(vary: Mapping[str, Bounds], built: Built) -> Box:
 
 def _axis(key: str, bounds: Bounds, built: Built) -> SearchDimension:
     low, high = bounds.between
-    nominal, name = bounds.nominal, f"falsify.vary.{key}"
+    nominal = bounds.nominal
+    name = f"falsify.vary.{key}"
     section = next(iter(key_path(key)), "")
     if section not in _SECTIONS:
         got = f"`{section}`" if section else "empty"

@@ -36,7 +36,8 @@ class Evaluator:
 
     def __init__(self, text: Text, built: Built, box: Box, requirements: Sequence[Requirement]):
         self.text, self.nominal, self.box, self.requirements = text, built, box, tuple(requirements)
-        settings, seed = built.scenario.falsify, built.scenario.seed
+        settings = built.scenario.falsify
+        seed = built.scenario.seed
         self.seeds = [(seed + number) % 2**32 for number in range(settings.seeds)]
         self._part_cache = PartCache()
         loop = built.scenario.loop
@@ -53,9 +54,9 @@ class Evaluator:
 
     def built(self, departure: Float[np.ndarray, " k"], seed: int | None = None) -> Built | None:
         """The scenario at a departure, with its own seed unless another is given; None where it cannot be built."""
-        other = {} if seed is None else {"seed": seed}
+        seed_entry = {} if seed is None else {"seed": seed}
         try:
-            return build(scenario_at(self.text, self.box.values(departure) | other), self._part_cache)
+            return build(scenario_at(self.text, self.box.values(departure) | seed_entry), self._part_cache)
         except BadInput:
             return None
 
@@ -76,10 +77,14 @@ class Evaluator:
         return np.concatenate([self._some(every[i : i + _AT_ONCE]) for i in range(0, len(every), _AT_ONCE)])
 
     def _some(self, every: Sequence[tuple[np.ndarray, int | None]]) -> np.ndarray:
-        found = np.full((len(every), len(self.requirements)), _INVALID)
-        builts = [(i, built) for i, one in enumerate(every) if (built := self.built(*one)) is not None]
+        robustness = np.full((len(every), len(self.requirements)), _INVALID)
+        builts = [
+            (i, built)
+            for i, (departure, seed) in enumerate(every)
+            if (built := self.built(departure, seed)) is not None
+        ]
         if not builts:
-            return found
+            return robustness
         with runtime.on_processor():
             result = run_prepared((prepare_trial(built, self._series) for _, built in builts), self._programs)
         assert result is not None
@@ -87,6 +92,6 @@ class Evaluator:
             signals = contiguous({name: result.series[name][row] for name in self._names}, self._names)
             metrics = {name: float(values[row]) for name, values in result.metrics.items()}
             status, ended, duration = int(result.status[row]), float(result.ended[row]), built.scenario.loop.duration
-            kept = judged(self.requirements, signals, self.period, metrics, status, ended, duration)
-            found[i] = [kept[one.name].robustness for one in self.requirements]
-        return found
+            judgements = judged(self.requirements, signals, self.period, metrics, status, ended, duration)
+            robustness[i] = [judgements[requirement.name].robustness for requirement in self.requirements]
+        return robustness

@@ -80,8 +80,8 @@ class Falsified(NamedTuple):
 
     def repeated(self) -> bool:
         """Whether the run of the counter-example by itself has the same robustness, bit for bit."""
-        alone = judged_alone(self.evaluator.requirements, self.single_runs[-1])
-        return self.violation is not None and alone == self.broken
+        rerun = judged_alone(self.evaluator.requirements, self.single_runs[-1])
+        return self.violation is not None and rerun == self.broken
 
 
 def falsify(
@@ -128,38 +128,40 @@ def falsify(
             shrink(objective, gradient, ends, seed)
     except BudgetSpent:
         finished = False
-    found = objective.smallest
-    say("running the counter-example by itself" if found is not None else "running the nominal scenario by itself")
-    broken, runs = dict[str, float](), (run_scenario(evaluator.nominal),)
-    if found is not None:
-        names = [one.name for one in evaluator.requirements]
-        broken = dict(zip(names, evaluator.each(found.departure[None], [found.seed])[0].tolist(), strict=True))
-        counterexample = evaluator.built(found.departure, found.seed)
+    violation = objective.smallest
+    say("running the counter-example by itself" if violation is not None else "running the nominal scenario by itself")
+    broken = dict[str, float]()
+    runs = (run_scenario(evaluator.nominal),)
+    if violation is not None:
+        names = [requirement.name for requirement in evaluator.requirements]
+        broken = dict(zip(names, evaluator.each(violation.departure[None], [violation.seed])[0].tolist(), strict=True))
+        counterexample = evaluator.built(violation.departure, violation.seed)
         assert counterexample is not None  # it has a robustness
         runs = (*runs, run_scenario(counterexample))
-    return Falsified(evaluator, objective, found, broken, runs, method, gradient.differentiated, finished, seed)
+    return Falsified(evaluator, objective, violation, broken, runs, method, gradient.differentiated, finished, seed)
 
 
-def judged_alone(requirements: Sequence[Requirement], executed: ScenarioResult) -> dict[str, float]:
+def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) -> dict[str, float]:
     """Robustness of every requirement in one run of a scenario, by name."""
-    loop, names = executed.built.scenario.loop, needed_signals(requirements)
-    kept = judged(
+    loop = result.built.scenario.loop
+    names = needed_signals(requirements)
+    judgements = judged(
         requirements,
-        contiguous(executed.outcome.signals, names),
+        contiguous(result.outcome.signals, names),
         record_period(loop),
-        executed.steady or {},
-        int(executed.status),
-        float(executed.outcome.ended),
+        result.steady or {},
+        int(result.status),
+        float(result.outcome.ended),
         loop.duration,
     )
-    return {name: one.robustness for name, one in kept.items()}
+    return {name: judgement.robustness for name, judgement in judgements.items()}
 
 
-def _kept(evaluator: Evaluator, path: Path, resume: bool, how: tuple[str, int]) -> Robustness:
+def _kept(evaluator: Evaluator, path: Path, resume: bool, search_options: tuple[str, int]) -> Robustness:
     """Robustness of departures with their seeds, from the checkpoint as far as it goes."""
     settings = evaluator.nominal.scenario.falsify.model_dump()
-    about = text_hash(dump({"how": list(how), "falsify": settings, **evaluator.nominal.resolved}))
-    checkpoint = Checkpoint(path, about, np.inf, resume, what="falsification")
+    fingerprint = text_hash(dump({"how": list(search_options), "falsify": settings, **evaluator.nominal.resolved}))
+    checkpoint = Checkpoint(path, fingerprint, np.inf, resume, what="falsification")
 
     def compute(departures: np.ndarray, seeds: Sequence[int]) -> np.ndarray:
         numbers = lambda: np.minimum(evaluator.robustness(departures, seeds), _MOST).tolist()  # JSON has no infinity
@@ -181,40 +183,46 @@ def evaluator_of(text: Text) -> Evaluator:
             raise BadInput("loop.kind", "be sampled for `undertow falsify`", loop.kind)
         box = box_of(settings.vary, built)
         # Metrics of a batch are of every control step.
-        every = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
-        evaluator = Evaluator(every, build(every), box, _required(built, settings))
+        every_step = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
+        evaluator = Evaluator(every_step, build(every_step), box, _required(built, settings))
         for axis in box.axes:
             with within(f"falsify.vary.{axis.key}"):
                 scenario_at(text, {axis.key: axis.high})
-        for one in (*np.diag(box.lower), *np.diag(box.upper)):
-            if evaluator.built(one) is None:
+        for departure in (*np.diag(box.lower), *np.diag(box.upper)):
+            if evaluator.built(departure) is None:
                 with within(note="at a bound of `falsify.vary`"):
-                    build(scenario_at(text, box.values(one)))
+                    build(scenario_at(text, box.values(departure)))
         return evaluator
 
 
 def _required(built: Built, settings: Falsify) -> tuple[Requirement, ...]:
     """What is to be broken."""
-    known = built.requirements or tuple(Requirement(name, below=most) for name, most in built.criterion().items())
-    if not known:
+    requirements = built.requirements or tuple(
+        Requirement(name, below=most) for name, most in built.criterion().items()
+    )
+    if not requirements:
         hint = "For example `requirements: {settles: {formula: within 10 s always position_error < 0.1}}`"
         raise BadInput("requirements", "be given", hint=hint)
-    names = [one.name for one in known]
+    names = [requirement.name for requirement in requirements]
     for name in settings.requirements or ():
         if name not in names:
             raise BadInput(
                 "falsify.requirements", "name requirements of the scenario", name, hint=did_you_mean(name, names)
             )
-    return tuple(one for one in known if settings.requirements is None or one.name in settings.requirements)
+    if settings.requirements is None:
+        return requirements
+    return tuple(requirement for requirement in requirements if requirement.name in settings.requirements)
 
 
 def _check_nominal(evaluator: Evaluator) -> None:
     count = min(len(evaluator.seeds), _NOMINAL)
-    found = evaluator.each(np.zeros((count, len(evaluator.box.axes))), evaluator.seeds[:count]).min(axis=0)
-    for one, robustness in zip(evaluator.requirements, found.tolist(), strict=True):
+    least_robustness = evaluator.each(np.zeros((count, len(evaluator.box.axes))), evaluator.seeds[:count]).min(axis=0)
+    for requirement, robustness in zip(evaluator.requirements, least_robustness.tolist(), strict=True):
         if not robustness > 0:
             got = f"violated, robustness {robustness:.3g}"
-            raise BadInput(f"requirements.{one.name}", "hold in the nominal scenario", got, hint="Loosen it first")
+            raise BadInput(
+                f"requirements.{requirement.name}", "hold in the nominal scenario", got, hint="Loosen it first"
+            )
 
 
 def _break(
@@ -245,14 +253,14 @@ def _at_bounds(box: Box, count: int, chance: np.random.Generator) -> np.ndarray:
     """Departures at random, about half of whose numbers are at a bound: failures are often there."""
     shape = (count, len(box.axes))
     inside = box.of_cube(chance.random(shape))
-    both = (box.lower < 0) & (box.upper > 0)
-    upper = np.where(both, chance.random(shape) < 0.5, box.upper > 0)
+    two_sided = (box.lower < 0) & (box.upper > 0)
+    upper = np.where(two_sided, chance.random(shape) < 0.5, box.upper > 0)
     return np.where(chance.random(shape) < 0.5, np.where(upper, box.upper, box.lower), inside)
 
 
-def as_data(found: Falsified) -> dict[str, Any]:
+def as_data(falsified: Falsified) -> dict[str, Any]:
     """Contents of falsify.json."""
-    objective, box, violation = found.objective, found.box, found.violation
+    objective, box, violation = falsified.objective, falsified.box, falsified.violation
     least = np.minimum.accumulate(objective.robustnesses)
     departures = [box.values(departure) for departure in objective.departures]
     return {
@@ -260,26 +268,29 @@ def as_data(found: Falsified) -> dict[str, Any]:
             axis.key: {"between": [axis.low, axis.high], "nominal": axis.nominal, "integer": axis.integer}
             for axis in box.axes
         },
-        "requirements": [one.name for one in found.evaluator.requirements],
-        "method": found.method,
-        "gradients": "differentiation" if found.differentiated else "differences",
-        "seed": found.seed,
-        "seeds": len(found.evaluator.seeds),
+        "requirements": [requirement.name for requirement in falsified.evaluator.requirements],
+        "method": falsified.method,
+        "gradients": "differentiation" if falsified.differentiated else "differences",
+        "seed": falsified.seed,
+        "seeds": len(falsified.evaluator.seeds),
         "budget": objective.budget,
         "runs": objective.runs,
-        "converged": found.finished,
+        "converged": falsified.finished,
         "least_robustness": float(least[-1]) if len(least) else None,
         "counterexample": None
         if violation is None
         else {
             "size": violation.size,
-            "values": found.values(),
+            "values": falsified.values(),
             "seed": violation.seed,
             "departure": dict(zip((axis.key for axis in box.axes), violation.departure.tolist(), strict=True)),
-            "robustness": found.broken,
-            "repeated": found.repeated(),
+            "robustness": falsified.broken,
+            "repeated": falsified.repeated(),
         },
-        "history": [{"runs": one.runs, "size": one.size, "robustness": one.robustness} for one in objective.violations],
+        "history": [
+            {"runs": smaller.runs, "size": smaller.size, "robustness": smaller.robustness}
+            for smaller in objective.violations
+        ],
         "evaluations": {
             "values": {axis.key: [values[axis.key] for values in departures] for axis in box.axes},
             "robustness": objective.robustnesses,

@@ -48,8 +48,8 @@ class Gradient:
 
     def __call__(self, departure: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
         """The gradient; zero where it is not finite."""
-        found = self._slope(departure) if self.differentiated else self._differences(departure)
-        return np.where(np.isfinite(found), found, 0.0)
+        slope = self._slope(departure) if self.differentiated else self._differences(departure)
+        return np.where(np.isfinite(slope), slope, 0.0)
 
     def _slope(self, departure: np.ndarray) -> np.ndarray:
         with runtime.on_processor(), runtime.in_precision(self._precision):
@@ -69,8 +69,8 @@ class Gradient:
 
     def _differentiable(self) -> bool:
         """Whether the loop can be built and run with traced numbers."""
-        several = len(self._evaluator.seeds) > 1
-        if self._smallest is None or several or any(axis.integer for axis in self._box.axes):
+        several_seeds = len(self._evaluator.seeds) > 1
+        if self._smallest is None or several_seeds or any(axis.integer for axis in self._box.axes):
             return False
         try:
             with runtime.on_processor(), runtime.in_precision(self._precision):
@@ -84,8 +84,8 @@ class Gradient:
         nominal, smallest = self._evaluator.nominal, self._smallest
         assert smallest is not None  # see `_differentiable`
         scenario, settings = nominal.scenario, nominal.scenario.loop
-        for place, axis in enumerate(self._box.axes):
-            scenario = with_value(scenario, key_path(axis.key), axis.value(departure[place], jnp))
+        for index, axis in enumerate(self._box.axes):
+            scenario = with_value(scenario, key_path(axis.key), axis.value(departure[index], jnp))
         with checks.recorded_conditions():  # inside the bounds; the exact runs show whether they are met
             run = loop_run(build_scenario(scenario, nominal.text, PartCache()))
         outcome = sampled.simulate(

@@ -83,12 +83,12 @@ class RobustnessObjective:
         if len(allowed):
             inside = np.clip(allowed, self.box.lower, self.box.upper)
             chosen = list(seeds or self._present(len(departures)))[: len(allowed)]
-            found = self._compute(inside, chosen)
-            for departure, seed, robustness in zip(inside, chosen, found.tolist(), strict=True):
+            computed = self._compute(inside, chosen)
+            for departure, seed, robustness in zip(inside, chosen, computed.tolist(), strict=True):
                 self._note(departure, seed, robustness)
             self._watch(self.runs, min(self.robustnesses), self.smallest)
             if len(allowed) == len(departures):
-                return found
+                return computed
         raise BudgetSpent
 
     def _present(self, count: int) -> list[int]:
@@ -119,10 +119,10 @@ class ToBreak:
         Raises:
             Broken: a point breaks a requirement.
         """
-        found = self._objective.robustness(self._objective.box.of_cube(points))
+        robustness = self._objective.robustness(self._objective.box.of_cube(points))
         if self._objective.smallest is not None:
             raise Broken
-        return np.minimum(found, _WORST)
+        return np.minimum(robustness, _WORST)
 
     def slope(self, point: np.ndarray) -> np.ndarray:
         """Gradient of the robustness with respect to the point."""
@@ -150,5 +150,6 @@ class ToShrink:
     def costs(self, points: np.ndarray) -> np.ndarray:
         """Cost of each point."""
         departures = self._objective.box.of_cube(points)
-        found = self._objective.robustness(departures)
-        return np.where(found <= 0, self._objective.box.size(departures), _UNBROKEN + np.minimum(found, _WORST))
+        robustness = self._objective.robustness(departures)
+        sizes = self._objective.box.size(departures)
+        return np.where(robustness <= 0, sizes, _UNBROKEN + np.minimum(robustness, _WORST))

@@ -40,8 +40,8 @@ def corners(objective: RobustnessObjective, chance: np.random.Generator) -> Depa
         sides = (np.arange(2**numbers)[:, None] >> np.arange(numbers)) & 1
     else:
         sides = chance.integers(0, 2, (_RAYS, numbers))
-    found = np.unique(np.concatenate([ends, np.where(sides, upper, lower)]), axis=0)
-    return found[objective.box.size(found) > 0]
+    candidates = np.unique(np.concatenate([ends, np.where(sides, upper, lower)]), axis=0)
+    return candidates[objective.box.size(candidates) > 0]
 
 
 def shrink(
@@ -59,8 +59,9 @@ def shrink(
         BudgetSpent: before the search has converged.
     """
     chance = np.random.default_rng(seed)
-    alone = objective.box.size(first) <= 1.0  # one number at its bound
-    for ends in filter(len, (np.concatenate([_smallest(objective).departure[None], first[alone]]), first[~alone])):
+    at_one_bound = objective.box.size(first) <= 1.0  # one number at its bound
+    single_axes = np.concatenate([_smallest(objective).departure[None], first[at_one_bound]])
+    for ends in filter(len, (single_axes, first[~at_one_bound])):
         before = _smallest(objective)
         _along(objective, ends)
         if _smallest(objective) is not before:
@@ -91,32 +92,35 @@ def _along(objective: RobustnessObjective, ends: Departures) -> None:
     sizes = objective.box.size(ends)
     ends = ends * np.minimum(1.0, _smallest(objective).size / sizes)[:, None]
     scales = np.arange(1, _SCALES + 1) / _SCALES
-    found = objective.robustness((scales[:, None, None] * ends).reshape(-1, ends.shape[1])).reshape(_SCALES, len(ends))
-    breaking = (found <= 0).any(axis=0)
-    firsts = (found <= 0).argmax(axis=0)
+    departures = (scales[:, None, None] * ends).reshape(-1, ends.shape[1])
+    robustness = objective.robustness(departures).reshape(_SCALES, len(ends))
+    breaking = (robustness <= 0).any(axis=0)
+    firsts = (robustness <= 0).argmax(axis=0)
     lengths = objective.box.size(ends)
     for ray in sorted(np.flatnonzero(breaking), key=lambda ray: firsts[ray] * lengths[ray]):
         if firsts[ray] / _SCALES * lengths[ray] < _smallest(objective).size:
             _bisect(objective, ends[ray], firsts[ray] / _SCALES, (firsts[ray] + 1) / _SCALES)
 
 
-def _bisect(objective: RobustnessObjective, end: Float[np.ndarray, " k"], kept: float, broken: float) -> None:
+def _bisect(objective: RobustnessObjective, end: Float[np.ndarray, " k"], holding: float, broken: float) -> None:
     """Narrow the bracket of the distance along a ray at which a requirement breaks."""
-    while broken - kept > _PRECISION:
-        scales = np.linspace(kept, broken, _NARROWED + 1)[1:-1]
+    while broken - holding > _PRECISION:
+        scales = np.linspace(holding, broken, _NARROWED + 1)[1:-1]
         breaking = objective.robustness(scales[:, None] * end) <= 0
         if breaking.any():
-            place = int(breaking.argmax())
-            kept, broken = scales[place - 1] if place else kept, scales[place]
+            index = int(breaking.argmax())
+            holding, broken = scales[index - 1] if index else holding, scales[index]
         else:
-            kept = scales[-1]
+            holding = scales[-1]
 
 
 def _descend(
     objective: RobustnessObjective, slope: Callable[[np.ndarray], np.ndarray], chance: np.random.Generator
 ) -> None:
     """Improve the direction of the smallest violation until no candidate is better."""
-    spread, gradient, at = _WIDE, None, None
+    spread = _WIDE
+    gradient = None
+    at = None
     for _ in range(_ROUNDS):
         best = _smallest(objective)
         if at is not best:
@@ -143,14 +147,17 @@ def _directions(
     box: Box, best: Violation, gradient: np.ndarray | None, spread: float, chance: np.random.Generator
 ) -> Departures:
     """Directions of norm 1 that may meet the boundary nearer to the nominal scenario."""
-    departure, found = best.departure, [best.departure]
+    departure = best.departure
+    candidates = [best.departure]
     if gradient is not None and gradient.any():
+        # The point nearest to the nominal scenario at which the linearised robustness is zero: the departure x of
+        # robustness r with gradient g has the plane g.(y - x) + r = 0, whose point of least norm is along g.
         nearest = (gradient @ departure - best.robustness) / (gradient @ gradient) * gradient
         nearest = np.clip(nearest, box.lower, box.upper)
-        found += [departure + step * (nearest - departure) for step in _STEPS]
-    for place in np.flatnonzero(departure):
-        found += [np.where(np.arange(len(departure)) == place, share * departure, departure) for share in _LESS]
+        candidates += [departure + step * (nearest - departure) for step in _STEPS]
+    for axis in np.flatnonzero(departure):
+        candidates += [np.where(np.arange(len(departure)) == axis, share * departure, departure) for share in _LESS]
     around = best.size * spread * chance.standard_normal((_RANDOM, len(departure)))
-    inside = np.clip(np.array([*found, *(departure + around)]), box.lower, box.upper)
+    inside = np.clip(np.array([*candidates, *(departure + around)]), box.lower, box.upper)
     sizes = box.size(inside)
     return inside[sizes > 0] / sizes[sizes > 0, None]

@@ -13,31 +13,31 @@ _SATURATED = 0.1  # share of the time, from which on a loop without limits says 
 _FLAT = 0.05  # slope of the thrust that counts as none, as a share of that at half the supply
 
 
-def reason_without_prediction(executed: ScenarioResult) -> str:
+def reason_without_prediction(result: ScenarioResult) -> str:
     """Why a run has no prediction, as far as that is known in milliseconds; empty where it takes a linearisation."""
-    if executed.steady is None:
+    if result.steady is None:
         return "the run did not reach its steady window"
-    saturated = executed.steady.get("saturated_fraction", 0.0)
+    saturated = result.steady.get("saturated_fraction", 0.0)
     if saturated >= _SATURATED:
         return f"actuators were saturated {100 * saturated:.0f} % of the time, which the linear model does not capture"
-    return _flat_thrust(executed)
+    return _flat_thrust(result)
 
 
-def _flat_thrust(executed: ScenarioResult) -> str:
+def _flat_thrust(result: ScenarioResult) -> str:
     """A sentence where a thruster without dynamics swings about an input at which its thrust has almost no slope.
 
     With dynamics, a slope comes from the motor. Without, thrust that grows with the square of the voltage has none at
     rest, and the linear loop would need impossible voltages.
     """
-    plant = executed.built.of_the_law().closed_loop.plant
+    plant = result.built.of_the_law().closed_loop.plant
     if not (isinstance(plant, HybridVehicle) and isinstance(plant.thruster, AbstractQuasiStaticThruster)):
         return ""
     supply = np.asarray(plant.thruster.supply, dtype=float)
     if not np.isfinite(supply).all():
         return ""
-    start, stop = executed.built.window()
-    time = np.asarray(executed.outcome.time)
-    inputs = np.asarray(executed.outcome.signals["input"])[(time >= start) & (time <= stop)]
+    start, stop = result.built.window()
+    time = np.asarray(result.outcome.time)
+    inputs = np.asarray(result.outcome.signals["input"])[(time >= start) & (time <= stop)]
     mean, swing = inputs.mean(axis=0), inputs.std(axis=0)
     thruster = without(plant.thruster, ("dead_zone",))  # as it is linearised
     slope = lambda voltage: np.asarray(jax.jvp(lambda u: thruster.thrust((), u), (voltage,), (voltage * 0 + 1,))[1])

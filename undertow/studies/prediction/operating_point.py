@@ -61,25 +61,25 @@ def _desired(reference: AbstractReference, t: Time) -> Outputs:
     return reference.at(t).position
 
 
-def predicted(known: OperatingPoint) -> tuple[dict[str, float] | None, str]:
+def predicted(op_point: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     """Metrics of the steady window from the linearised loop; or None, and the reason."""
-    if not known.mean.found:
-        rate = f"{known.mean.moving:.2g} per second"
+    if not op_point.mean.found:
+        rate = f"{op_point.mean.moving:.2g} per second"
         return None, f"no equilibrium of the loop was found under the mean load: a state still changes by {rate}"
-    if known.radius >= 1:
-        pole = margins.poles(known.linear)[0]
+    if op_point.radius >= 1:
+        pole = margins.poles(op_point.linear)[0]
         turning = f"+- {abs(pole.imag):.3g}j " if pole.imag else ""
         why_not = f"the loop linearised at fixed weights is unstable: rightmost pole {pole.real:+.3g} {turning}1/s"
-        if theory_of(known.built.closed_loop.controller).adapts:
+        if theory_of(op_point.built.closed_loop.controller).adapts:
             why_not += "; adapting weights may change that, which only a run shows"
         return None, why_not
-    start, stop = known.built.window()
-    settings = known.built.scenario.loop
+    start, stop = op_point.built.window()
+    settings = op_point.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
-    begun = from_start(known.linear, known.mean, *_start(known))
-    signals = signals_within(known.mean, begun, known.around, (start, stop), every)
-    forbidden = _forbidden(known.built.closed_loop.controller, signals) or _beyond_limits(known, signals["u"])
-    units = known.built.closed_loop.plant.output_units
+    transient = from_start(op_point.linear, op_point.mean, *_start(op_point))
+    signals = signals_within(op_point.mean, transient, op_point.around, (start, stop), every)
+    forbidden = _forbidden(op_point.built.closed_loop.controller, signals) or _beyond_limits(op_point, signals["u"])
+    units = op_point.built.closed_loop.plant.output_units
     return (None, forbidden) if forbidden else (metrics_of(signals, units), "")
 
 
@@ -95,15 +95,16 @@ def _forbidden(law: AbstractController, signals: dict[str, np.ndarray]) -> str:
     return ""
 
 
-def _beyond_limits(known: OperatingPoint, inputs: np.ndarray) -> str:
+def _beyond_limits(op_point: OperatingPoint, inputs: np.ndarray) -> str:
     """A sentence where an input would have to be beyond its limit on average; short peaks only saturate for a while."""
     size = np.sqrt((inputs**2).mean(axis=0))
-    low, high = input_limits(known.built, known.mean)
+    low, high = input_limits(op_point.built, op_point.mean)
     share = size / np.maximum(-low, high)
     if share.max(initial=0.0) <= 1:
         return ""
-    worst, unit = int(share.argmax()), known.built.closed_loop.plant.input_unit
-    at_rest = known.mean.at["u"][worst]
+    worst = int(share.argmax())
+    unit = op_point.built.closed_loop.plant.input_unit
+    at_rest = op_point.mean.at["u"][worst]
     if share[worst] > _ABSURD and abs(at_rest) < _LITTLE * max(-low[worst], high[worst]):
         return (
             f"the loop is in equilibrium with input {worst + 1} at {at_rest:.2g} {unit}, where it has almost no effect "
@@ -117,18 +118,19 @@ def _beyond_limits(known: OperatingPoint, inputs: np.ndarray) -> str:
 
 def input_limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest input that reaches the actuators; infinite without a limit."""
-    plant, (x, _) = built.closed_loop.plant, at.parts.states(at.at)
+    plant = built.closed_loop.plant
+    x, _ = at.parts.states(at.at)
     ask = as_array(np.full(plant.inputs(), 1e9))
     low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
     return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
 
 
-def _start(known: OperatingPoint) -> list[np.ndarray]:
+def _start(op_point: OperatingPoint) -> list[np.ndarray]:
     """States of plant and controller at t = 0 as vectors."""
-    loop, initial = known.built.closed_loop, known.built.scenario.initial
-    loop = dataclasses.replace(loop, controller=known.mean.parts.loop.controller)
+    loop, initial = op_point.built.closed_loop, op_point.built.scenario.initial
+    loop = dataclasses.replace(loop, controller=op_point.mean.parts.loop.controller)
     outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(known.built.scenario.seed), *outputs)]
+    return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(op_point.built.scenario.seed), *outputs)]
 
 
 @eqx.filter_jit

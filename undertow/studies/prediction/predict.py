@@ -77,43 +77,45 @@ class Prediction(NamedTuple):
 def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
     """Predict a scenario from its linearised closed loop."""
     progress("equilibrium", 0.0)
-    known = operating_point(built)
-    loop, settings = known.built.closed_loop, built.scenario.loop
+    op_point = operating_point(built)
+    loop, settings = op_point.built.closed_loop, built.scenario.loop
     progress("poles at the operating points", 0.5)
-    points = tuple(_point(known, one) for one in known.around.operating_points(SHARES))
+    points = tuple(_point(op_point, conditions) for conditions in op_point.around.operating_points(SHARES))
     worst = max(points, key=lambda point: point.radius).at
     progress("margins", 0.6)
-    found = _margins(worst, settings.dt)
+    loop_margins = _margins(worst, settings.dt)
     progress("noise and disturbances", 0.9)
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
-    error, estimation = _responses(known.linear, frequency)
-    law, names = loop.controller, loop.plant.outputs
-    metrics, why_not = predicted(known)
-    axes, theory = range(len(names)), theory_of(law)
+    error, estimation = _responses(op_point.linear, frequency)
+    law = loop.controller
+    names = loop.plant.outputs
+    metrics, why_not = predicted(op_point)
+    axes = range(len(names))
+    theory = theory_of(law)
     gains = np.asarray(law.model.dynamics.gain(loop.plant.output(as_array(0.0), worst.parts.states(worst.at)[0])))
     return Prediction(
-        operating_point=known,
+        operating_point=op_point,
         points=points,
-        margins=found,
-        noise=_noise(known),
+        margins=loop_margins,
+        noise=_noise(op_point),
         frequency=frequency,
         error=error,
         estimation=estimation,
-        forms=closed_form_poles(law, margins.poles(known.linear), names),
-        estimators=[(names[i], *found, theory.ramp_error(i)) for i in axes if (found := theory.estimator(i))],
-        drift=max((found for i in axes if (found := theory.drift_bound(i, settings.dt))), default=None),
-        authority=actuator_authority(loop, known.mean, known.around.load),
+        forms=closed_form_poles(law, margins.poles(op_point.linear), names),
+        estimators=[(names[i], *estimator, theory.ramp_error(i)) for i in axes if (estimator := theory.estimator(i))],
+        drift=max((bound for i in axes if (bound := theory.drift_bound(i, settings.dt))), default=None),
+        authority=actuator_authority(loop, op_point.mean, op_point.around.load),
         lost=open_loop_advice("the gain matrix", gains, names),
         metrics=metrics,
         why_not=why_not,
     )
 
 
-def _point(known: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
-    loop, settings = known.built.closed_loop, known.built.scenario.loop
-    at = equilibrium(loop, settings.dt, known.mean.parts.target.position, acting.load, acting.flow)
+def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
+    loop, settings = op_point.built.closed_loop, op_point.built.scenario.loop
+    at = equilibrium(loop, settings.dt, op_point.mean.parts.target.position, acting.load, acting.flow)
     linear = margins.closed(at, settings.dt, settings.kind)
-    low, high = input_limits(known.built, at)
+    low, high = input_limits(op_point.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
     return LinearizedPoint(
@@ -132,14 +134,15 @@ def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
     }
 
 
-def _noise(known: OperatingPoint) -> VelocityNoise:
-    dt, axes = known.linear.dt, known.around.load.shape[1]
-    sampled = margins.closed(known.mean, dt)
-    one = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
-    gain = lambda name: margins.noise_gain(sampled, name, one) / _NOISE
+def _noise(op_point: OperatingPoint) -> VelocityNoise:
+    dt = op_point.linear.dt
+    axes = op_point.around.load.shape[1]
+    sampled = margins.closed(op_point.mean, dt)
+    velocity_noise = np.concatenate([np.zeros(axes), np.full(axes, _NOISE)])
+    gain = lambda name: margins.noise_gain(sampled, name, velocity_noise) / _NOISE
     of_input, of_estimate = gain("u"), gain("estimate") if "estimate" in sampled.signals else np.zeros(axes)
-    low, high = input_limits(known.built, known.mean)
-    room = np.minimum(high - known.mean.at["u"], known.mean.at["u"] - low)
+    low, high = input_limits(op_point.built, op_point.mean)
+    room = np.minimum(high - op_point.mean.at["u"], op_point.mean.at["u"] - low)
     with np.errstate(divide="ignore", invalid="ignore"):
         largest = float(np.maximum(room / (_DEVIATIONS * of_input), 0.0).min())
     return VelocityNoise(of_input, of_estimate, largest)
@@ -154,16 +157,16 @@ def _responses(linear: LinearLoop, frequency: np.ndarray) -> tuple[np.ndarray, n
     estimate = margins.response(linear, "estimate", frequency) if "estimate" in linear.signals else 0.0
     into_axes = linear.direct["uncertainty"]["load"]  # a load on the outputs in the controller's axes
     missed = (estimate - answer["uncertainty"]) @ np.linalg.inv(into_axes)
-    own = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
-    return own(answer["error"]), own(missed)
+    diagonal = lambda matrices: np.abs(np.diagonal(matrices, axis1=1, axis2=2))
+    return diagonal(answer["error"]), diagonal(missed)
 
 
 def summary(prediction: Prediction) -> dict[str, Any]:
     """Contents of prediction.json."""
-    known = prediction.operating_point
+    op_point = prediction.operating_point
     return {
-        "position": known.mean.parts.target.position.tolist(),
-        "mean_load": known.mean.at["load"].tolist(),
+        "position": op_point.mean.parts.target.position.tolist(),
+        "mean_load": op_point.mean.at["load"].tolist(),
         "points": [
             {
                 "where": point.where,

@@ -28,18 +28,19 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     worst = max(unstable, key=lambda point: point.radius)
     pole = worst.poles[0]
     turning = f" at {abs(pole.imag):.3g} rad/s" if pole.imag else ""
-    said = (
+    sentence = (
         f"the loop is unstable at {len(unstable)} of {len(prediction.points)} operating points: rightmost pole "
         f"{pole.real:+.3g} 1/s{turning}. Use `preset: robust`, or a slower estimator"
     )
     if theory_of(prediction.operating_point.built.closed_loop.controller).adapts:
-        said += ". This holds for fixed weights: drifting weights add damping, so that a run may still last. Simulate "
-        said += "it to find out"
-    return (said,)
+        sentence += ". This holds for fixed weights: drifting weights add damping, so that a run may still last. "
+        sentence += "Simulate it to find out"
+    return (sentence,)
 
 
 def _actuators(prediction: Prediction) -> tuple[str, ...]:
-    warnings, authority = [], prediction.authority
+    warnings = []
+    authority = prediction.authority
     if authority.held < 1:
         warnings.append(
             f"the actuators meet the demand for only {authority.held:.0%} of the time, and give "
@@ -54,7 +55,8 @@ def _actuators(prediction: Prediction) -> tuple[str, ...]:
 
 
 def _sampling(prediction: Prediction) -> tuple[str, ...]:
-    warnings, dt = [], prediction.operating_point.linear.dt
+    warnings = []
+    dt = prediction.operating_point.linear.dt
     law = prediction.operating_point.built.closed_loop.controller
     fastest = max((row[1] for row in prediction.estimators), default=0.0)
     if fastest * dt > _SAMPLED:

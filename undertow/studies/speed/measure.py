@@ -35,35 +35,35 @@ def measure(watch: Watch) -> dict[str, Any]:
         Figures of W1 by their names, those of W2 under names that begin with `w2_`.
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    found: dict[str, Any] = {"threads": threads, "simd_width": simd_batch.simd_width(64)}
-    lacking = simd_batch.unavailable()
-    if lacking:
-        found["simd_unavailable"] = lacking
+    figures: dict[str, Any] = {"threads": threads, "simd_width": simd_batch.simd_width(64)}
+    why_no_simd = simd_batch.unavailable()
+    if why_no_simd:
+        figures["simd_unavailable"] = why_no_simd
     watch("first results", 0.0)
-    found["first_cold_s"], found["first_kept_s"] = _first_results()
+    figures["first_cold_s"], figures["first_kept_s"] = _first_results()
     with runtime.on_processor():
         watch("W1, one run", 0.1)
-        one = workload.workload(W1)
-        found |= {"steps": one.steps} | ({} if lacking else _single(one))
+        w1 = workload.workload(W1)
+        figures |= {"steps": w1.steps} | ({} if why_no_simd else _single(w1))
         watch("W1, one run, XLA backend", 0.2)
-        found |= _by_xla(one)
-        if not lacking:
+        figures |= _by_xla(w1)
+        if not why_no_simd:
             watch("W2, one run", 0.3)
-            other = workload.workload(W2)
-            second = {"steps": other.steps} | _single(other, _REPETITIONS_W2)
-            second |= _prefixed("batch_float64_", _batch(other, threads, _BATCH_W2, _REPETITIONS_W2))
-            found |= _prefixed("w2_", second)
-    for i, kind in enumerate(() if lacking else ("float64", "float32")):
+            w2 = workload.workload(W2)
+            second = {"steps": w2.steps} | _single(w2, _REPETITIONS_W2)
+            second |= _prefixed("batch_float64_", _batch(w2, threads, _BATCH_W2, _REPETITIONS_W2))
+            figures |= _prefixed("w2_", second)
+    for i, kind in enumerate(() if why_no_simd else ("float64", "float32")):
         watch(f"W1, batch, {kind}", 0.5 + 0.2 * i)
         with runtime.in_precision(kind):
-            found |= _many(kind, threads)
+            figures |= _many(kind, threads)
     watch("W1 in plain NumPy", 0.9)
-    found["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_STEPS), 1) / _NUMPY_STEPS
-    if not lacking:
-        found["single_times_numpy"] = found["numpy_ns"] / found["single_ns"]
-        found["batch_times_scalar"] = found["single_ns"] / found["batch_float64_ns"]
+    figures["numpy_ns"] = _shortest(lambda: plain_numpy.workload_w1(_NUMPY_STEPS), 1) / _NUMPY_STEPS
+    if not why_no_simd:
+        figures["single_times_numpy"] = figures["numpy_ns"] / figures["single_ns"]
+        figures["batch_times_scalar"] = figures["single_ns"] / figures["batch_float64_ns"]
     watch("", 1.0)
-    return found
+    return figures
 
 
 def _first_results() -> tuple[float, float]:
@@ -82,16 +82,16 @@ def with_cache(folder: str) -> dict[str, str]:
     return settings
 
 
-def _single(one: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
-    single, compiling = _timed(lambda: workload.batch(one, width=1))
-    numbers = workload.alone(one.run)
+def _single(job: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
+    single, compiling = _timed(lambda: workload.batch(job, width=1))
+    numbers = workload.alone(job.run)
     tracking = float(workload.tracking(single.run(numbers).accumulated)[0])
-    each = _shortest(lambda: single.run(numbers), repetitions) / one.steps
-    return {"single_compile_s": compiling, "single_ns": each, "tracking_rms": tracking}
+    ns_per_step = _shortest(lambda: single.run(numbers), repetitions) / job.steps
+    return {"single_compile_s": compiling, "single_ns": ns_per_step, "tracking_rms": tracking}
 
 
-def _by_xla(one: Workload) -> dict[str, float]:
-    run, plan = one
+def _by_xla(job: Workload) -> dict[str, float]:
+    run, plan = job
 
     def execute():
         at = dict(zip(("position", "velocity"), run.start, strict=True))
@@ -109,46 +109,46 @@ def _by_xla(one: Workload) -> dict[str, float]:
 def _many(kind: str, threads: int) -> dict[str, Any]:
     """A batch, on the CPU and, if there is one, on the GPU."""
     with runtime.on_processor():
-        one = workload.workload(W1 | {"precision": kind})
-        found = _prefixed(f"batch_{kind}_", _batch(one, threads, _BATCH))
+        job = workload.workload(W1 | {"precision": kind})
+        figures = _prefixed(f"batch_{kind}_", _batch(job, threads, _BATCH))
     if jax.default_backend() == "gpu":
-        short = one._replace(plan=one.plan._replace(steps=200))
-        found |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(short, _ON_GPU)}
+        short = job._replace(plan=job.plan._replace(steps=200))
+        figures |= {"gpu": jax.devices()[0].device_kind, f"gpu_{kind}_vmap_ns": vmapped_ns(short, _ON_GPU)}
     driver = simd_batch.gpu()
     if driver is not None:
-        found |= _prefixed(f"gpu_{kind}_", on_gpu(one, driver, _ON_GPU))
-    return found
+        figures |= _prefixed(f"gpu_{kind}_", on_gpu(job, driver, _ON_GPU))
+    return figures
 
 
-def _batch(one: Workload, threads: int, runs: int, repetitions: int = _REPETITIONS) -> dict[str, float]:
+def _batch(job: Workload, threads: int, runs: int, repetitions: int = _REPETITIONS) -> dict[str, float]:
     """Several runs per thread, all threads at once and one alone."""
-    program, compiling = _timed(lambda: workload.batch(one))
-    numbers = workload.several(one.run, runs)
+    program, compiling = _timed(lambda: workload.batch(job))
+    numbers = workload.several(job.run, runs)
 
     def together(count: int) -> float:
         with runtime.workers(count) as pool:
             work = lambda: list(pool.map(lambda _: program.run(numbers), range(count)))
             return _shortest(work, repetitions) / count
 
-    each = one.steps * runs
-    found = {"compile_s": compiling, "one_thread_ns": together(1) / each, "ns": together(threads) / each}
+    steps = job.steps * runs
+    figures = {"compile_s": compiling, "one_thread_ns": together(1) / steps, "ns": together(threads) / steps}
     # The program of a single run has its stages in a loop, which counts them once.
-    return found | {"operations": program.operations}
+    return figures | {"operations": program.operations}
 
 
-def on_gpu(one: Workload, driver: Any, runs: int) -> dict[str, float]:
+def on_gpu(job: Workload, driver: Any, runs: int) -> dict[str, float]:
     """A batch on a GPU with one thread per run, including the copies to and from it."""
-    program, compiling = _timed(lambda: workload.batch(one, driver=driver))
-    numbers = workload.several(one.run, runs)
-    each = _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
-    return {"compile_s": compiling, "ns": each, "steps_per_second": 1e9 / each}
+    program, compiling = _timed(lambda: workload.batch(job, driver=driver))
+    numbers = workload.several(job.run, runs)
+    ns_per_step = _shortest(lambda: program.run(numbers), 3) / (job.steps * runs)
+    return {"compile_s": compiling, "ns": ns_per_step, "steps_per_second": 1e9 / ns_per_step}
 
 
-def vmapped_ns(one: Workload, runs: int) -> float:
+def vmapped_ns(job: Workload, runs: int) -> float:
     """Nanoseconds per step and run by `jax.vmap` on the device that JAX uses."""
-    program = XlaBatchRunner(one.run, one.plan, width=runs)
-    numbers = jax.tree.map(jnp.asarray, workload.several(one.run, runs))
-    return _shortest(lambda: program.run(numbers), 3) / (one.steps * runs)
+    program = XlaBatchRunner(job.run, job.plan, width=runs)
+    numbers = jax.tree.map(jnp.asarray, workload.several(job.run, runs))
+    return _shortest(lambda: program.run(numbers), 3) / (job.steps * runs)
 
 
 def _prefixed(prefix: str, figures: dict[str, Any]) -> dict[str, Any]:

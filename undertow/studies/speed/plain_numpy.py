@@ -81,9 +81,9 @@ def law(eta, eta_dot, v_hat, theta, composite):
     f = -j @ M_INV @ body_forces(eta, np.linalg.solve(j, eta_dot))
     acceleration = -f - d_hat + e - 2 * eta_dot + u_r
     voltage = B_PINV @ M @ np.linalg.solve(j, acceleration) / ALPHA
-    known = f + j @ M_INV @ B @ (ALPHA * voltage)
-    v_hat_dot = -150 * eps + known + d_hat - 0.1 * np.tanh(eps / 0.5)
-    return voltage, v_hat_dot, -100 * (s + composite * eps)[:, None] * xi, (e, d_hat, u_r, known)
+    modelled = f + j @ M_INV @ B @ (ALPHA * voltage)
+    v_hat_dot = -150 * eps + modelled + d_hat - 0.1 * np.tanh(eps / 0.5)
+    return voltage, v_hat_dot, -100 * (s + composite * eps)[:, None] * xi, (e, d_hat, u_r, modelled)
 
 
 def rk4(rate, t, y, h):

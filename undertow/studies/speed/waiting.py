@@ -69,16 +69,17 @@ def waiting_times(
     Raises:
         CalledProcessError: a command failed.
     """
-    found, stages = {}, [*cases, *compared]
+    times = {}
+    stages = [*cases, *compared]
     watch("start of JAX", 0.0)
-    found["jax_start_s"] = _seconds(_JAX, Path(), dict(os.environ))[1]
+    times["jax_start_s"] = _seconds(_JAX, Path(), dict(os.environ))[1]
     for i, (name, case) in enumerate(cases.items()):
         with tempfile.TemporaryDirectory() as folder:
             settings = _settings(Path(folder))
             for when, scenario in (("cold", case.scenario), ("changed", case.changed)):
                 watch(f"{name}, {when}", i / len(stages))
                 results, files = _simulated(Path(folder), settings, scenario)
-                found |= {f"{name}_{when}_results_s": results, f"{name}_{when}_files_s": files}
+                times |= {f"{name}_{when}_results_s": results, f"{name}_{when}_files_s": files}
     for i, name in enumerate(compared):
         with tempfile.TemporaryDirectory() as folder:
             settings = _settings(Path(folder))
@@ -86,9 +87,9 @@ def waiting_times(
             for when in ("cold", "warm"):
                 watch(f"{name}, comparison, {when}", (len(cases) + i) / len(stages))
                 command = (*_COMMAND, "compare", "scenario.yaml", "--controllers", _COMPARED, "--out", when)
-                found[f"{name}_compare_{when}_s"] = _seconds(command, Path(folder), settings)[1]
+                times[f"{name}_compare_{when}_s"] = _seconds(command, Path(folder), settings)[1]
     watch("", 1.0)
-    return found
+    return times
 
 
 def _settings(folder: Path) -> dict[str, str]:
@@ -104,7 +105,8 @@ def _simulated(folder: Path, settings: dict[str, str], scenario: Mapping[str, An
 
 def _seconds(command: Sequence[str], folder: Path, settings: dict[str, str], until: str = "") -> tuple[float, float]:
     """Seconds until a process prints a line that begins with `until`, and until it ends."""
-    started, printed = time.perf_counter(), float("nan")
+    started = time.perf_counter()
+    printed = float("nan")
     options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
     with subprocess.Popen(command, cwd=folder, env=settings, **options) as process:
         for line in process.stdout or ():

@@ -69,8 +69,8 @@ def workload(data: Mapping[str, Any]) -> Workload:
 
 def constant(run: LoopRun) -> list[bool]:
     """Which numbers are equal in `several`: all except the initial position."""
-    same = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
-    return jax.tree.leaves(same._replace(start=(False, True)))
+    all_constant = jax.tree.map(lambda leaf: True, eqx.filter(run, eqx.is_array))
+    return jax.tree.leaves(all_constant._replace(start=(False, True)))
 
 
 def several(run: LoopRun, count: int) -> Any:
@@ -81,9 +81,9 @@ def several(run: LoopRun, count: int) -> Any:
     return stacked._replace(start=(places.astype(run.start[0].dtype), stacked.start[1]))
 
 
-def batch(one: Workload, width: int = 0, driver: Any = None) -> SimdBatchRunner:
+def batch(job: Workload, width: int = 0, driver: Any = None) -> SimdBatchRunner:
     """Program of a workload; arguments as of `SimdBatchRunner`."""
-    return SimdBatchRunner(one.run, one.plan, constant(one.run), width, driver)
+    return SimdBatchRunner(job.run, job.plan, constant(job.run), width, driver)
 
 
 def tracking(accumulated: Any) -> np.ndarray:

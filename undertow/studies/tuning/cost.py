@@ -60,7 +60,8 @@ class CostSums(AbstractAccumulator):
     def update(self, state: Sums, t: Scalar, signals: Signals) -> Sums:
         inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
         last_t, last_share, last_inside = state.last
-        share, between = signals["input"] / self.input_scale, inside * last_inside
+        share = signals["input"] / self.input_scale
+        between = inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
         return Sums(
             samples=state.samples + inside,
@@ -82,8 +83,8 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     """
     rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
     variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
-    found = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
-    return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in found))
+    parts = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
+    return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in parts))
 
 
 def times_other(cost: float, other: float) -> str:

@@ -42,14 +42,17 @@ class Scaled(AbstractDisturbance):
         return self.inner.realize(key)
 
     def at(self, realization, t, pose, load: Load) -> Load:
-        whole, size = self.inner.at(realization, t, pose, load), self.size
-        water, factors, surface = whole.water, whole.scaling, whole.surface
+        full = self.inner.at(realization, t, pose, load)
+        size = self.size
+        water, factors, surface = full.water, full.scaling, full.surface
         return Load(
-            acceleration=load.acceleration + size * (whole.acceleration - load.acceleration),
-            wrench=load.wrench + size * (whole.wrench - load.wrench),
+            acceleration=load.acceleration + size * (full.acceleration - load.acceleration),
+            wrench=load.wrench + size * (full.wrench - load.wrench),
             water=water and Water(size * water.velocity, size * water.acceleration),
             scaling=factors and ModelScaling(*(factor**size for factor in factors)),
-            payloads=tuple(Payload(size * each.mass, size * each.weight, each.point) for each in whole.payloads),
+            payloads=tuple(
+                Payload(size * payload.mass, size * payload.weight, payload.point) for payload in full.payloads
+            ),
             surface=surface and FreeSurface(surface.depth, size * surface.elevation),
         )
 

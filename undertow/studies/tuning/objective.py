@@ -82,29 +82,29 @@ class Objective:
         Raises:
             OutOfTime: the budget is used up.
         """
-        found = self._costs(points, must) if self._most is None else self._costs_within(self._most, points, must)
-        for i in np.argsort(found, kind="stable"):
-            if self.best is not None and not found[i] < self.best.cost:
+        costs = self._costs(points, must) if self._most is None else self._costs_within(self._most, points, must)
+        for i in np.argsort(costs, kind="stable"):
+            if self.best is not None and not costs[i] < self.best.cost:
                 break
             radius = self.radius(points[i])
             if radius < 1:
                 step = Improvement(
-                    self.evaluations, self._checkpoint.elapsed, float(found[i]), points[i].tolist(), radius
+                    self.evaluations, self._checkpoint.elapsed, float(costs[i]), points[i].tolist(), radius
                 )
                 self.steps.append(step)
                 break
             self.rejected += 1
-            found[i] = np.inf
+            costs[i] = np.inf
             self._known[_key(points[i])] = np.inf
         if self.best is not None:
             self._watch(self.best, self.evaluations)
-        return found
+        return costs
 
     def _costs(self, points: Points, must: bool) -> np.ndarray:
         """Costs from the checkpoint, or computed."""
-        found = self._checkpoint.ask("costs", points, lambda: _finite(self._computes.costs(points)), must)
+        costs = self._checkpoint.ask("costs", points, lambda: _finite(self._computes.costs(points)), must)
         self.evaluations += len(points)
-        return np.asarray(found)
+        return np.asarray(costs)
 
     def _costs_within(self, most: int, points: Points, must: bool) -> np.ndarray:
         """Costs of the points for which the budget is enough; infinite for the others."""
@@ -127,9 +127,9 @@ class Objective:
         evaluations = self.evaluations + 2 * len(point)
         if self._most is not None and evaluations > self._most:
             raise OutOfTime
-        found = self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist())
+        gradient = self._checkpoint.ask("slope", point, lambda: self._computes.slope(point).tolist())
         self.evaluations = evaluations
-        return np.asarray(found)
+        return np.asarray(gradient)
 
     def radius(self, point: np.ndarray) -> float:
         """Largest spectral radius of the loop at a point."""

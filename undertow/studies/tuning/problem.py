@@ -76,9 +76,11 @@ def _problem(text: Text, built: Built) -> Problem:
     loop, scenario, tune = built.closed_loop, built.scenario, built.scenario.tune
     if scenario.loop.kind != "sampled":
         raise BadInput("loop.kind", "be sampled, for gains to be used on a vehicle", scenario.loop.kind)
-    known, dt, angles = _law_of(built), scenario.loop.dt, loop.controller.model.coordinates.angles
-    function, given = _controller(text, built)
-    chosen = _parameters(known, function, given, tune, dt, angles)
+    tunable = _law_of(built)
+    dt = scenario.loop.dt
+    angles = loop.controller.model.coordinates.angles
+    function, base_options = _controller(text, built)
+    chosen = _parameters(tunable, function, base_options, tune, dt, angles)
     train, held_out = training_and_held_out(text, built)
     duration = min(scenario.loop.duration, _LONGEST) if tune.duration is None else tune.duration
     start = duration / 2 if tune.start is None else tune.start
@@ -86,22 +88,24 @@ def _problem(text: Text, built: Built) -> Problem:
         raise BadInput("tune.start", f"be earlier than the end of a run ({duration:g} s)", f"{start:g} s")
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
     sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
-    made = lambda place: None if place is None else np.asarray(place, dtype=float)
-    places = made(scenario.initial.position), made(scenario.initial.velocity)
+    as_floats = lambda values: None if values is None else np.asarray(values, dtype=float)
+    places = as_floats(scenario.initial.position), as_floats(scenario.initial.velocity)
     training_loop = TrainingLoop(loop, scenario.loop, duration, places, sums, tune.weights)
     model = loop.controller.model
-    law = lambda options: function(model, **(given | _left_out(known, options) | dict(options)))
-    begin = [parameter.share(_mean(known, loop.controller, given, parameter)) for parameter in chosen]
-    found = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
+    law = lambda options: function(model, **(base_options | _left_out(tunable, options) | dict(options)))
+    begin = [parameter.share(_mean(tunable, loop.controller, base_options, parameter)) for parameter in chosen]
+    tuning_problem = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
     try:
         with within("controller"):
-            found.law(found.options(found.start))
-            jax.eval_shape(lambda point: eqx.filter(law(found.options(point)), eqx.is_array), found.start)
+            tuning_problem.law(tuning_problem.options(tuning_problem.start))
+            jax.eval_shape(
+                lambda point: eqx.filter(law(tuning_problem.options(point)), eqx.is_array), tuning_problem.start
+            )
     except TypeError as error:
         must = "be options that the controller takes as arrays of JAX, one number for each axis"
         hint = "Compute with jax.numpy, without float() and without `if` on a gain"
         raise BadInput("tune.parameters", must, str(error).partition("\n")[0], hint=hint) from None
-    return found
+    return tuning_problem
 
 
 def _law_of(built: Built) -> TunableParameters:
@@ -118,16 +122,19 @@ def _controller(text: Text, built: Built) -> tuple[Callable[..., AbstractControl
 
 
 def _parameters(
-    known: TunableParameters,
+    tunable: TunableParameters,
     function: Callable[..., Any],
-    given: Mapping[str, Any],
+    base_options: Mapping[str, Any],
     tune: Any,
     dt: float,
     angles: tuple[bool, ...],
 ) -> list[TunableParameter]:
-    ranges, options = tune.parameters or known.ranges(dt), list(inspect.signature(function).parameters)[1:]
+    ranges = tune.parameters or tunable.ranges(dt)
+    options = list(inspect.signature(function).parameters)[1:]
     if not ranges:
-        raise BadInput("tune.parameters", "be given: this controller has no ranges of its own", hint=_example(given))
+        raise BadInput(
+            "tune.parameters", "be given: this controller has no ranges of its own", hint=_example(base_options)
+        )
     for name in ranges:
         if name.partition("[")[0] not in options:
             hint = did_you_mean(name, options)
@@ -135,12 +142,12 @@ def _parameters(
     return tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
 
 
-def _example(given: Mapping[str, Any]) -> str:
+def _example(options: Mapping[str, Any]) -> str:
     """How to give ranges: of an option of the controller with one number, around its value."""
-    numbers = {name: value for name, value in given.items() if type(value) in (int, float) and value > 0}
+    numbers = {name: value for name, value in options.items() if type(value) in (int, float) and value > 0}
     name, value = next(iter(numbers.items()), ("OPTION", 1.0))
-    others = f"; its options with one number are {', '.join(numbers)}" if len(numbers) > 1 else ""
-    return f"For example `tune: {{parameters: {{{name}: [{value / 10:g}, {10 * value:g}]}}}}`{others}"
+    listing = f"; its options with one number are {', '.join(numbers)}" if len(numbers) > 1 else ""
+    return f"For example `tune: {{parameters: {{{name}: [{value / 10:g}, {10 * value:g}]}}}}`{listing}"
 
 
 def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
@@ -153,21 +160,21 @@ def _groups(per: str, angles: tuple[bool, ...]) -> list[tuple[int, ...]]:
     return [(i,) for i in axes]
 
 
-def _left_out(known: TunableParameters, options: Mapping[str, Any]) -> dict[str, None]:
+def _left_out(tunable: TunableParameters, options: Mapping[str, Any]) -> dict[str, None]:
     """Options that are equivalent to tuned ones, set to None."""
-    return {other: None for option in options for other in known.instead.get(option, ())}
+    return {equivalent: None for option in options for equivalent in tunable.instead.get(option, ())}
 
 
 def _mean(
-    known: TunableParameters, law: AbstractController, given: Mapping[str, Any], parameter: TunableParameter
+    tunable: TunableParameters, law: AbstractController, base_options: Mapping[str, Any], parameter: TunableParameter
 ) -> float:
     """Value of a parameter in a controller: geometric mean over its axes, or of its bounds where unknown."""
     name = parameter.option if parameter.entry is None else f"{parameter.option}[{parameter.entry}]"
-    value = known.now[name](law) if name in known.now else given.get(parameter.option)
+    value = tunable.now[name](law) if name in tunable.now else base_options.get(parameter.option)
     if value is None:
         return float(np.sqrt(parameter.low * parameter.high))
     numbers = np.asarray(value, dtype=float)
-    if name not in known.now and parameter.entry is not None:
+    if name not in tunable.now and parameter.entry is not None:
         numbers = numbers[..., parameter.entry]
     of_axes = numbers[list(parameter.axes)] if numbers.ndim and parameter.axes else numbers
     return float(np.exp(np.log(np.maximum(of_axes, parameter.low)).mean()))

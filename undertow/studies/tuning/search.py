@@ -49,7 +49,12 @@ def descend(objective: Descended, start: np.ndarray, cost: float, iterations: in
         cost: at the start.
         iterations: at most.
     """
-    x, inverse, slope, idle, stuck, reach = start, None, objective.slope(start), 0, False, _FIRST
+    x = start
+    inverse = None
+    slope = objective.slope(start)
+    idle = 0
+    stuck = False
+    reach = _FIRST
     chance = np.random.default_rng(0)
     for _ in range(iterations):
         free = ~(((x <= 0) & (slope > 0)) | ((x >= 1) & (slope < 0)))
@@ -72,7 +77,10 @@ def descend(objective: Descended, start: np.ndarray, cost: float, iterations: in
             continue
         stuck = False
         idle = idle + 1 if cost - costs[best] < _LITTLE * abs(cost) else 0
-        moved, x, cost, before = points[best] - x, points[best], float(costs[best]), slope
+        moved = points[best] - x
+        x = points[best]
+        cost = float(costs[best])
+        before = slope
         if idle >= _PATIENCE:
             return
         slope = objective.slope(x)
@@ -117,13 +125,17 @@ def evolve(objective: Searched, start: np.ndarray, cost: float, iterations: int,
         iterations: at most.
         seed: seed of all random numbers.
     """
-    x, spread, chance = start, _FIRST, np.random.default_rng(seed)
+    x = start
+    spread = _FIRST
+    chance = np.random.default_rng(seed)
     for _ in range(iterations):
         points = np.clip(x + spread * chance.normal(size=(AT_ONCE, len(x))), 0.0, 1.0)
         costs = objective.costs(points)
         best = int(np.argmin(costs))
         if costs[best] < cost:
-            x, cost, spread = points[best], float(costs[best]), min(_GROWTH * spread, _LARGEST)
+            x = points[best]
+            cost = float(costs[best])
+            spread = min(_GROWTH * spread, _LARGEST)
         else:
             spread *= _SHRINKAGE
         if spread < _NEAREST:

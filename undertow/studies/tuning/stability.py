@@ -74,9 +74,10 @@ class Certifier:
         variants: list[str] = []
         columns = zip(self._variants, self._plants, self._points, self._first, strict=True)
         for name, plant, points, near in columns:
-            found = margins.certify(self._training_loop.with_parts(plant, law), dt, self._position, points, near)
-            radii += [radius if np.isfinite(radius) else float("inf") for radius in found]
-            variants += [name] * len(found)
+            loop = self._training_loop.with_parts(plant, law)
+            radii_of_plant = margins.certify(loop, dt, self._position, points, near)
+            radii += [radius if np.isfinite(radius) else float("inf") for radius in radii_of_plant]
+            variants += [name] * len(radii_of_plant)
         return Certificate(tuple(radii), tuple(variants))
 
     def _operating_points(self, plant: Any, key: Any, law: AbstractController) -> list[OperatingConditions]:
@@ -94,29 +95,30 @@ class NoCertificate(BadInput):
     """None of the tried points is certified."""
 
 
-def no_certificate(given: Certificate, tried: Mapping[str, Certificate], points: int) -> NoCertificate:
+def no_certificate(initial: Certificate, tried: Mapping[str, Certificate], points: int) -> NoCertificate:
     """The error where none of the tried points is certified, with the point that came nearest.
 
     Args:
-        given: certificate of the given gains, each moved to the nearest bound where it is outside its range.
+        initial: certificate of the given gains, each moved to the nearest bound where it is outside its range.
         tried: certificates by gains in words; without those that an earlier, interrupted tuning computed.
         points: number of points that were tried.
     """
-    radius = f"the given gains, within the ranges, have {given.worst:.4g}{_on(given)}"
-    says = [f"A loop is stable with a spectral radius below 1: {radius}"]
+    radius = f"the given gains, within the ranges, have {initial.worst:.4g}{_on(initial)}"
+    sentences = [f"A loop is stable with a spectral radius below 1: {radius}"]
     remedies = ["Widen the ranges"]
     if tried:
         nearest = min(tried, key=lambda gains: tried[gains].worst)
-        says.append(f"the nearest point has {tried[nearest].worst:.4g}, with {nearest}")
+        sentences.append(f"the nearest point has {tried[nearest].worst:.4g}, with {nearest}")
         remedies = ["Widen the ranges beyond this point"]
-    (variant, times), *_ = Counter(one.worst_variant for one in (given, *tried.values())).most_common()
+    certificates = (initial, *tried.values())
+    (variant, times), *_ = Counter(certificate.worst_variant for certificate in certificates).most_common()
     if variant:
         often = f" ({times} of {1 + len(tried)} times the least stable one)" if tried else ""
         remedies += ["use another nominal model", f"leave variant {variant}{often} out of tune.train.sets"]
     must, got = "allow gains for which the loop is stable", f"ranges in which none of {points} points is certified"
-    hint = f"{', '.join(says)}. {', or '.join(remedies)}"
+    hint = f"{', '.join(sentences)}. {', or '.join(remedies)}"
     return NoCertificate("tune.parameters", must, got, hint=hint)
 
 
-def _on(found: Certificate) -> str:
-    return f" on the plant variant {found.worst_variant}" if found.worst_variant else ""
+def _on(certificate: Certificate) -> str:
+    return f" on the plant variant {certificate.worst_variant}" if certificate.worst_variant else ""

@@ -52,9 +52,9 @@ def training_and_held_out(text: Text, built: Built) -> tuple[PlantVariants, Plan
         BadInput: a parameter set that the vehicle does not have.
     """
     tune, names = built.scenario.tune, parameter_sets(built)
-    own = tuple(dict.fromkeys((*names[:1], *names[1::2])))
+    held_out_sets = tuple(dict.fromkeys((*names[:1], *names[1::2])))
     train = trials(text, built, tune.train, names[::2], "train", built.scenario.seed)
-    return train, trials(text, built, tune.held_out, own, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
+    return train, trials(text, built, tune.held_out, held_out_sets, "held_out", built.scenario.seed + _HELD_OUT_SEEDS)
 
 
 def trials(
@@ -70,33 +70,34 @@ def trials(
         key: key of `tune`, for messages.
         first_seed: first seed; the others follow.
     """
-    names, known = tuple(runs.sets if runs.sets is not None else default), parameter_sets(built)
+    names = tuple(runs.sets if runs.sets is not None else default)
+    published = parameter_sets(built)
     for i, name in enumerate(names):
-        if not known:
+        if not published:
             raise BadInput(f"tune.{key}.sets", "be left out: there is only one parameter set", list(names))
-        checks.choice(f"tune.{key}.sets[{i}]", name, known)
+        checks.choice(f"tune.{key}.sets[{i}]", name, published)
     for i, size in enumerate(runs.sizes):
         checks.not_negative(f"tune.{key}.sizes[{i}]", size)
     if not runs.sizes:
         raise BadInput(f"tune.{key}.sizes", "have an entry")
     if names == ():
-        names = known[:1] if known else ("",)
+        names = published[:1] if published else ("",)
     plants = {name: _plant(text, built, name) for name in names}
-    each = [(name, seed) for seed in range(runs.seeds) for name in names]
+    pairs = [(name, seed) for seed in range(runs.seeds) for name in names]
     return PlantVariants(
-        plants=stacked([plants[name] for name, _ in each]),
-        keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in each]),
-        sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in each], dtype=float),
-        variants=tuple(name for name, _ in each),
+        plants=stacked([plants[name] for name, _ in pairs]),
+        keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in pairs]),
+        sizes=jnp.asarray([runs.sizes[seed % len(runs.sizes)] for _, seed in pairs], dtype=float),
+        variants=tuple(name for name, _ in pairs),
     )
 
 
-def joined(several: Sequence[PlantVariants]) -> PlantVariants:
+def joined(variant_sets: Sequence[PlantVariants]) -> PlantVariants:
     """All trials of several sets."""
-    numbers = [(eqx.filter(one.plants, eqx.is_array), one.keys, one.sizes) for one in several]
+    numbers = [(eqx.filter(variants.plants, eqx.is_array), variants.keys, variants.sizes) for variants in variant_sets]
     arrays, keys, sizes = jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *numbers)
-    plants = eqx.combine(arrays, eqx.filter(several[0].plants, eqx.is_array, inverse=True))
-    return PlantVariants(plants, keys, sizes, tuple(name for one in several for name in one.variants))
+    plants = eqx.combine(arrays, eqx.filter(variant_sets[0].plants, eqx.is_array, inverse=True))
+    return PlantVariants(plants, keys, sizes, tuple(name for variants in variant_sets for name in variants.variants))
 
 
 def parameter_sets(built: Built) -> tuple[str, ...]:
@@ -108,8 +109,8 @@ def parameter_sets(built: Built) -> tuple[str, ...]:
     if function is None or "parameters" not in inspect.signature(function).parameters:
         return ()
     names = tuple(getattr(sys.modules[function.__module__], "PARAMETERS", ()))
-    own = vehicle["parameters"]
-    return (own, *(name for name in names if name != own)) if own in names else ()
+    scenario_set = vehicle["parameters"]
+    return (scenario_set, *(name for name in names if name != scenario_set)) if scenario_set in names else ()
 
 
 def stacked(plants: Sequence[AbstractPlant]) -> AbstractPlant:
@@ -124,7 +125,7 @@ def _plant(text: Text, built: Built, name: str) -> AbstractPlant:
     """The scenario's plant with another parameter set."""
     if not name or name == built.resolved["plant"]["vehicle"]["parameters"]:
         return built.closed_loop.plant
-    given = dict(built.scenario.plant.model_dump())
-    vehicle = given.get("vehicle", built.resolved["plant"]["vehicle"])
-    given["vehicle"] = {**({"kind": vehicle} if isinstance(vehicle, str) else vehicle), "parameters": name}
-    return factory.make("plants", given, text.folder)[0]
+    plant_options = dict(built.scenario.plant.model_dump())
+    vehicle = plant_options.get("vehicle", built.resolved["plant"]["vehicle"])
+    plant_options["vehicle"] = {**({"kind": vehicle} if isinstance(vehicle, str) else vehicle), "parameters": name}
+    return factory.make("plants", plant_options, text.folder)[0]

@@ -57,20 +57,20 @@ def parameters(
     Raises:
         BadInput: not two bounds, not positive, or the wrong way round; or not all numbers of an option.
     """
-    found = []
+    tunable = []
     for name, bounds in ranges.items():
         option, entry = _parsed(name)
         low, high = _bounds(name, bounds)
         for axes in [()] if option in shared else groups:
-            found.append(TunableParameter(option, entry, axes, low, high))
+            tunable.append(TunableParameter(option, entry, axes, low, high))
     for option, width in _WIDTHS.items():
-        given = [parameter.entry for parameter in found if parameter.option == option]
-        missing = [f"{option}[{i}]" for i in range(width) if i not in given] if given else []
+        entries = [parameter.entry for parameter in tunable if parameter.option == option]
+        missing = [f"{option}[{i}]" for i in range(width) if i not in entries] if entries else []
         if missing:
             raise BadInput(
-                "tune.parameters", f"include {', '.join(missing)}", f"given with {option}[{min(given)}] only"
+                "tune.parameters", f"include {', '.join(missing)}", f"given with {option}[{min(entries)}] only"
             )
-    return found
+    return tunable
 
 
 def options(chosen: Sequence[TunableParameter], point: Point, axes: int) -> dict[str, Array]:
@@ -81,17 +81,17 @@ def options(chosen: Sequence[TunableParameter], point: Point, axes: int) -> dict
         point: shape (k,).
         axes: n.
     """
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for share, parameter in zip(point, chosen, strict=True):
         value = parameter.value(share)
         if not parameter.axes:
-            found[parameter.option] = value
+            values[parameter.option] = value
             continue
         shape = (axes,) if parameter.entry is None else (axes, _WIDTHS[parameter.option])
-        held = found.get(parameter.option, jnp.zeros(shape))
-        place = (np.array(parameter.axes),) if parameter.entry is None else (np.array(parameter.axes), parameter.entry)
-        found[parameter.option] = held.at[place].set(value)
-    return found
+        held = values.get(parameter.option, jnp.zeros(shape))
+        index = (np.array(parameter.axes),) if parameter.entry is None else (np.array(parameter.axes), parameter.entry)
+        values[parameter.option] = held.at[index].set(value)
+    return values
 
 
 def _parsed(name: str) -> tuple[str, int | None]:
@@ -213,5 +213,5 @@ _LAWS = {
 def law_of(kind: str, preset: str | None, law: AbstractController) -> TunableParameters:
     """Tunable parameters of a controller: the known ones, else the parameters that declare a `range`."""
     declared = tuning_ranges(law)
-    own = TunableParameters(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
-    return _LAWS.get((kind, preset), own)
+    declared_only = TunableParameters(lambda dt: declared, {name: attrgetter(name) for name in declared}, {})
+    return _LAWS.get((kind, preset), declared_only)

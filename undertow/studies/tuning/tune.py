@@ -59,9 +59,9 @@ class Tuned(NamedTuple):
     @property
     def kept(self) -> Evaluated:
         """The tuned gains where they are better on held-out runs, or the given ones have no certificate; else these."""
-        given, *_, tuned = self.evaluated
-        better = tuned.held_out_cost < given.held_out_cost
-        return tuned if better or not given.certificate.holds else given
+        initial, *_, tuned = self.evaluated
+        better = tuned.held_out_cost < initial.held_out_cost
+        return tuned if better or not initial.certificate.holds else initial
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -108,21 +108,21 @@ def tune(
         if evaluations < INITIAL_DESIGN:
             raise BadInput("evaluations", f"be at least {INITIAL_DESIGN}, the initial design", evaluations)
         budget = math.inf
-    begun = time.perf_counter() if started is None else started
+    start_time = time.perf_counter() if started is None else started
     say("building")
     task = problem(text)
     counted = {} if evaluations is None else {"evaluations": evaluations}
-    asked = {"method": method, "tune": task.built.scenario.tune.model_dump(), **counted}
-    about = text_hash(dump({**asked, **task.built.resolved}))
-    notes = Checkpoint(checkpoint, about, _FOR_THE_SEARCH * budget, resume, begun)
+    settings = {"method": method, "tune": task.built.scenario.tune.model_dump(), **counted}
+    fingerprint = text_hash(dump({**settings, **task.built.resolved}))
+    notes = Checkpoint(checkpoint, fingerprint, _FOR_THE_SEARCH * budget, resume, start_time)
     evaluation, certifier = _prepared(task, notes, budget, say)
     tried: dict[str, Certificate] = {}
 
     def certify(point: np.ndarray) -> Certificate:
         pairs = zip(task.parameters, point, strict=True)
-        words = ", ".join(f"{parameter.name} = {parameter.value(share):.3g}" for parameter, share in pairs)
-        tried[words] = certifier(evaluation.law(point))
-        return tried[words]
+        gains_text = ", ".join(f"{parameter.name} = {parameter.value(share):.3g}" for parameter, share in pairs)
+        tried[gains_text] = certifier(evaluation.law(point))
+        return tried[gains_text]
 
     objective = Objective(evaluation, certify, notes, watch, evaluations)
     seed, iterations = task.built.scenario.seed, task.built.scenario.tune.iterations
@@ -132,7 +132,8 @@ def tune(
     finished = True
     with contextlib.suppress(OutOfTime):
         objective.costs(points[AT_ONCE:])
-    designed, start = objective.evaluations, objective.best
+    designed = objective.evaluations
+    start = objective.best
     if start is None:
         with within(location=text.location):
             raise no_certificate(certifier(evaluation.law(task.start)), tried, designed)
@@ -145,7 +146,8 @@ def tune(
         else:
             search(objective, np.array(start.point), iterations, seed)
         while evaluations is not None:  # until they are used up
-            at, seed = objective.best or start, (seed + 1) % 2**32
+            at = objective.best or start
+            seed = (seed + 1) % 2**32
             evolve(objective, np.array(at.point), at.cost, iterations, seed)
     except OutOfTime:
         finished = evaluations is not None
@@ -191,7 +193,8 @@ def _prepared(
         BadInput: the budget ends before they are; they go on in their threads until the process ends.
     """
     say("compiling")
-    evaluation, threads = _evaluation(task), runtime.workers(2)
+    evaluation = _evaluation(task)
+    threads = runtime.workers(2)
     program, certifier = threads.submit(evaluation.compile), threads.submit(_certifier, task)
     try:
         notes.wait(program, "compiling", say)
@@ -204,11 +207,11 @@ def _prepared(
         threads.shutdown(wait=False)
 
 
-def _evaluation(task: Problem, others: Sequence[AbstractController] = ()) -> Evaluation:
-    """What evaluates controllers of the kind that is tuned; `others` have further numbers than the tuned ones."""
+def _evaluation(task: Problem, further_examples: Sequence[AbstractController] = ()) -> Evaluation:
+    """What evaluates controllers of the kind that is tuned; `further_examples` have more numbers than these."""
     make = lambda point: task.law(task.options(point))
     ends = [make(np.full(len(task.start), share)) for share in (0.0, 1.0)]
-    examples = [make(task.start), *ends, task.built.closed_loop.controller, *others]
+    examples = [make(task.start), *ends, task.built.closed_loop.controller, *further_examples]
     return Evaluation(task.training_loop, make, examples, (task.train, task.held_out))
 
 
@@ -217,11 +220,11 @@ def _certifier(task: Problem) -> Certifier:
 
 
 def _evaluate(
-    task: Problem, evaluation: Evaluation, certifier: Certifier, others: Mapping[str, Mapping[str, Any]]
+    task: Problem, evaluation: Evaluation, certifier: Certifier, candidates: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Evaluated, ...]:
     """Evaluate the given gains, without rounding, and other choices on both sets of trials."""
-    chosen = {"given": None, **others}
-    laws = [task.built.closed_loop.controller, *(task.law(options) for options in others.values())]
+    chosen = {"given": None, **candidates}
+    laws = [task.built.closed_loop.controller, *(task.law(options) for options in candidates.values())]
     train, held_out = (evaluation.shares(laws, trials) for trials in (task.train, task.held_out))
     costs = [evaluation.total(parts).mean(axis=1) for parts in (train, held_out)]
     row = lambda parts, i: Shares(*(np.asarray(part)[i] for part in parts))  # pyright: ignore[reportArgumentType] - NumPy's means
@@ -233,59 +236,59 @@ def _evaluate(
     )
 
 
-def as_scenario(found: Tuned) -> str:
+def as_scenario(tuned: Tuned) -> str:
     """YAML that `undertow simulate` takes, with the certificate above it."""
-    kept = found.kept
+    gains = tuned.kept
     origin = (
-        "Gains found by" if kept.name == "tuned" else "The given gains, better on held-out runs than those found by"
+        "Gains found by" if gains.name == "tuned" else "The given gains, better on held-out runs than those found by"
     )
-    sets = list(dict.fromkeys(name for name in found.problem.train.variants if name))
-    points = f"{len(kept.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
+    sets = list(dict.fromkeys(name for name in tuned.problem.train.variants if name))
+    points = f"{len(gains.certificate.radii)} operating points" + (f" of {', '.join(sets)}" if sets else "")
     head = (
-        f"# {origin} `undertow tune`, method {found.method}.\n"
-        f"# Certificate: the exactly linearised closed loop has a spectral radius of {kept.certificate.worst:.6f},\n"
+        f"# {origin} `undertow tune`, method {tuned.method}.\n"
+        f"# Certificate: the exactly linearised closed loop has a spectral radius of {gains.certificate.worst:.6f},\n"
         f"# below 1, over one control step; this is the largest at {points}.\n"
-        f"# Cost {kept.train_cost:.6g} on training runs, {kept.held_out_cost:.6g} on held-out runs.\n"
+        f"# Cost {gains.train_cost:.6g} on training runs, {gains.held_out_cost:.6g} on held-out runs.\n"
     )
-    return head + dump(found.scenario)
+    return head + dump(tuned.scenario)
 
 
-def as_data(found: Tuned) -> dict[str, Any]:
+def as_data(tuned: Tuned) -> dict[str, Any]:
     """Contents of tuning.json; parts of the cost per run, in the order of `trials`."""
-    sets = {"train": found.problem.train, "held_out": found.problem.held_out}
+    sets = {"train": tuned.problem.train, "held_out": tuned.problem.held_out}
     return {
-        "method": found.method,
-        "elapsed": found.elapsed,
-        "finished": found.finished,
-        "evaluations": found.evaluations,
-        "rejected": found.rejected,
+        "method": tuned.method,
+        "elapsed": tuned.elapsed,
+        "finished": tuned.finished,
+        "evaluations": tuned.evaluations,
+        "rejected": tuned.rejected,
         "parameters": [
             {"name": parameter.name, "low": parameter.low, "high": parameter.high}
-            for parameter in found.problem.parameters
+            for parameter in tuned.problem.parameters
         ],
         "trials": {
             name: {"variants": list(trials.variants), "sizes": np.asarray(trials.sizes).tolist()}
             for name, trials in sets.items()
         },
-        "gains": {one.name: _entries(one) | {"options": _written(found, one)} for one in found.evaluated},
-        "kept": found.kept.name,
-        "history": [step._asdict() for step in found.steps],
+        "gains": {gains.name: _entries(gains) | {"options": _written(tuned, gains)} for gains in tuned.evaluated},
+        "kept": tuned.kept.name,
+        "history": [step._asdict() for step in tuned.steps],
     }
 
 
-def _written(found: Tuned, one: Evaluated) -> Mapping[str, Any]:
+def _written(tuned: Tuned, evaluated: Evaluated) -> Mapping[str, Any]:
     """The tuned options as a scenario with these gains has them."""
-    if one.options is not None:
-        return one.options
-    controller = found.problem.built.resolved["controller"]
-    return {name: controller.get(name) for name in found.evaluated[-1].options or {}}
+    if evaluated.options is not None:
+        return evaluated.options
+    controller = tuned.problem.built.resolved["controller"]
+    return {name: controller.get(name) for name in tuned.evaluated[-1].options or {}}
 
 
-def _entries(one: Evaluated) -> dict[str, Any]:
+def _entries(evaluated: Evaluated) -> dict[str, Any]:
     return {
-        "train_cost": one.train_cost,
-        "held_out_cost": one.held_out_cost,
-        "spectral_radii": list(one.certificate.radii),
-        "train": {name: np.asarray(part).tolist() for name, part in one.train._asdict().items()},
-        "held_out": {name: np.asarray(part).tolist() for name, part in one.held_out._asdict().items()},
+        "train_cost": evaluated.train_cost,
+        "held_out_cost": evaluated.held_out_cost,
+        "spectral_radii": list(evaluated.certificate.radii),
+        "train": {name: np.asarray(part).tolist() for name, part in evaluated.train._asdict().items()},
+        "held_out": {name: np.asarray(part).tolist() for name, part in evaluated.held_out._asdict().items()},
     }
