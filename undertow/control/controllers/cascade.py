@@ -121,7 +121,7 @@ def ardusub(
     most = _authority(model, conditions, authority)
     level, vertical, tilt, yaw = most[:2] / (_LEAN * _GRAVITY), most[2:3], most[3:5], most[5:]
     loop = 1 + _THROTTLE * 0.5 * vertical
-    joined = lambda *parts: jnp.concatenate([jnp.broadcast_to(jnp.asarray(one, dtype=float), n) for one, n in parts])
+    joined = lambda *parts: jnp.concatenate([jnp.broadcast_to(jnp.asarray(gain, dtype=float), n) for gain, n in parts])
     each = lambda a, b, c, d: joined((a, 2), (b, 1), (c, 2), (d, 1))
     return _cascade(
         model,
@@ -213,16 +213,16 @@ def cascade(model: Model, *, preset: str = "placed", **options: Any) -> Cascade:
 cascade.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here
 
 
-def _authority(model: Model, conditions: DesignConditions, given):
+def _authority(model: Model, conditions: DesignConditions, authority):
     """Acceleration of a demand of 1 in each of the six axes."""
     if len(model.coordinates.axes) != _AXES:
         raise BadInput("preset", "be `placed` for a plant that is not a vehicle with six axes", "that of an autopilot")
-    if given is not None:
-        checks.positive("authority", given, "m/s^2, rad/s^2")
-        checks.per_axis("authority", given, _AXES)
-        return jnp.broadcast_to(jnp.asarray(given, dtype=float), _AXES)
-    found = np.array([axis.authority for axis in axes_of(model, conditions)])
-    return jnp.asarray(found if (found < _UNLIMITED).all() else _BLUEROV2_HEAVY)
+    if authority is not None:
+        checks.positive("authority", authority, "m/s^2, rad/s^2")
+        checks.per_axis("authority", authority, _AXES)
+        return jnp.broadcast_to(jnp.asarray(authority, dtype=float), _AXES)
+    default = np.array([axis.authority for axis in axes_of(model, conditions)])
+    return jnp.asarray(default if (default < _UNLIMITED).all() else _BLUEROV2_HEAVY)
 
 
 def _cascade(

@@ -61,8 +61,8 @@ class PolicyInterface(eqx.Module):
             assert y.body is not None
             parts += [y.body.nu, y.body.attitude]
         bound = jnp.asarray(self.bounds())
-        seen = jnp.clip(jnp.concatenate(parts), -bound, bound)
-        return jnp.concatenate([seen, before])
+        outputs = jnp.clip(jnp.concatenate(parts), -bound, bound)
+        return jnp.concatenate([outputs, before])
 
     def bounds(self) -> np.ndarray:
         """Largest sizes of the observation's entries, without those of the action before."""
@@ -105,9 +105,11 @@ def policy_interface_of(model: Model, action: str, scale: Any = None) -> PolicyI
         BadInput: another word, a scale that is not positive, or a wrench for a plant without body axes.
     """
     checks.choice("action", action, ACTIONS)
-    own, body = model.in_body_axes(), bool(model.in_body_axes().coordinates.axes)
-    actuators, rest, unused = own.actuators.quasi_static(), jnp.zeros(len(model.coordinates.angles)), jnp.zeros(())
-    effect = own.dynamics.gain(model.coordinates.measurement(rest, rest))
+    body_model = model.in_body_axes()
+    body = bool(body_model.coordinates.axes)
+    actuators = body_model.actuators.quasi_static()
+    still, unused = jnp.zeros(len(model.coordinates.angles)), jnp.zeros(())
+    effect = body_model.dynamics.gain(model.coordinates.measurement(still, still))
     each = lambda value: jnp.broadcast_to(value, effect.shape[1:])
     least, most = map(each, actuators.range(actuators.init(), unused))
     if scale is not None:

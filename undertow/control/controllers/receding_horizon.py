@@ -104,16 +104,16 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
         return (slope, (curve + curve.T) / 2), (step, gain)
 
     end = _end(horizon)
-    known = (states, forces, *jax.vmap(linear)(times, states, forces))
-    _, (steps, gains) = jax.lax.scan(backward, (matvec(end, last), end), known, reverse=True)
+    trajectory = (states, forces, *jax.vmap(linear)(times, states, forces))
+    _, (steps, gains) = jax.lax.scan(backward, (matvec(end, last), end), trajectory, reverse=True)
 
     def forward(s, now):
         t, before, force, step, gain = now
         new = jnp.clip(force + step + matvec(gain, s - before), low, high)
         return moved(s, bending(t, s, new)), new
 
-    _, found = jax.lax.scan(forward, start, (times, states, forces, steps, gains))
-    return Improved(found, start, gains[0])
+    _, improved_forces = jax.lax.scan(forward, start, (times, states, forces, steps, gains))
+    return Improved(improved_forces, start, gains[0])
 
 
 def regulator(horizon: Horizon) -> tuple[Float[Array, "n 2 2"], Float[Array, "n 2"]]:
@@ -121,14 +121,14 @@ def regulator(horizon: Horizon) -> tuple[Float[Array, "n 2 2"], Float[Array, "n 
 
     By doubling: Chu, Fan and Lin (2005).
     """
-    h, one = horizon.step, jnp.eye(2)
-    a = one + h * jnp.eye(2, k=1)
+    h, identity = horizon.step, jnp.eye(2)
+    a = identity + h * jnp.eye(2, k=1)
     b = jnp.stack([h**2 / 2, h])
-    cost = h * jnp.stack([horizon.position, horizon.rate], -1)[:, :, None] * one[None, :, :]
+    cost = h * jnp.stack([horizon.position, horizon.rate], -1)[:, :, None] * identity[None, :, :]
 
     def double(_, now):
         a, reach, cost = now
-        within = _inverse(one[None, :, :] + _each(reach, cost))
+        within = _inverse(identity[None, :, :] + _each(reach, cost))
         back = _each(a, within)
         turned = jnp.swapaxes(a, 1, 2)
         return (

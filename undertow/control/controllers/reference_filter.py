@@ -57,7 +57,7 @@ class ReferenceFilter(eqx.Module):
     def smoothed(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
         """The reference with the remainder of its jumps."""
         offset = self._offset(state, r, coordinates)
-        return Target(*(own + left for own, left in zip(r, offset, strict=True)))
+        return Target(*(reference + left for reference, left in zip(r, offset, strict=True)))
 
     def advance(
         self, state: FilterState, r: Target, coordinates: AbstractCoordinates, share, dt, room: Room = UNLIMITED

@@ -46,6 +46,6 @@ class RobustModification(eqx.Module):
 def modification_of(leakage, e_modification, dead_zone) -> RobustModification | None:
     """Modification with these values; None, which costs nothing, where all of them are zero."""
     values = (leakage, e_modification, dead_zone)
-    if not any(checks.assumed(lambda given: (given != 0).any(), value) for value in values):
+    if not any(checks.assumed(lambda number: (number != 0).any(), value) for value in values):
         return None
     return RobustModification(*values)

@@ -101,8 +101,8 @@ class InertiaIdentification(eqx.Module):
         real, _ = self._transfer(state)
         prior = self.plausible**2
         expected = 1.0 if self.expected is None else self.expected
-        found = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
-        return jnp.clip(jnp.where(self.amplitude > 0, found, expected), 1 / _HEAVIEST, _HEAVIEST)
+        shrunk = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
+        return jnp.clip(jnp.where(self.amplitude > 0, shrunk, expected), 1 / _HEAVIEST, _HEAVIEST)
 
     def used(self, state: InertiaState) -> PerAxis:
         """h by which corrections are scaled, from 1."""
@@ -114,8 +114,8 @@ class InertiaIdentification(eqx.Module):
         size = (state.response**2).sum(0) * self.frequency**2 + _NOTHING
         unseen = (self.window / jnp.maximum(state.counted, self.window / _UNKNOWN)) ** 4
         impossible = (real - jnp.clip(real, 1 / _HEAVIEST, _HEAVIEST)) ** 2
-        found = jnp.sqrt(self.window * state.noise / (2 * size) + unseen + impossible)
-        return jnp.where(self.amplitude > 0, jnp.minimum(found, _UNKNOWN), _UNKNOWN)
+        deviation = jnp.sqrt(self.window * state.noise / (2 * size) + unseen + impossible)
+        return jnp.where(self.amplitude > 0, jnp.minimum(deviation, _UNKNOWN), _UNKNOWN)
 
     def motion(self, state: InertiaState) -> tuple[PerAxis, PerAxis, PerAxis]:
         """Displacement (m, rad), rate and acceleration of the target besides those of the reference."""
@@ -146,18 +146,18 @@ class InertiaIdentification(eqx.Module):
         most = self.window * _SUDDEN**2 * usual + (size / 2) ** 2 / self.window
         ended = state.since + span >= self.window
         weight = jnp.where(ended, most / (most + left + _NOTHING**2), 0.0)
-        kept, running = 1 - span / self.horizon, jnp.where(ended, 0.0, 1.0)
+        forgetting, running = 1 - span / self.horizon, jnp.where(ended, 0.0, 1.0)
         return InertiaState(
             angle=jnp.mod(state.angle + self.frequency * dt, 2 * jnp.pi),
-            time=kept * state.time + span * share**2,
-            response=kept * state.response + (share * weight)[None, :] * response,
-            applied=kept * state.applied + (share * weight)[None, :] * applied,
-            counted=kept * state.counted + share**2 * weight * self.window,
+            time=forgetting * state.time + span * share**2,
+            response=forgetting * state.response + (share * weight)[None, :] * response,
+            applied=forgetting * state.applied + (share * weight)[None, :] * applied,
+            counted=forgetting * state.counted + share**2 * weight * self.window,
             since=running * (state.since + span),
             window_response=running * response,
             window_applied=running * applied,
             window_size=running * size,
-            noise=kept * state.noise + share**2 * weight * left,
+            noise=forgetting * state.noise + share**2 * weight * left,
             square=state.square + dt / self.window * (square - state.square),
         )
 
