@@ -133,8 +133,8 @@ class FuzzySystem(eqx.Module):
         degrees = even_memberships if self.evenly_spaced else memberships
         basis = degrees(inputs[:, 0], self.centres[0], self.widths[0])
         for j in range(1, self.inputs):
-            other = degrees(inputs[:, j], self.centres[j], self.widths[j])
-            basis = (basis[:, :, None] * other[:, None, :]).reshape(basis.shape[0], -1)
+            degrees_of_input = degrees(inputs[:, j], self.centres[j], self.widths[j])
+            basis = (basis[:, :, None] * degrees_of_input[:, None, :]).reshape(basis.shape[0], -1)
         return basis
 
     def output(self, weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, " n"]:

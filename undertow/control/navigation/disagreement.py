@@ -36,27 +36,27 @@ class Disagreement(NamedTuple):
         return self._replace(silent=self.silent + elapsed)
 
     def after(
-        self, sensor: int, taken: Bool[Array, ""], known: Bool[Array, ""], square: Number, period: Number
+        self, sensor: int, accepted: Bool[Array, ""], delivered: Bool[Array, ""], square: Number, period: Number
     ) -> "Disagreement":
         """With a reading of a sensor.
 
         Args:
             sensor: its place.
-            taken: whether the filter took it.
-            known: whether there is one.
+            accepted: whether the filter took it.
+            delivered: whether there is one.
             square: normalised square of an entry.
             period: between readings, s.
         """
         tolerance, excess = self.tolerance[sensor], self.excess[sensor]
         step = 2 ** jnp.minimum(period / _DOUBLING, 1.0)
         # What is taken lowers it as slowly: where a wrong reading was believed, the right ones soon are.
-        moved = jnp.where(taken, jnp.maximum(tolerance / step, 1.0), jnp.minimum(tolerance * step, _MOST_TOLERATED))
-        following = jnp.where(known, moved, tolerance)
-        beyond = jnp.where(known, jnp.where(taken, 0.0, jnp.minimum(square, _MOST_TOLERATED)), excess)
+        moved = jnp.where(accepted, jnp.maximum(tolerance / step, 1.0), jnp.minimum(tolerance * step, _MOST_TOLERATED))
+        following = jnp.where(delivered, moved, tolerance)
+        beyond = jnp.where(delivered, jnp.where(accepted, 0.0, jnp.minimum(square, _MOST_TOLERATED)), excess)
         return self._replace(
             tolerance=self.tolerance.at[sensor].set(following),
             excess=self.excess.at[sensor].set(beyond),
-            silent=self.silent.at[sensor].set(jnp.where(known, 0.0, self.silent[sensor])),
+            silent=self.silent.at[sensor].set(jnp.where(delivered, 0.0, self.silent[sensor])),
         )
 
     def reopening(

@@ -102,15 +102,15 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
     slopes, zero = jax.jacfwd(read)(none), jnp.zeros
     of = lambda errors: slopes[:, errors]
     rows = slopes.shape[0]
-    whole = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
+    blocks = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
     if of_errors is not None and state.sensor_errors is not None:
         # Where tilt is known from the accelerometers alone, a late velocity without this would tell it from their bias.
         faster, moved = age * rotation, age**2 / 2 * rotation
-        whole[3] = product(of(slice(3, 6)), faster) + product(of(slice(6, 9)), moved)
+        blocks[3] = product(of(slice(3, 6)), faster) + product(of(slice(6, 9)), moved)
         last = MOTION_STATES + len(state.sensor_errors)
-        whole += [
+        blocks += [
             zero((rows, of_errors.start - MOTION_STATES)),
             of(slice(9, None)),
             zero((rows, last - of_errors.stop)),
         ]
-    return read(none), jnp.concatenate(whole, axis=1)
+    return read(none), jnp.concatenate(blocks, axis=1)

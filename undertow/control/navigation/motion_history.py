@@ -49,18 +49,18 @@ class MotionHistory(NamedTuple):
         now = jnp.zeros(()), jnp.zeros(3), jnp.zeros(3), attitude
         due = age[0] >= spacing
         shifted = [
-            jnp.where(due, jnp.concatenate([jnp.asarray(new)[None], kept[:-1]]), kept)
-            for new, kept in zip(now, old, strict=True)
+            jnp.where(due, jnp.concatenate([jnp.asarray(new)[None], slots[:-1]]), slots)
+            for new, slots in zip(now, old, strict=True)
         ]
         return MotionHistory(*shifted, attitude=attitude)
 
     def at(self, age: Number) -> Past:
         """The motion `age` (s) ago, by cubic interpolation; the oldest kept one before that."""
         newer = jnp.concatenate([jnp.zeros(1), self.age[:-1]])
-        here = ((newer <= age) & (age < self.age))[:, None]
+        enclosing = ((newer <= age) & (age < self.age))[:, None]
         beyond = age >= self.age[-1]
         before = lambda values, now: jnp.concatenate([now[None], values[:-1]])
-        chosen = lambda values: jnp.where(here, values, 0.0).sum(0)
+        chosen = lambda values: jnp.where(enclosing, values, 0.0).sum(0)
         zero = jnp.zeros(3)
         start, end = chosen(newer[:, None])[0], chosen(self.age[:, None])[0]
         length = jnp.where(beyond, 1.0, end - start)
