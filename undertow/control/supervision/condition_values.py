@@ -82,10 +82,10 @@ class ConditionValues(eqx.Module):
             "position_error": what.errors[0],
             "attitude_error": what.errors[1],
         }
-        found = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
+        values = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
         euler = passed.measurement.body is not None and not coordinates.axes
         lost = lambda name: jnp.asarray(signals.get(name, jnp.zeros(1)), dtype=float).sum()
-        found |= {
+        values |= {
             "measurement_not_finite": passed.not_finite,
             "measurement_implausible": passed.implausible,
             "measurement_jump": passed.jump,
@@ -104,21 +104,21 @@ class ConditionValues(eqx.Module):
             "overrun": jnp.where(jnp.isfinite(what.elapsed), what.elapsed, 0.0),
             "clock_fault": jnp.where(what.elapsed <= CLOCK_FAULT, 0.0, 1.0),
         }
-        return jnp.stack([jnp.asarray(found[name], dtype=float) for name in NAMES])
+        return jnp.stack([jnp.asarray(values[name], dtype=float) for name in NAMES])
 
     def limits(self) -> PerCondition:
         """Limits of all conditions: 0 of what is counted, 1 of what is relative to a limit, and a few others."""
         counted = ("measurement_not_finite", "report_lost", "reference_rejected", "output_not_finite", "saturated")
-        found = dict.fromkeys(NAMES, 1.0) | dict.fromkeys(
+        limits = dict.fromkeys(NAMES, 1.0) | dict.fromkeys(
             (*counted, "thruster_lost", "axes_lost", "clock_fault", "place_held"), 0.0
         )
-        found |= {
+        limits |= {
             "restarts_exhausted": float(self.restarts),
             "reference_infeasible": _INFEASIBLE,
             "near_vertical": _NEAR_VERTICAL,
             "overrun": _OVERRUN,
         }
-        return jnp.stack([jnp.asarray(found[name], dtype=float) for name in NAMES])
+        return jnp.stack([jnp.asarray(limits[name], dtype=float) for name in NAMES])
 
     def _estimate_ratio(self, view: View) -> Scalar:
         """Estimated uncertainty relative to the largest plausible one."""

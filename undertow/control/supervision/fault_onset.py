@@ -75,12 +75,13 @@ def wide_covariance(axes: int) -> Float[Array, "n n"]:
 def weighed(effect: Float[Array, "n m"], covariance: Float[Array, "n n"], vector: PerAxis) -> Weighed:
     """A vector and directions, weighed by the inverse of a covariance."""
     inverse = inverse_symmetric(covariance)
-    pulled = matvec(inverse, vector)
+    weighted_vector = matvec(inverse, vector)
     columns = effect.T
-    stretched = (columns[:, None, :] * inverse[None, :, :]).sum(-1)
-    products = (stretched[:, None, :] * columns[None, :, :]).sum(-1)
-    own = (stretched * columns).sum(-1)
-    return Weighed(products, jnp.where(own > 0, own, 1.0), matvec(columns, pulled), (vector * pulled).sum())
+    weighted_columns = (columns[:, None, :] * inverse[None, :, :]).sum(-1)
+    products = (weighted_columns[:, None, :] * columns[None, :, :]).sum(-1)
+    squares = (weighted_columns * columns).sum(-1)
+    size = jnp.where(squares > 0, squares, 1.0)
+    return Weighed(products, size, matvec(columns, weighted_vector), (vector * weighted_vector).sum())
 
 
 def transients(bandwidth, decay, elapsed, onsets: int = ONSETS) -> Float[Array, "k+1 3"]:
@@ -183,8 +184,8 @@ def cleared(state: OnsetState, when: Array) -> OnsetState:
 
 def first_weight(examinations: Float[Array, ""], elapsed, memory) -> Float[Array, ""]:
     """Part of the covariance that the next innovation replaces: a mean at first, then fading memory."""
-    known = examinations - (ONSETS + 2)
-    return jnp.where(known < 0, 0.0, jnp.maximum(elapsed / memory, 1 / (jnp.maximum(known, 0.0) + _FIRST)))
+    innovations = examinations - (ONSETS + 2)
+    return jnp.where(innovations < 0, 0.0, jnp.maximum(elapsed / memory, 1 / (jnp.maximum(innovations, 0.0) + _FIRST)))
 
 
 def _unknown(effect: Float[Array, "n m"], forces: PerActuator) -> Float[Array, "n n"]:

@@ -140,5 +140,5 @@ def largest_estimate(authority: Outputs) -> Outputs:
 
     It is ten times the acceleration that the actuators can give, and 500 where they have no limit.
     """
-    known = jnp.isfinite(authority) & (authority > 0)
-    return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
+    limited = jnp.isfinite(authority) & (authority > 0)
+    return jnp.where(limited, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)

@@ -284,7 +284,7 @@ class ThrusterMonitor(eqx.Module):
             ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest
         )
         awake = past.quiet <= 0
-        found, explained = one_thruster(onsets, missing, used, bounds)
+        suspect, explained = one_thruster(onsets, missing, used, bounds)
         at_once = jnp.sqrt(explained) / self.threshold
         behind = forces[0]
         slow = (residual - past.background) / self.unit
@@ -295,7 +295,7 @@ class ThrusterMonitor(eqx.Module):
         )
         likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
         strained = jnp.where(jnp.abs(behind) > _STRAINED * self.largest, likely_pair, 0.0)
-        suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
+        suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(suspect, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
         both = two_thrusters(wide, behind, used, bounds)
@@ -381,8 +381,8 @@ class ThrusterMonitor(eqx.Module):
         summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)
         in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
         summed = summed * in_use[:, None] * in_use[None, :]
-        own = jnp.eye(len(used))
-        single, pair = (summed * own).max(1), summed * jnp.triu(jnp.ones_like(own), 1)
+        identity = jnp.eye(len(used))
+        single, pair = (summed * identity).max(1), summed * jnp.triu(jnp.ones_like(identity), 1)
         best, best_pair = single.max(), pair.max()
         is_best, is_best_pair = single >= best, (pair >= best_pair) & (best_pair > 0)
         second = jnp.where(is_best, 0.0, single).max()
