@@ -128,8 +128,9 @@ def axes_of(model: Model, conditions: DesignConditions) -> list[Axis]:
         still = as_array(np.zeros(axes))
         lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))
         dead_zone = float(model.actuators.dead_zone())
-    lag, max_bandwidth, reached = None if lag is None else float(lag), float(max_bandwidth), np.asarray(forces)
-    authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
+    lag, max_bandwidth = None if lag is None else float(lag), float(max_bandwidth)
+    largest = np.asarray(forces)
+    authority = np.where(np.isfinite(largest) & (largest > 0) & (largest < _UNLIMITED), largest, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
     common = (float(sampling_time), lag, max_bandwidth, float(delay))
@@ -256,15 +257,15 @@ def _best(axis: Axis, law: Callable[[np.ndarray], LoopTransfer], rates: np.ndarr
     open_loop = held * (from_y.of_position / s**2 + from_y.of_velocity / s)
     order = np.argsort(_cost(axis, frequency, from_y, held, open_loop), kind="stable")
     for start in range(0, len(order), _AT_ONCE):
-        some = order[start : start + _AT_ONCE]
-        allowed = np.ones(len(some), dtype=bool)
+        batch = order[start : start + _AT_ONCE]
+        allowed = np.ones(len(batch), dtype=bool)
         for factor, added, delay, largest in MARGINS:
-            slower = axis.unknown_delay * (UNKNOWN_LAG if added and axis.lag is None else added)
-            late = np.exp(-s * delay * axis.unknown_delay)
-            behind = late / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * slower))
-            allowed &= _keeps(open_loop[some] * behind, largest)
+            unknown_lag = axis.unknown_delay * (UNKNOWN_LAG if added and axis.lag is None else added)
+            unknown_delay = np.exp(-s * delay * axis.unknown_delay)
+            transfer = unknown_delay / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * unknown_lag))
+            allowed &= _keeps(open_loop[batch] * transfer, largest)
         if allowed.any():
-            return int(some[allowed.argmax()])
+            return int(batch[allowed.argmax()])
     return int(rates.argmin())
 
 

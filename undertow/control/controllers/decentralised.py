@@ -45,12 +45,16 @@ class Decentralised(AbstractController):
         return jnp.concatenate([u for u, _ in commands]), signals
 
     def advance(self, z: tuple[PyTree, ...], y: Measurement, r: Target, u_applied: Inputs, dt) -> tuple[PyTree, ...]:
-        each = zip(z, self._each(y, r), split(u_applied, self._inputs()), strict=True)
-        return tuple(law.advance(state, measurement, target, u, dt) for state, (law, measurement, target), u in each)
+        subsystems = zip(z, self._each(y, r), split(u_applied, self._inputs()), strict=True)
+        return tuple(
+            law.advance(state, measurement, target, u, dt) for state, (law, measurement, target), u in subsystems
+        )
 
     def known_acceleration(self, z: tuple[PyTree, ...], y: Measurement, u_applied: Inputs) -> Outputs:
-        each = zip(self.laws, z, self._measured(y), split(u_applied, self._inputs()), strict=True)
-        return jnp.concatenate([law.known_acceleration(state, measurement, u) for law, state, measurement, u in each])
+        subsystems = zip(self.laws, z, self._measured(y), split(u_applied, self._inputs()), strict=True)
+        return jnp.concatenate(
+            [law.known_acceleration(state, measurement, u) for law, state, measurement, u in subsystems]
+        )
 
     def signals(self):
         joined = lambda signal: not signal.dimensions or signal.dimensions[0] in _JOINED

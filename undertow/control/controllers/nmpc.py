@@ -81,9 +81,9 @@ class NMPC(AbstractAccelerationLaw):
         planned = planned + (tracking_error.acceleration - state.acceleration) - (estimate - state.estimate)
         gains = regulator(horizon)[1]
         error, rate, acceleration = tracking_error
-        alone = acceleration + gains[:, 0] * error + gains[:, 1] * rate - estimate
+        fallback = acceleration + gains[:, 0] * error + gains[:, 1] * rate - estimate
         usable = (state.elapsed > 0) & jnp.isfinite(planned).all()
-        return jnp.where(usable, planned, alone), {"estimate": estimate}
+        return jnp.where(usable, planned, fallback), {"estimate": estimate}
 
     def adapt(
         self, state: PlannedState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
@@ -92,12 +92,13 @@ class NMPC(AbstractAccelerationLaw):
         estimate, horizon = self._estimate(state, y), self._horizon(y)
         forces = state.plan.forces
         share = jnp.minimum(state.elapsed / horizon.step, 1.0)
-        moved = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
-        moved = jnp.where(jnp.isfinite(moved).all(), jnp.clip(moved, horizon.low[None, :], horizon.high[None, :]), 0.0)
+        warm_start = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
+        limited = jnp.clip(warm_start, horizon.low[None, :], horizon.high[None, :])
+        warm_start = jnp.where(jnp.isfinite(warm_start).all(), limited, 0.0)
         start = jnp.concatenate([tracking_error.error, tracking_error.rate])
         motion = self._motion(y, tracking_error, estimate)
-        again = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
-        plan, _ = jax.lax.scan(again, state.plan._replace(forces=moved, start=start), None, self.iterations)
+        iterate = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
+        plan, _ = jax.lax.scan(iterate, state.plan._replace(forces=warm_start, start=start), None, self.iterations)
         predicted = self.model.coordinates.velocity(y) + dt * (actuation.known + estimate)
         return PlannedState(plan, tracking_error.acceleration, predicted, estimate, dt)
 

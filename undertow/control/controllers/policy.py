@@ -118,13 +118,13 @@ def _network(path: Path) -> Network:
         BadInput: it cannot be read, or its layers do not fit.
     """
     try:
-        data = io.BytesIO(path.read_bytes())
-        with zipfile.ZipFile(data) as file:
+        buffer = io.BytesIO(path.read_bytes())
+        with zipfile.ZipFile(buffer) as file:
             size = sum(entry.file_size for entry in file.infolist())
         if size > _LARGEST:
             raise ValueError(f"its arrays have {size} bytes, more than the {_LARGEST} that are read")
-        data.seek(0)
-        with np.load(data, allow_pickle=False) as file:
+        buffer.seek(0)
+        with np.load(buffer, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except Exception as error:  # whatever the readers of zip files and of arrays raise
         raise BadInput("function", "be an .npz file of numbers", f"{path.name}: {error}") from None

@@ -110,25 +110,26 @@ def policy_interface_of(model: Model, action: str, scale: Any = None) -> PolicyI
     actuators = body_model.actuators.quasi_static()
     still, unused = jnp.zeros(len(model.coordinates.angles)), jnp.zeros(())
     effect = body_model.dynamics.gain(model.coordinates.measurement(still, still))
-    each = lambda value: jnp.broadcast_to(value, effect.shape[1:])
-    least, most = map(each, actuators.range(actuators.init(), unused))
+    per_actuator = lambda value: jnp.broadcast_to(value, effect.shape[1:])
+    least_force, largest_force = map(per_actuator, actuators.range(actuators.init(), unused))
     if scale is not None:
         checks.positive("scale", scale)
-        low, high = each(-jnp.asarray(scale, dtype=float)), each(jnp.asarray(scale, dtype=float))
+        low, high = per_actuator(-jnp.asarray(scale, dtype=float)), per_actuator(jnp.asarray(scale, dtype=float))
     else:
         unit = lambda force, sign: jnp.where(jnp.isfinite(force), force, sign)  # without a limit
         low, high = (
             actuators.command(actuators.init(), unit(force, sign), unused)
-            for force, sign in ((least, -1.0), (most, 1.0))
+            for force, sign in ((least_force, -1.0), (largest_force, 1.0))
         )
     of_wrench = None
     if action == "wrench":
         if not body:
             raise BadInput("action", "be normalised or input for a plant without body axes", action)
-        if not checks.assumed(lambda low, high: (abs(low) < np.inf).all() & (abs(high) < np.inf).all(), least, most):
+        limited = lambda low, high: (abs(low) < np.inf).all() & (abs(high) < np.inf).all()
+        if not checks.assumed(limited, least_force, largest_force):
             hint = "Give the thruster a supply"
             raise BadInput("action", "be normalised or input for thrusters without limits", action, hint=hint)
         # In units of the largest acceleration that the thrusters give in each axis, which is the largest wrench times
         # the inverse of the mass matrix.
-        of_wrench = jnp.linalg.pinv(effect) * (jnp.abs(effect) @ jnp.minimum(-least, most))[None]
-    return PolicyInterface(model.coordinates, actuators, each(low), each(high), of_wrench, action, body)
+        of_wrench = jnp.linalg.pinv(effect) * (jnp.abs(effect) @ jnp.minimum(-least_force, largest_force))[None]
+    return PolicyInterface(model.coordinates, actuators, per_actuator(low), per_actuator(high), of_wrench, action, body)

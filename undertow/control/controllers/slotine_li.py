@@ -124,8 +124,8 @@ class SlotineLi(AbstractAccelerationLaw):
         _, transposed = jax.vjp(lambda parameters: self._force(parameters, y, tracking_error), state)
         (slope,) = transposed(self._within_reach(y, surface))
         rate = self.adaptation_rate * structure.rates * slope
-        added, taken = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
-        share = jnp.where(added > taken, taken / jnp.where(added > taken, added, 1.0), 1.0)
+        added, dissipated = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
+        share = jnp.where(added > dissipated, dissipated / jnp.where(added > dissipated, added, 1.0), 1.0)
         share = jnp.where(actuation.share < _WHOLE, 0.0, share)
         low, high = structure.nominal - structure.most, structure.nominal + structure.most
         return jnp.clip(state + dt * share * rate, low, high)
@@ -184,9 +184,9 @@ def slotine_li(
     checks.positive("slope", slope)
     gain = slope if gain is None else gain
     if reach is None:
-        most = [axis.authority for axis in axes]
-        steep = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
-        reach = jnp.minimum(_HALF * jnp.asarray(most, dtype=float) / steep, _FAR)
+        authorities = [axis.authority for axis in axes]
+        stiffness = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
+        reach = jnp.minimum(_HALF * jnp.asarray(authorities, dtype=float) / stiffness, _FAR)
     if adaptation_rate is None:
         adaptation_rate = _ADAPTATION * jnp.min(jnp.asarray(slope, dtype=float)) ** 2
     dynamics = model.dynamics

@@ -50,7 +50,7 @@ def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
     m = forces.shape[0]
     use = jnp.full(m + 1, _USE).at[m].set(1.0)
     linear = jnp.zeros(m + 1).at[m].set(1.0)
-    least = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
-    most = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
-    solution = box_minimum(use, factor, linear, least, most)
+    lower = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
+    upper = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
+    solution = box_minimum(use, factor, linear, lower, upper)
     return unit * solution[:m]

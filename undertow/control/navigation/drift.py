@@ -32,13 +32,13 @@ def drift_advice(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, durati
         return ()
     in_unit = lambda output, size: f"{np.degrees(size):.2g} degrees" if output == "yaw" else f"{size:.2g} m"
     sizes = {output: in_unit(output, size) for output, size in drift_of.items()}
-    far = " and ".join(f"{size} ({output})" for output, size in sizes.items())
+    drift_text = " and ".join(f"{size} ({output})" for output, size in sizes.items())
     remedies = " and ".join(f"`{_REMEDIES[output]}`" for output in drift_of)
     unbiased = not any(np.any(np.asarray(sensor.sampling.bias)) for sensor in sensors)
-    alone = " by noise alone, to which the biases of real sensors add" if unbiased else ""
+    noise_only = " by noise alone, to which the biases of real sensors add" if unbiased else ""
     return (
-        f"no sensor measures {', '.join(drift_of)}: the estimate drifts by about {far} in {duration:g} s, one standard "
-        f"deviation{alone}. Add {remedies} to `navigation.sensors`",
+        f"no sensor measures {', '.join(drift_of)}: the estimate drifts by about {drift_text} in {duration:g} s, "
+        f"one standard deviation{noise_only}. Add {remedies} to `navigation.sensors`",
     )
 
 
@@ -64,7 +64,7 @@ def drifts(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: fl
         drift_of["down"] = _of_position(sensors, dvl_blend, error(7, 0.0), 2, duration)
     if "yaw" not in fixed:
         drift_of["yaw"] = _once(error(4, 0.0), duration)
-    return {what: float(drift) for what, drift in drift_of.items() if drift > 0}
+    return {output_name: float(drift) for output_name, drift in drift_of.items() if drift > 0}
 
 
 def _of_position(

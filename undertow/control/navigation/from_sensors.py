@@ -109,7 +109,7 @@ class SensorNavigation(AbstractInformedNavigation):
         """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
         sensors = [sensor for sensor in self.filter.sensors if isinstance(sensor, AbstractVelocitySensor)]
         densities = [sensor.velocity_noise() ** 2 * sensor.sampling.period for sensor in sensors]
-        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
+        density = 1 / sum(1 / jnp.maximum(sensor_density, _NOISELESS) for sensor_density in densities)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
     def init(self, realization, truth: Measurement) -> SensorNavigationState:
@@ -140,9 +140,9 @@ class SensorNavigation(AbstractInformedNavigation):
         faults = state.faults
         if self.faults is not None:
             received, faults = self.faults.received(realization[len(received)], faults, t, received)
-        lost = [delivery.fresh & ~jnp.isfinite(delivery.reading).all() for delivery in received]
+        unusable = [delivery.fresh & ~jnp.isfinite(delivery.reading).all() for delivery in received]
         estimated = self.filter.update(state.filter, t - state.time, received)
-        ignored = state.ignored + sum(jnp.where(is_lost, 1, 0) for is_lost in lost)
+        ignored = state.ignored + sum(jnp.where(flag, 1, 0) for flag in unusable)
         after = SensorNavigationState(t, velocity, states, estimated, ignored, faults, self._errors(estimated, truth))
         return self.filter.measurement(estimated), after
 
@@ -225,10 +225,10 @@ def check_sensors(sensors: Sequence[AbstractSensor]) -> None:
 
 def _chances(keys, numbers, readings) -> list:
     """Standard normal numbers, one per entry of each reading and one more, in one call, which compiles faster."""
-    most = max(reading.size for reading in readings) + 1
-    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
-    together = jax.vmap(normal)(keys, numbers)
-    return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
+    width = max(reading.size for reading in readings) + 1
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (width,), dtype=readings[0].dtype)
+    rows = jax.vmap(normal)(keys, numbers)
+    return [row[: reading.size + 1] for row, reading in zip(rows, readings, strict=True)]
 
 
 def _error_chances(key, numbers, sensors: Sequence[AbstractSensor], dtype) -> list[Array | None]:
@@ -237,5 +237,5 @@ def _error_chances(key, numbers, sensors: Sequence[AbstractSensor], dtype) -> li
     if not any(counts):
         return [None] * len(sensors)
     normal = lambda key, number: jax.random.normal(numbered(key, number), (max(counts),), dtype=dtype)
-    together = jax.vmap(normal)(jax.random.split(key, len(sensors)), numbers)
-    return [row[:count] if count else None for row, count in zip(together, counts, strict=True)]
+    rows = jax.vmap(normal)(jax.random.split(key, len(sensors)), numbers)
+    return [row[:count] if count else None for row, count in zip(rows, counts, strict=True)]

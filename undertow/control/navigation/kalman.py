@@ -295,17 +295,20 @@ class Kalman(AbstractCovarianceFilter):
         error, posterior = jnp.where(readable, error, 0.0), covariance
         correction, square, normalised = jnp.zeros(len(covariance)), jnp.zeros(()), []
         diagonal = np.eye(len(covariance), dtype=bool)
+        # The noise of the entries is independent, so that one scalar update after the other is the update by all of
+        # them, without the inverse of a matrix. Each subtracts the square of a vector: the covariance stays symmetric.
         for k, variance in enumerate(self.variance(sensor, len(reading))):
             shared = product(posterior, slopes[k])
             total = (slopes[k] * shared).sum() + variance
-            left = error[k] - (slopes[k] * correction).sum()
+            residual = error[k] - (slopes[k] * correction).sum()
             gain, share = shared / jnp.sqrt(total), jnp.where(readable[k], 1.0, 0.0)
-            square = square + share * left**2 / total
-            normalised.append(share * left / jnp.sqrt(total))
-            correction = correction + share * left / total * shared
+            square = square + share * residual**2 / total
+            normalised.append(share * residual / jnp.sqrt(total))
+            correction = correction + share * residual / total * shared
             posterior = posterior - share * gain[:, None] * gain[None, :]
-            least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
-            posterior = jnp.where(diagonal, jnp.maximum(posterior, least[:, None]), posterior)
+            # No variance is below what the reading's noise leaves.
+            least_variance = share * (gain**2 / total) * variance
+            posterior = jnp.where(diagonal, jnp.maximum(posterior, least_variance[:, None]), posterior)
         count = jnp.where(readable, 1.0, 0.0).sum()
         delivered = delivery.fresh & (count > 0)
         gate = self.gate**2 * count
@@ -314,9 +317,9 @@ class Kalman(AbstractCovarianceFilter):
         tolerated = delivered & ~accepted & (square <= gate * state.disagreement.tolerance[i])
         disagreement = state.disagreement.after(i, accepted, delivered, square / jnp.maximum(count, 1.0), period)
         # One reading far away says nothing of the others: it counts as at the gate.
-        most = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
-        innovation = jnp.clip(jnp.stack(normalised), -most, most)
-        innovation = jnp.where(jnp.isnan(innovation), most, innovation)
+        largest_innovation = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
+        innovation = jnp.clip(jnp.stack(normalised), -largest_innovation, largest_innovation)
+        innovation = jnp.where(jnp.isnan(innovation), largest_innovation, innovation)
         monitor = state.monitor.updated(i, innovation, count, delivered, period)
         correction = jnp.where(accepted, correction, 0.0)
         turn = quaternion_of_turn(correction[ATTITUDE])

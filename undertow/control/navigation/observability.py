@@ -64,12 +64,12 @@ def deviations(sensed: list[Sensed], initial: np.ndarray, noise: np.ndarray, dur
     step = max(0.02, duration / _STEPS)
     a = step * error_dynamics()
     after = np.eye(_SIZE) + a + a @ a / 2 + a @ a @ a / 6
-    covariance, gained = np.diag(np.asarray(initial) ** 2), step * np.diag(noise)
+    covariance, process_noise = np.diag(np.asarray(initial) ** 2), step * np.diag(noise)
     slopes = np.concatenate([sensor.slopes for sensor in sensed]) if sensed else np.zeros((0, _SIZE))
     # As much information per second as the readings have.
     variance = np.concatenate([sensor.variance * sensor.period / step for sensor in sensed]) if sensed else np.zeros(0)
     for _ in range(round(duration / step)):
-        covariance = after @ covariance @ after.T + gained
+        covariance = after @ covariance @ after.T + process_noise
         shared = covariance @ slopes.T
         covariance = covariance - shared @ np.linalg.solve(slopes @ shared + np.diag(variance), shared.T)
         covariance = (covariance + covariance.T) / 2
@@ -86,11 +86,12 @@ def drift_sentences(sensed: list[Sensed], initial: np.ndarray, noise: np.ndarray
     sized = lambda name: (
         f"{np.degrees(deviation_of[name]):.2g} degrees" if is_angle(name) else f"{deviation_of[name]:.2g} m"
     )
-    far = ", ".join(f"{sized(name)} ({name})" for name in unseen)
+    drift_text = ", ".join(f"{sized(name)} ({name})" for name in unseen)
     remedies = " and ".join(
         f"`{remedy}`" for remedy in dict.fromkeys(_REMEDIES[name] for name in unseen if name in _REMEDIES)
     )
     return (
-        f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest: the estimate drifts by about {far} in "
-        f"{duration:g} s, one standard deviation" + (f". Add {remedies} to `navigation.sensors`" if remedies else ""),
+        f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest: the estimate drifts by "
+        f"about {drift_text} in {duration:g} s, one standard deviation"
+        + (f". Add {remedies} to `navigation.sensors`" if remedies else ""),
     )

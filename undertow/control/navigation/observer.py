@@ -124,14 +124,14 @@ def _inclination(observer: Observer, sensor, estimate: Estimate, reading, age) -
 
 
 def _heading(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
-    now = reading + age * estimate.rates[2]
-    return _turned(estimate, jnp.concatenate([estimate.angles()[:2], now]), observer.compass_blend)
+    heading = reading + age * estimate.rates[2]
+    return _turned(estimate, jnp.concatenate([estimate.angles()[:2], heading]), observer.compass_blend)
 
 
 def _velocity(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
     """Compare the reading with the velocity at its time, from the acceleration since."""
-    then = estimate.velocity - age * estimate.acceleration
-    error = matvec(estimate.rotation(), reading) - then
+    past_velocity = estimate.velocity - age * estimate.acceleration
+    error = matvec(estimate.rotation(), reading) - past_velocity
     return estimate._replace(velocity=estimate.velocity + observer.dvl_blend * error)
 
 
@@ -177,8 +177,8 @@ def _fixed(estimate: Estimate, axes: slice, reading: Float[Array, " k"], age, pe
 
     beta = alpha^2 / (2 - alpha) is that of Benedict and Bordner (1962), optimal for a given noise.
     """
-    then = estimate.position[axes] - age * estimate.velocity[axes]
-    error, beta = jnp.zeros(3).at[axes].set(reading - then), share**2 / (2 - share)
+    past_position = estimate.position[axes] - age * estimate.velocity[axes]
+    error, beta = jnp.zeros(3).at[axes].set(reading - past_position), share**2 / (2 - share)
     return estimate._replace(
         position=estimate.position + share * error, velocity=estimate.velocity + beta / period * error
     )

@@ -54,5 +54,5 @@ def faded(covariance: Covariance, errors: CorrelatedErrors, elapsed: Number) -> 
     """The covariance `elapsed` (s) later, whose last states are these errors."""
     motion = len(covariance) - len(errors.deviation)
     decay = jnp.concatenate([jnp.ones(motion), errors.kept(elapsed)])
-    gained = jnp.concatenate([jnp.zeros(motion), errors.gained(elapsed)])
-    return covariance * decay[:, None] * decay[None, :] + jnp.diag(gained)
+    growth = jnp.concatenate([jnp.zeros(motion), errors.gained(elapsed)])
+    return covariance * decay[:, None] * decay[None, :] + jnp.diag(growth)

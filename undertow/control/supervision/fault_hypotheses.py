@@ -64,10 +64,10 @@ def one_thruster(
     unexplained = of_best(state.total[:, None]) - best
     axes = state.covariance.shape[0]
     freedom = axes * of_best(jnp.arange(1.0, len(state.total) + 1)[:, None]) - 1
-    alone = best > bounds.explained * (unexplained + best - freedom)
+    sufficient = best > bounds.explained * (unexplained + best - freedom)
     noise = _noise(unexplained, freedom)
     best, second = best / noise, second / noise
-    clear = alone & (best > bounds.square) & (best - second > jnp.maximum(bounds.margin, _AHEAD * best))
+    clear = sufficient & (best > bounds.square) & (best - second > jnp.maximum(bounds.margin, _AHEAD * best))
     believable = (share > bounds.least_share) & (share < bounds.most_share) & (force > 1)
     return jnp.where(is_best.any(0) & clear & believable, 1.0, 0.0), best
 
@@ -91,17 +91,17 @@ def two_thrusters(wide: Wide, forces: PerActuator, used: PerActuator, bounds: Fa
     def solved():
         squares = size[:, None] * size[None, :]
         determinant = squares - products * products
-        apart = determinant > _APART * squares  # never so for a thruster and itself
+        separable = determinant > _APART * squares  # never so for a thruster and itself
         # Force of thruster i (row) in the pair of i and j (column).
         force = size[None, :] * along[:, None] - products * along[None, :]
-        force = force / jnp.where(apart, determinant, 1.0)
+        force = force / jnp.where(separable, determinant, 1.0)
         explained = force * along[:, None]
         explained = explained + explained.T
         nominal, missing = jnp.abs(forces)[:, None], -force * jnp.sign(forces)[:, None]
         stopped = (missing > _OFF_LEAST * nominal) & (missing < _OFF_MOST * nominal)
         fits = stopped & (jnp.abs(force) > bounds.force[:, None]) & (used > 0)[:, None]
         once = jnp.triu(jnp.ones_like(explained), 1) > 0  # rounding may differ between (i, j) and (j, i)
-        explained = jnp.where(apart & fits & fits.T & once, explained, 0.0)
+        explained = jnp.where(separable & fits & fits.T & once, explained, 0.0)
         best = explained.max()
         is_best = explained >= best
         second = jnp.where(is_best, 0.0, explained).max()
@@ -125,8 +125,8 @@ def missing_effect(weighed: Weighed, changes: PerActuator) -> Float[Array, "m m"
         changes: what the vector would contain of the nominal forces if they had no effect, N, with its sign reversed.
     """
     single = -2 * changes * weighed.along - changes * changes * weighed.size
-    both = 2 * changes[:, None] * changes[None, :] * weighed.products
-    pair = single[:, None] + single[None, :] - both
+    interaction = 2 * changes[:, None] * changes[None, :] * weighed.products
+    pair = single[:, None] + single[None, :] - interaction
     diagonal = jnp.eye(len(changes))
     return jnp.where(diagonal > 0, single[:, None] * diagonal, pair)
 

@@ -134,7 +134,8 @@ def examine(
     before, unit = past.forces[:, 0], jnp.eye(len(residual))
     innovation = residual - 2 * past.residuals[0] + past.residuals[1]
     change = forces[0] - 2 * before[0] + before[1]
-    now = weighed(effect, past.covariance + _FLOOR * unit + _unknown(effect, error_share * change), innovation)
+    covariance = past.covariance + _FLOOR * unit + _unknown(effect, error_share * change)
+    weighed_innovation = weighed(effect, covariance, innovation)
     # Second difference of the missing force, which is zero at the onset and before.
     bent = jnp.concatenate([remains[1:2], remains[2:] - 2 * remains[1:-1] + remains[:-2]])
     first = (jnp.arange(len(past.total)) == 0)[:, None]
@@ -143,10 +144,10 @@ def examine(
     after = OnsetState(
         residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
         forces=jnp.concatenate([forces[None], past.forces[:-1]]),
-        along=_later(past.along) - added * now.along[None],
-        size=_later(past.size) + added * added * now.size[None],
-        total=_later(past.total) + now.total,
-        covariance=_learned(past.covariance, learned, innovation, now.total),
+        along=_later(past.along) - added * weighed_innovation.along[None],
+        size=_later(past.size) + added * added * weighed_innovation.size[None],
+        total=_later(past.total) + weighed_innovation.total,
+        covariance=_learned(past.covariance, learned, innovation, weighed_innovation.total),
     )
     return after, missing
 
@@ -190,8 +191,8 @@ def first_weight(examinations: Float[Array, ""], elapsed, memory) -> Float[Array
 
 def _unknown(effect: Float[Array, "n m"], forces: PerActuator) -> Float[Array, "n n"]:
     """Covariance of forces of these standard deviations."""
-    each = forces[None, :] * effect
-    return (each[:, None, :] * each[None, :, :]).sum(-1)
+    columns = forces[None, :] * effect
+    return (columns[:, None, :] * columns[None, :, :]).sum(-1)
 
 
 def _learned(covariance: Float[Array, "n n"], part, vector: PerAxis, size) -> Float[Array, "n n"]:

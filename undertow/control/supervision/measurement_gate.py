@@ -124,18 +124,18 @@ class MeasurementGate(eqx.Module):
         unreported = sum((~good).sum(dtype=float) for good in jax.tree.leaves(usable))
         y = y._replace(actuator=reported)
 
-        chosen = MonitoredMotion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
+        motion = MonitoredMotion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
 
         all_good = jnp.stack([entries.all() for entries in good]).all()
         missing = jnp.stack([(~entries).sum(dtype=float) for entries in finite]).sum()
         largest = lambda ratios: jnp.stack([entries.max(initial=0.0) for entries in ratios]).max()
-        measurement = jax.lax.cond(all_good, lambda: y, lambda: with_motion(y, chosen))
+        measurement = jax.lax.cond(all_good, lambda: y, lambda: with_motion(y, motion))
         jump_limits = JumpLimits(self.jump_position, self.jump_angle, self.jump_velocity, self.jump_rate)
-        innovations = self.innovations.after(state.innovations, chosen, expected, jump_limits, believe, state.since)
+        innovations = self.innovations.after(state.innovations, motion, expected, jump_limits, believe, state.since)
         # Actuators of which nobody has ever reported anything but rest are not lost.
         reports = jax.tree.leaves(state.actuator)
         largest_report = jnp.stack([jnp.zeros(()), *(jnp.abs(report).max() for report in reports)]).max()
-        lost = jnp.where(largest_report > 0, jnp.asarray(unreported, dtype=float), 0.0)
+        lost_reports = jnp.where(largest_report > 0, jnp.asarray(unreported, dtype=float), 0.0)
         return Passed(
             measurement=measurement,
             stuck=stuck_state,
@@ -146,7 +146,7 @@ class MeasurementGate(eqx.Module):
             contradiction=self.innovations.contradiction(innovations),
             noise=self.innovations.noise_ratio(innovations),
             missing=stuck.missing,
-            unreported=lost,
+            unreported=lost_reports,
         )
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:

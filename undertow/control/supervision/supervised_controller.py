@@ -213,14 +213,14 @@ class Supervised(AbstractController):
         holds = ~(values <= limits)  # NaN is beyond every limit
         conditions = held_for(z.conditions, holds, elapsed, self._tolerated(z))
 
-        wrong = NUMBER["estimator_diverged"]
-        at_once = (jnp.arange(len(NAMES)) == wrong) & broken & view.controls
+        divergence = NUMBER["estimator_diverged"]
+        at_once = (jnp.arange(len(NAMES)) == divergence) & broken & view.controls
         conditions = conditions._replace(level=jnp.where(at_once, jnp.maximum(conditions.level, 1.0), conditions.level))
         condition_state, reason = judged(conditions.level)
         state, reason = self._next(z, view, condition_state, reason)
         begins = _controls(state) & ~view.controls
         diverged = view.controls & (
-            broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
+            broken | (holds[divergence] & (conditions.held[divergence] >= CONDITIONS[divergence].degraded_after))
         )
         by_fallback = self._by_whom(z, conditions)
         switches = by_fallback != (z.fallback_controls > 0)
@@ -236,7 +236,7 @@ class Supervised(AbstractController):
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, _with_restart(z.restarts, z.time), z.restarts)
         # What has begun again gets its time before it is judged.
-        judged_anew = jnp.arange(len(NAMES)) == wrong
+        judged_anew = jnp.arange(len(NAMES)) == divergence
         conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
         time, changed = z.time + elapsed, (state != z.state) | (reason != z.reason)
         # A condition may be named after it has held: its value is the last one beyond the limit.
@@ -322,16 +322,16 @@ class Supervised(AbstractController):
             command, signals = by_law()
         else:
             command, signals = jax.lax.cond((z.fallback_controls > 0), lambda: self._by_fallback(z, y, r), by_law)
-        most = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
-        within = jnp.clip(command, self.watch.low, self.watch.high)
-        towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
+        largest_change = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
+        limited = jnp.clip(command, self.watch.low, self.watch.high)
+        slewed = lambda goal: jnp.clip(goal, z.output - largest_change, z.output + largest_change)
         # The difference at a transfer ends by itself. Were the output led to that of the law instead, the law's loop
         # would have a slower actuator until then, and might never settle.
-        beyond = jnp.where(z.transfer > 0, z.output - within, z.beyond)
-        beyond = jnp.where(jnp.isfinite(beyond), beyond - jnp.clip(beyond, -most, most), 0.0)
-        output = jnp.where(beyond == 0, within, within + beyond)
+        beyond = jnp.where(z.transfer > 0, z.output - limited, z.beyond)
+        beyond = jnp.where(jnp.isfinite(beyond), beyond - jnp.clip(beyond, -largest_change, largest_change), 0.0)
+        output = jnp.where(beyond == 0, limited, limited + beyond)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
-        safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
+        safe = jnp.where(z.reason == code_of(OPERATOR), slewed(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
         # Whatever the memory holds.
@@ -354,12 +354,12 @@ class Supervised(AbstractController):
         """The reference, or the last valid one at rest; and the number of entries that cannot be used."""
         lengths = ~jnp.asarray(np.array(self.model.coordinates.angles))
         speed = jnp.where(lengths, self.gate.max_speed, self.gate.max_rate)
-        far = jnp.abs(r.position) > jnp.where(lengths, self.gate.max_distance, _TURNS)
-        far = far | (jnp.abs(r.velocity) > speed)
-        far = far | (jnp.abs(r.acceleration) > speed / _SUDDEN)
-        wrong = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + far.sum(dtype=float)
+        implausible = jnp.abs(r.position) > jnp.where(lengths, self.gate.max_distance, _TURNS)
+        implausible = implausible | (jnp.abs(r.velocity) > speed)
+        implausible = implausible | (jnp.abs(r.acceleration) > speed / _SUDDEN)
+        unusable = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + implausible.sum(dtype=float)
         held = (before.position, jnp.zeros_like(before.velocity), jnp.zeros_like(before.acceleration))
-        return Target(*(jnp.where(wrong > 0, valid, new) for valid, new in zip(held, r, strict=True))), wrong
+        return Target(*(jnp.where(unusable > 0, valid, new) for valid, new in zip(held, r, strict=True))), unusable
 
     def _advanced(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> tuple[PyTree, PyTree]:
         """States of law and fallback one step later; only the one that controls advances."""
@@ -403,10 +403,10 @@ class Supervised(AbstractController):
 
     def _variation(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> Scalar:
         """Average variation of the input, ranges from limit to limit per second."""
-        now = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
+        variation = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
         settled = (z.transfer == 0) & (view.beyond == 0).all()
-        return jnp.where(view.controls & settled, z.variation + share * (now - z.variation), 0.0)
+        return jnp.where(view.controls & settled, z.variation + share * (variation - z.variation), 0.0)
 
     def _jumped(self, conditions: Conditions) -> Bool[Array, ""]:
         """Whether readings that have jumped ask for SAFE, and a place has to be held for that."""
@@ -450,9 +450,9 @@ class Supervised(AbstractController):
         acceleration = modelled
         if "estimate" in view.signals:
             # One that has diverged would make a jump of every reading.
-            most = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
-            most = jnp.minimum(most, self.watch.max_estimate)
-            acceleration = modelled + jnp.clip(view.signals["estimate"], -most, most)
+            largest = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
+            largest = jnp.minimum(largest, self.watch.max_estimate)
+            acceleration = modelled + jnp.clip(view.signals["estimate"], -largest, largest)
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 
 

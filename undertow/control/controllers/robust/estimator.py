@@ -92,9 +92,9 @@ class Estimator(eqx.Module):
             dt: sampling time, s.
         """
         of_rates, of_estimate = self.gains(dt)
-        moved = of_estimate * (observed.error + tracking)
-        weights = state.weights - (moved / (observed.basis**2).sum(-1))[:, None] * observed.basis
-        leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, moved.shape) * dt)[:, None]
+        correction = of_estimate * (observed.error + tracking)
+        weights = state.weights - (correction / (observed.basis**2).sum(-1))[:, None] * observed.basis
+        leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, correction.shape) * dt)[:, None]
         weights = weights - leaked * _unseen(weights, observed.basis)
         rates = state.rates + dt * (modelled + observed.uncertainty) - of_rates * observed.error
         return EstimatorState(rates, self._in_box(weights))
@@ -113,10 +113,10 @@ class Estimator(eqx.Module):
 
 def _unseen(weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, "n rules"]:
     """The part of the weights that is orthogonal to the basis and to (1, ..., 1)."""
-    apart, lean = (rows - rows.mean(-1, keepdims=True) for rows in (weights, basis))
-    size = (lean**2).sum(-1, keepdims=True)
-    along = (apart * lean).sum(-1, keepdims=True) / jnp.where(size > _EVEN, size, 1.0)
-    return apart - along * lean
+    centred, direction = (rows - rows.mean(-1, keepdims=True) for rows in (weights, basis))
+    size = (direction**2).sum(-1, keepdims=True)
+    along = (centred * direction).sum(-1, keepdims=True) / jnp.where(size > _EVEN, size, 1.0)
+    return centred - along * direction
 
 
 def _cosine_of_root(x: Float[Array, "..."]) -> Float[Array, "..."]:

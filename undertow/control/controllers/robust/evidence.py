@@ -46,17 +46,17 @@ def gathered(past: Evidence, alone: PerAxis, explained: PerAxis, span, judging_t
         span: of the step, s; 0 for a step that does not count.
         judging_time: over which evidence is forgotten, s.
     """
-    remains = 1 - span / judging_time
-    new = Evidence(jnp.ones(()), alone**2, alone * explained, explained**2)
-    return Evidence(*(remains * previous + span * added for previous, added in zip(past, new, strict=True)))
+    forgetting = 1 - span / judging_time
+    added = Evidence(jnp.ones(()), alone**2, alone * explained, explained**2)
+    return Evidence(*(forgetting * old + span * new for old, new in zip(past, added, strict=True)))
 
 
 def best_share(evidence: Evidence) -> tuple[PerAxis, PerAxis]:
     """The share of the memory that leaves the least modelling error, and twice its standard error."""
     judged = evidence.explained > _NOTHING
     size = jnp.where(judged, evidence.explained, 1.0)
-    left = evidence.alone * evidence.explained - evidence.shared**2
-    spread = 2 * safe_sqrt(left) * jnp.sqrt(_CORRELATED / jnp.maximum(evidence.time, _CORRELATED)) / size
+    residual = evidence.alone * evidence.explained - evidence.shared**2
+    spread = 2 * safe_sqrt(residual) * jnp.sqrt(_CORRELATED / jnp.maximum(evidence.time, _CORRELATED)) / size
     return jnp.where(judged, evidence.shared / size, 1.0), jnp.where(judged, spread, 1.0)
 
 

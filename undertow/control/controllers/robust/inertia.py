@@ -140,12 +140,12 @@ class InertiaIdentification(eqx.Module):
         # At the end of a window, its weight in what is found.
         real, imaginary = self._transfer(state)
         motion = self.frequency[None, :] * _turned(response)
-        left = ((applied - real[None, :] * motion - imaginary[None, :] * _turned(motion)) ** 2).sum(0) / self.window
+        residual = ((applied - real[None, :] * motion - imaginary[None, :] * _turned(motion)) ** 2).sum(0) / self.window
         size = state.window_size + span * self._size(state)
         usual = state.noise / jnp.maximum(state.counted, _NOTHING)
-        most = self.window * _SUDDEN**2 * usual + (size / 2) ** 2 / self.window
+        plausible_residual = self.window * _SUDDEN**2 * usual + (size / 2) ** 2 / self.window
         ended = state.since + span >= self.window
-        weight = jnp.where(ended, most / (most + left + _NOTHING**2), 0.0)
+        weight = jnp.where(ended, plausible_residual / (plausible_residual + residual + _NOTHING**2), 0.0)
         forgetting, running = 1 - span / self.horizon, jnp.where(ended, 0.0, 1.0)
         return InertiaState(
             angle=jnp.mod(state.angle + self.frequency * dt, 2 * jnp.pi),
@@ -157,7 +157,7 @@ class InertiaIdentification(eqx.Module):
             window_response=running * response,
             window_applied=running * applied,
             window_size=running * size,
-            noise=forgetting * state.noise + share**2 * weight * left,
+            noise=forgetting * state.noise + share**2 * weight * residual,
             square=state.square + dt / self.window * (square - state.square),
         )
 

@@ -146,7 +146,7 @@ class RobustRCAF(AbstractController):
         # While limits bind, the reference waits, and the tracking error is not caused by d.
         applied = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
         share = attained(effect, plan.forces, applied)
-        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
+        tracking_term = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
         modelled = self._known(plan.actuators, y, u_applied)
         remembered, lost = None, None
         if self.memory is not None and z.memory is not None and plan.recalled is not None:
@@ -162,7 +162,7 @@ class RobustRCAF(AbstractController):
             # What differs from the desired acceleration acts on the inertia that was learnt.
             expected = modelled + plan.seen.uncertainty
             modelled = modelled + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
-        estimator = self.estimator.advance(z.estimator, plan.seen, modelled, learnt, dt)
+        estimator = self.estimator.advance(z.estimator, plan.seen, modelled, tracking_term, dt)
         if lost is not None:
             estimator = self.estimator.lowered(estimator, lost)
         return RobustState(
