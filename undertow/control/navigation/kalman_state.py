@@ -72,8 +72,8 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
         of_errors: states of the correlated errors of this sensor; None where those of no sensor are states.
     """
     past = state.history.at(age)
-    turn = quaternion_product(conjugate(state.history.attitude), past.attitude)
-    past_attitude = quaternion_product(state.attitude, turn)
+    turn_back = quaternion_product(conjugate(state.history.attitude), past.attitude)
+    past_attitude = quaternion_product(state.attitude, turn_back)
     rotation, fallen = rotation_from_quaternion(past_attitude), age * gravity()
     estimated = jnp.zeros(0)
     if of_errors is not None and state.sensor_errors is not None:
