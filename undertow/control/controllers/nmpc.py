@@ -75,8 +75,8 @@ class NMPC(AbstractAccelerationLaw):
         dynamics, estimate, horizon = self.model.dynamics, self._estimate(state, y), self._horizon(y)
         error_state = jnp.concatenate([tracking_error.error, tracking_error.rate])
         force = state.plan.forces[0] + matvec(state.plan.gain, error_state - state.plan.start)
-        force = jnp.clip(force, horizon.low, horizon.high)
-        planned = self._compensated(y, tracking_error) + matvec(dynamics.gain(y), force)
+        compensated, effect = self._compensated(y, tracking_error), dynamics.gain(y)
+        planned = compensated + matvec(effect, jnp.clip(force, horizon.low, horizon.high))
         # What has become known since the plan enters at once.
         planned = planned + (tracking_error.acceleration - state.acceleration) - (estimate - state.estimate)
         gains = regulator(horizon)[1]
@@ -93,8 +93,8 @@ class NMPC(AbstractAccelerationLaw):
         forces = state.plan.forces
         share = jnp.minimum(state.elapsed / horizon.step, 1.0)
         warm_start = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
-        limited = jnp.clip(warm_start, horizon.low[None, :], horizon.high[None, :])
-        warm_start = jnp.where(jnp.isfinite(warm_start).all(), limited, 0.0)
+        usable = jnp.isfinite(warm_start).all()
+        warm_start = jnp.where(usable, jnp.clip(warm_start, horizon.low[None, :], horizon.high[None, :]), 0.0)
         start = jnp.concatenate([tracking_error.error, tracking_error.rate])
         motion = self._motion(y, tracking_error, estimate)
         iterate = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)

@@ -127,8 +127,8 @@ class SlotineLi(AbstractAccelerationLaw):
         added, dissipated = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
         share = jnp.where(added > dissipated, dissipated / jnp.where(added > dissipated, added, 1.0), 1.0)
         share = jnp.where(actuation.share < _WHOLE, 0.0, share)
-        low, high = structure.nominal - structure.most, structure.nominal + structure.most
-        return jnp.clip(state + dt * share * rate, low, high)
+        adapted = state + dt * share * rate
+        return jnp.clip(adapted, structure.nominal - structure.most, structure.nominal + structure.most)
 
     def signals(self):
         surface = Signal(("axis",), "[axis]/s", "distance s from the surface")
