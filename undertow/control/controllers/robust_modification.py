@@ -39,8 +39,8 @@ class RobustModification(eqx.Module):
             weights: theta, m/s^2 and rad/s^2.
         """
         size = jnp.abs(error)
-        learnt = jnp.where((size < self.dead_zone)[:, None], 0.0, rate)
-        return learnt - (adaptation * (self.leakage + self.e_modification * size))[:, None] * weights
+        adaptive_rate = jnp.where((size < self.dead_zone)[:, None], 0.0, rate)
+        return adaptive_rate - (adaptation * (self.leakage + self.e_modification * size))[:, None] * weights
 
 
 def modification_of(leakage, e_modification, dead_zone) -> RobustModification | None:

@@ -80,16 +80,16 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
         estimated = state.sensor_errors[of_errors.start - MOTION_STATES : of_errors.stop - MOTION_STATES]
 
     def read(errors):
-        turn, faster, moved = errors[:3], errors[3:6], errors[6:9]
-        velocity = state.velocity + faster + cross(turn, state.velocity)
-        turned = rotation + product(skew(turn), rotation)
+        attitude_error, velocity_error, position_error = errors[:3], errors[3:6], errors[6:9]
+        velocity = state.velocity + velocity_error + cross(attitude_error, state.velocity)
+        turned = rotation + product(skew(attitude_error), rotation)
         # What accelerated the body since then is turned with it, gravity is not.
-        displaced = past.displacement + cross(turn, past.displacement - age / 2 * fallen)
+        displaced = past.displacement + cross(attitude_error, past.displacement - age / 2 * fallen)
         motion = Motion(
-            position=state.position + moved + displaced - age * velocity,
+            position=state.position + position_error + displaced - age * velocity,
             angles=euler_from_rotation(turned),
             rotation=turned,
-            velocity=velocity + past.velocity + cross(turn, past.velocity + fallen),
+            velocity=velocity + past.velocity + cross(attitude_error, past.velocity + fallen),
             rates=state.rates - state.gyro_bias,
             specific_force=state.force - state.force_bias,
             actuator=state.actuator,
@@ -106,8 +106,8 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
     blocks = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
     if of_errors is not None and state.sensor_errors is not None:
         # Where tilt is known from the accelerometers alone, a late velocity without this would tell it from their bias.
-        faster, moved = age * rotation, age**2 / 2 * rotation
-        blocks[3] = product(of(slice(3, 6)), faster) + product(of(slice(6, 9)), moved)
+        velocity_slope, position_slope = age * rotation, age**2 / 2 * rotation
+        blocks[3] = product(of(slice(3, 6)), velocity_slope) + product(of(slice(6, 9)), position_slope)
         last = MOTION_STATES + len(state.sensor_errors)
         blocks += [
             zero((rows, of_errors.start - MOTION_STATES)),

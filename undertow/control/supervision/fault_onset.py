@@ -102,8 +102,8 @@ def transients(bandwidth, decay, elapsed, onsets: int = ONSETS) -> Float[Array, 
     slow = jnp.exp(-bandwidth * t)
     rate = 1 / decay
     rate = jnp.where(jnp.abs(bandwidth - rate) < 0.01 * bandwidth, 0.99 * bandwidth, rate)  # the limit of equal ones
-    apart = bandwidth - rate
-    stopped = (bandwidth / apart) ** 2 * (jnp.exp(-rate * t) - slow * (1 + apart * t))
+    difference = bandwidth - rate
+    stopped = (bandwidth / difference) ** 2 * (jnp.exp(-rate * t) - slow * (1 + difference * t))
     return jnp.stack([slow, slow * bandwidth * t, stopped], axis=1)
 
 

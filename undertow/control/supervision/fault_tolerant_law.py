@@ -102,8 +102,8 @@ class FaultTolerantController(AbstractController):
     def _lost_axes(self, used: PerActuator, y: Measurement) -> Float[Array, " n"]:
         gain, everything = self.body_model.dynamics.gain(y), jnp.ones_like(used)
         share = lambda used: attained_share(gain, used, self.priority)
-        lost = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
-        return jax.lax.cond((used < 1).any(), lost, lambda: jnp.zeros_like(self.priority))
+        lost_axes = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
+        return jax.lax.cond((used < 1).any(), lost_axes, lambda: jnp.zeros_like(self.priority))
 
 
 @double_outside_runs

@@ -105,8 +105,8 @@ class MeasurementGate(eqx.Module):
         stuck_state = self.stuck.after(state.stuck, y, state.rates, state.since)
         stuck = self.stuck.found(stuck_state)
         held = MonitoredMotion(*(part > 0 for part in _of_motion(read, stuck.position, stuck.velocity)))
-        where_valid = lambda ratios, which: MonitoredMotion(
-            *(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True))
+        where_valid = lambda ratios, valid: MonitoredMotion(
+            *(jnp.where(w, r, 0.0) for w, r in zip(valid, ratios, strict=True))
         )
         sizes = where_valid(of_size, finite)
         # What is stuck departs from its prediction, of course.
@@ -156,13 +156,13 @@ class MeasurementGate(eqx.Module):
         are too long for the drag of a fast vehicle, would grow until it is no number.
         """
         y = passed.measurement
-        now, expected = motion_of(y), predicted(y, rate, dt)
+        motion, expected = motion_of(y), predicted(y, rate, dt)
         speed = _each(expected.velocity, self.max_speed, self.max_rate)
         expected = expected._replace(
             position=jnp.clip(expected.position, -self.max_distance, self.max_distance),
             velocity=jnp.clip(expected.velocity, -speed, speed),
         )
-        expected = MonitoredMotion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, now, strict=True)))
+        expected = MonitoredMotion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, motion, strict=True)))
         return GateState(expected, y.velocity, passed.stuck, passed.innovations, jnp.asarray(dt), y.actuator)
 
     def _sizes(self, read: MonitoredMotion) -> MonitoredMotion:

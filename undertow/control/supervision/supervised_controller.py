@@ -229,7 +229,7 @@ class Supervised(AbstractController):
         damaged = ~all_finite(without_laws) | jax.lax.cond(
             broken, lambda: ~all_finite((z.law, z.fallback)), lambda: jnp.asarray(False)
         )
-        again = begins | diverged | switches | damaged
+        begins_again = begins | diverged | switches | damaged
         place = released(z.place, is_another(z.reference, view.given, self.model.coordinates, elapsed))
         jumps, safe = self._jumped(conditions), state == int(State.SAFE)
         place = after_jump(place, ~_controls(state), safe, jumps, begins, view.passed.measurement, view.given)
@@ -237,12 +237,12 @@ class Supervised(AbstractController):
         times = jnp.where(counted, _with_restart(z.restarts, z.time), z.restarts)
         # What has begun again gets its time before it is judged.
         judged_anew = jnp.arange(len(NAMES)) == divergence
-        conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
+        conditions = conditions._replace(held=jnp.where(judged_anew & begins_again, 0.0, conditions.held))
         time, changed = z.time + elapsed, (state != z.state) | (reason != z.reason)
         # A condition may be named after it has held: its value is the last one beyond the limit.
         exceeding = jnp.where(holds, jnp.where(jnp.isfinite(values), values, _BIG), z.exceeding)
         cause = jnp.where(changed, _cause(exceeding, limits, reason), z.cause)
-        law, fallback = self._continued(z, view._replace(r=place.pursued), laws, again, broken)
+        law, fallback = self._continued(z, view._replace(r=place.pursued), laws, begins_again, broken)
         after = SupervisedState(
             law=(),
             fallback=(),
@@ -259,7 +259,7 @@ class Supervised(AbstractController):
             time=time,
             safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
             output=u,
-            transfer=again.astype(int),
+            transfer=begins_again.astype(int),
             beyond=jnp.where(view.controls, view.beyond, 0.0),
             variation=variation,
             swings=swings,
@@ -370,7 +370,7 @@ class Supervised(AbstractController):
         by_fallback = lambda: (z.law, fallback.advance(z.fallback, y, r, u, step))
         return jax.lax.cond((z.fallback_controls > 0), by_fallback, by_law)
 
-    def _continued(self, z: SupervisedState, view: View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
+    def _continued(self, z: SupervisedState, view: View, laws: tuple, begins_again, broken) -> tuple[PyTree, PyTree]:
         """States of law and fallback: begun again from the present measurement, advanced, or held."""
         y, r = view.passed.measurement, view.r
 
@@ -380,8 +380,8 @@ class Supervised(AbstractController):
             return self.law.restarted(self._knowledge(z), y, r), self.fallback.restarted(self._knowledge(z), y, r)
 
         held = lambda: (z.law, z.fallback)
-        goes_on = view.controls & ~broken & ~again
-        return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(again, begun, held))
+        goes_on = view.controls & ~broken & ~begins_again
+        return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(begins_again, begun, held))
 
     def _knowledge(self, z: SupervisedState) -> PyTree:
         """What law and fallback know and must not lose: of the one that controls, where both know the same things."""

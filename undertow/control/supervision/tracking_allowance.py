@@ -70,4 +70,4 @@ class TrackingAllowance(eqx.Module):
 def _sizes(coordinates: AbstractCoordinates, difference: Array) -> tuple[Scalar, Scalar]:
     """Lengths of the parts of a difference that are lengths and angles."""
     turns = np.array(coordinates.angles)
-    return tuple(length(difference * jnp.asarray(which, dtype=float)) for which in (~turns, turns))  # pyright: ignore[reportReturnType] - two of them
+    return tuple(length(difference * jnp.asarray(mask, dtype=float)) for mask in (~turns, turns))  # pyright: ignore[reportReturnType] - two of them

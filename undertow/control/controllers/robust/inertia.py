@@ -93,8 +93,8 @@ class InertiaIdentification(eqx.Module):
 
     def init(self, axes: int) -> InertiaState:
         """State before the first step."""
-        axis, phasor, now = jnp.zeros(axes), jnp.zeros((2, axes)), jnp.zeros(())
-        return InertiaState(axis, axis, axis, phasor, phasor, now, phasor, phasor, axis, axis, axis)
+        axis, phasor, zero = jnp.zeros(axes), jnp.zeros((2, axes)), jnp.zeros(())
+        return InertiaState(axis, axis, axis, phasor, phasor, zero, phasor, phasor, axis, axis, axis)
 
     def ratio(self, state: InertiaState) -> PerAxis:
         """h, shrunk towards what is expected by its standard error."""
