@@ -82,18 +82,23 @@ class AbstractAccelerationLaw(AbstractController):
         """State of the law itself before the first measurement is used."""
 
     @abc.abstractmethod
-    def demand(self, own: PyTree, y: Measurement, off: TrackingError) -> tuple[PerAxis, dict[str, Array]]:
+    def demand(self, state: PyTree, y: Measurement, tracking_error: TrackingError) -> tuple[PerAxis, dict[str, Array]]:
         """Acceleration, m/s^2 and rad/s^2, and the values of the law's signals.
 
         Args:
-            own: state of the law.
+            state: of the law.
             y: measurement.
-            off: errors from the target after the filter of jumps, and its acceleration.
+            tracking_error: errors from the target after the filter of jumps, and its acceleration.
         """
 
     @abc.abstractmethod
     def adapt(
-        self, own: PyTree, y: Measurement, off: TrackingError, given: ActuationResult, dt: Float[Array, ""]
+        self,
+        state: PyTree,
+        y: Measurement,
+        tracking_error: TrackingError,
+        actuation: ActuationResult,
+        dt: Float[Array, ""],
     ) -> PyTree:
         """State of the law one sampling time later."""
 
@@ -109,22 +114,23 @@ class AbstractAccelerationLaw(AbstractController):
 
     def advance(self, z: ActuatedState, y: Measurement, r: Target, u_applied, dt) -> ActuatedState:
         path, plan, actuators, effect = self.actuation, self._plan(z, y, r), self._actuators(), self._effect(y)
-        heading = lambda u: actuators.target_of(plan.actuators, u, path.actuator_rate)
-        asked, going = heading(actuators.command(plan.actuators, plan.forces, path.actuator_rate)), heading(u_applied)
-        share = attained(effect, asked, going)
-        known = self._drift(y) + matvec(effect, actuators.force(plan.actuators, u_applied))
-        missing = matvec(effect, going - asked + plan.forces) - plan.desired
+        forces_of = lambda u: actuators.target_of(plan.actuators, u, path.actuator_rate)
+        intended = forces_of(actuators.command(plan.actuators, plan.forces, path.actuator_rate))
+        actual = forces_of(u_applied)
+        share = attained(effect, intended, actual)
+        modelled = self._drift(y) + matvec(effect, actuators.force(plan.actuators, u_applied))
+        missing = matvec(effect, actual - intended + plan.forces) - plan.desired
         coordinates = self.model.coordinates
         return ActuatedState(
-            law=self.adapt(z.law, y, plan.off, ActuationResult(known, missing, share), dt),
+            law=self.adapt(z.law, y, plan.off, ActuationResult(modelled, missing, share), dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=None if path.filter is None else path.filter.advance(z.filter, r, coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
 
     def known_acceleration(self, z: ActuatedState, y: Measurement, u_applied) -> PerAxis:
         actuators = self._actuators()
-        given = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
-        return self._drift(y) + matvec(self._effect(y), given)
+        forces = actuators.force(actuators.update_from_report(z.actuators, y.actuator), u_applied)
+        return self._drift(y) + matvec(self._effect(y), forces)
 
     def _actuators(self) -> AbstractActuatorModel:
         actuators = self.model.actuators
@@ -140,20 +146,20 @@ class AbstractAccelerationLaw(AbstractController):
     def _drift(self, y: Measurement) -> PerAxis:
         return self.model.dynamics.drift(y) if self.actuation.feedforward else jnp.zeros_like(y.position)
 
-    def _compensated(self, y: Measurement, off: TrackingError) -> PerAxis:
+    def _compensated(self, y: Measurement, tracking_error: TrackingError) -> PerAxis:
         if not self.actuation.feedforward:
             return jnp.zeros_like(y.position)
-        return self.model.drift_at_target_velocity(y, off.rate)
+        return self.model.drift_at_target_velocity(y, tracking_error.rate)
 
     def _plan(self, z: ActuatedState, y: Measurement, r: Target) -> ActuationDecisions:
         dynamics, coordinates, _ = self.model
         smoothing = self.actuation.filter
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        off = coordinates.tracking_error(y, target)
-        acceleration, signals = self.demand(z.law, y, off)
-        desired = acceleration - self._compensated(y, off)
+        tracking_error = coordinates.tracking_error(y, target)
+        acceleration, signals = self.demand(z.law, y, tracking_error)
+        desired = acceleration - self._compensated(y, tracking_error)
         estimated = self._actuators().update_from_report(z.actuators, y.actuator)
-        return ActuationDecisions(estimated, off, desired, dynamics.invert(y, desired), signals)
+        return ActuationDecisions(estimated, tracking_error, desired, dynamics.invert(y, desired), signals)
 
 
 def actuation_for(sampling_time: float, frequency, options: ActuationOptions = ActuationOptions()) -> Actuation:

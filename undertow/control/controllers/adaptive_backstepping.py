@@ -77,29 +77,29 @@ class AdaptiveBackstepping(AbstractAccelerationLaw):
         still = jnp.zeros_like(y.position)
         return BacksteppingState(still, still)
 
-    def demand(self, own: BacksteppingState, y: Measurement, off: TrackingError):
-        return self._steps(own, off).demand, {"estimate": own.load}
+    def demand(self, state: BacksteppingState, y: Measurement, tracking_error: TrackingError):
+        return self._steps(state, tracking_error).demand, {"estimate": state.load}
 
     def adapt(
-        self, own: BacksteppingState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self, state: BacksteppingState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> BacksteppingState:
-        at = self._steps(own, off)
-        learning = jnp.where(given.share < _WHOLE, 0.0, self._within_reach(y, at.learning))
-        going = -jnp.expm1(-dt / self.lag) if self.lagged else 1.0
+        errors = self._steps(state, tracking_error)
+        learning = jnp.where(actuation.share < _WHOLE, 0.0, self._within_reach(y, errors.learning))
+        step_share = -jnp.expm1(-dt / self.lag) if self.lagged else 1.0
         return BacksteppingState(
-            jnp.clip(own.load + dt * learning, -self.bound, self.bound),
-            own.acceleration + going * (at.demand + given.missing - own.acceleration),
+            jnp.clip(state.load + dt * learning, -self.bound, self.bound),
+            state.acceleration + step_share * (errors.demand + actuation.missing - state.acceleration),
         )
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
 
-    def _steps(self, own: BacksteppingState, off: TrackingError) -> Steps:
+    def _steps(self, state: BacksteppingState, tracking_error: TrackingError) -> Steps:
         gains = (self.rate, self.inner_rate, self.adaptation, self.lag if self.lagged else None)
-        return steps(*off, own.load, own.acceleration, *gains)
+        return steps(*tracking_error, state.load, state.acceleration, *gains)
 
 
-def steps(error, rate, acceleration, load, given, c, inner, adaptation, lag) -> Steps:
+def steps(error, rate, acceleration, load, actuator_acceleration, c, inner, adaptation, lag) -> Steps:
     """The three steps; two of them where `lag` is None.
 
     Args:
@@ -107,7 +107,7 @@ def steps(error, rate, acceleration, load, given, c, inner, adaptation, lag) -> 
         rate: e_dot, m/s, rad/s.
         acceleration: of the target, m/s^2, rad/s^2.
         load: estimate, m/s^2, rad/s^2.
-        given: acceleration x that the actuators give, m/s^2, rad/s^2.
+        actuator_acceleration: acceleration x that the actuators give, m/s^2, rad/s^2.
         c: rate of the first two steps, 1/s.
         inner: rate of the third, 1/s.
         adaptation: gamma, 1/s^2.
@@ -117,10 +117,12 @@ def steps(error, rate, acceleration, load, given, c, inner, adaptation, lag) -> 
     alpha = acceleration + c * rate + c**2 * error + c * second - load
     if lag is None:
         return Steps(second, 0 * second, -adaptation * second, alpha)
-    third = alpha - given
+    third = alpha - actuator_acceleration
     learning = -adaptation * (second + 2 / c * third)
-    of_alpha = 2 * c * (acceleration - given - load) + 2 * c**2 * rate - learning  # its rate, but for d - d_hat
-    return Steps(second, third, learning, given + lag * (inner * third + c**2 * second + of_alpha))
+    of_alpha = (
+        2 * c * (acceleration - actuator_acceleration - load) + 2 * c**2 * rate - learning
+    )  # its rate, but for d - d_hat
+    return Steps(second, third, learning, actuator_acceleration + lag * (inner * third + c**2 * second + of_alpha))
 
 
 @flat_options("motor", "actuator_rate")
@@ -156,11 +158,11 @@ def adaptive_backstepping(
     """
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
-    known = (axes[0].lag or 0.0) if lag is None else lag
-    checks.not_negative("lag", known, "s")
-    lagged = known >= _SHORT * conditions.sampling_time
+    actuator_lag = (axes[0].lag or 0.0) if lag is None else lag
+    checks.not_negative("lag", actuator_lag, "s")
+    lagged = actuator_lag >= _SHORT * conditions.sampling_time
     if rate is None:
-        rate = alike([backstepping_rate(axis, known if lagged else None) for axis in axes])
+        rate = alike([backstepping_rate(axis, actuator_lag if lagged else None) for axis in axes])
     if bound is None:
         bound = alike([axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
     checks.per_axis("rate", rate, len(axes))
@@ -173,7 +175,7 @@ def adaptive_backstepping(
         inner_rate=_INNER * c if inner_rate is None else inner_rate,
         adaptation=_ADAPTATION * c**2 if adaptation is None else adaptation,
         bound=bound,
-        lag=known,
+        lag=actuator_lag,
         lagged=lagged,
     )
 
@@ -182,16 +184,18 @@ def backstepping_rate(axis: Axis, lag: float | None) -> float:
     """Rate c of the law with its other defaults, by the rule of `bandwidths.py`, 1/s."""
 
     def law(c, s):
-        kept = np.exp(-axis.sampling_time / lag) if lag else 0.0
+        decay = np.exp(-axis.sampling_time / lag) if lag else 0.0
         adaptation = _ADAPTATION * c**2
 
-        def demand(error, rate, given):
+        def demand(error, rate, actuator_acceleration):
             # The estimate integrates its own effect on the errors: learning is affine in it.
-            at = lambda load: steps(error, rate, 0.0, load, given, c, _INNER * c, adaptation, lag)
-            free = at(0.0).learning
-            return at(free / (s - (at(1.0).learning - free))).demand
+            steps_with = lambda load: steps(
+                error, rate, 0.0, load, actuator_acceleration, c, _INNER * c, adaptation, lag
+            )
+            learning = steps_with(0.0).learning
+            return steps_with(learning / (s - (steps_with(1.0).learning - learning))).demand
 
-        inner = 1 - demand(0.0, 0.0, 1.0) * (1 - kept) / (np.exp(s * axis.sampling_time) - kept) if lag else 1.0
+        inner = 1 - demand(0.0, 0.0, 1.0) * (1 - decay) / (np.exp(s * axis.sampling_time) - decay) if lag else 1.0
         return LoopTransfer(demand(1.0, 0.0, 0.0) / inner, demand(0.0, 1.0, 0.0) / inner)
 
     return best_frequency(axis, law)

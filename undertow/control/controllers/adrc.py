@@ -47,19 +47,24 @@ class ADRC(AbstractAccelerationLaw):
         rates = self.model.coordinates.velocity(y)
         return ExtendedStateObserverState(rates, jnp.zeros_like(rates))
 
-    def demand(self, own: ExtendedStateObserverState, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
+    def demand(self, state: ExtendedStateObserverState, y: Measurement, tracking_error: TrackingError):
+        error, rate, acceleration = tracking_error
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
-        signals = {"estimate": own.estimate, "modelling_error": own.rates - self.model.coordinates.velocity(y)}
-        return feedback - own.estimate, signals
+        signals = {"estimate": state.estimate, "modelling_error": state.rates - self.model.coordinates.velocity(y)}
+        return feedback - state.estimate, signals
 
     def adapt(
-        self, own: ExtendedStateObserverState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self,
+        state: ExtendedStateObserverState,
+        y: Measurement,
+        tracking_error: TrackingError,
+        actuation: ActuationResult,
+        dt,
     ) -> ExtendedStateObserverState:
-        eps = own.rates - self.model.coordinates.velocity(y)
+        eps = state.rates - self.model.coordinates.velocity(y)
         return ExtendedStateObserverState(
-            own.rates + dt * (given.known + own.estimate - 2 * self.damping * self.bandwidth * eps),
-            own.estimate - dt * self.bandwidth**2 * eps,
+            state.rates + dt * (actuation.known + state.estimate - 2 * self.damping * self.bandwidth * eps),
+            state.estimate - dt * self.bandwidth**2 * eps,
         )
 
     def signals(self):

@@ -128,8 +128,9 @@ def axes_of(model: Model, conditions: DesignConditions) -> list[Axis]:
         still = as_array(np.zeros(axes))
         lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))
         dead_zone = float(model.actuators.dead_zone())
-    lag, max_bandwidth, reached = None if lag is None else float(lag), float(max_bandwidth), np.asarray(forces)
-    authority = np.where(np.isfinite(reached) & (reached > 0) & (reached < _UNLIMITED), reached, np.inf)
+    lag, max_bandwidth = None if lag is None else float(lag), float(max_bandwidth)
+    largest = np.asarray(forces)
+    authority = np.where(np.isfinite(largest) & (largest > 0) & (largest < _UNLIMITED), largest, np.inf)
     per_axis = lambda value: np.broadcast_to(np.asarray(value, dtype=float), axes).tolist()
     rows = zip(per_axis(velocity_noise), per_axis(load_rate), authority.tolist(), strict=True)
     common = (float(sampling_time), lag, max_bandwidth, float(delay))
@@ -142,10 +143,10 @@ def _actuation(
 ) -> tuple[Array | None, Array, Float[Array, " n"]]:
     """Lag of the slowest actuator (s, None without one), their largest bandwidth (rad/s), and the largest forces."""
     actuators = model.actuators
-    known = actuators.time_constant()
+    time_constants = actuators.time_constant()
     gain = jnp.abs(model.dynamics.gain(model.coordinates.measurement(still, still)))
     forces = matvec(gain, largest_forces(actuators, gain.shape[1]))
-    return None if known is None else jnp.max(known), actuators.max_bandwidth(fastest), forces
+    return None if time_constants is None else jnp.max(time_constants), actuators.max_bandwidth(fastest), forces
 
 
 def alike(values: Sequence[float]):
@@ -189,14 +190,14 @@ def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: i
         if value is not None:
             checks.positive(name, value, "rad/s")
     rates, *of_axes = zip(*(robust_bandwidths(axis, order) for axis in axes), strict=True)
-    chosen = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
+    default = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
     if bandwidth is None:
-        rate, bandwidth, beside = chosen
+        rate, bandwidth, beside = default
     else:
-        given = jnp.asarray(bandwidth, dtype=float)
+        bandwidths = jnp.asarray(bandwidth, dtype=float)
         slowest, fastest = _BESIDE
-        beside = jnp.clip(chosen.tracking, slowest * given, fastest * given)
-        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(given))
+        beside = jnp.clip(default.tracking, slowest * bandwidths, fastest * bandwidths)
+        rate = jnp.minimum(axes[0].max_bandwidth, _ACTUATORS_FASTER * jnp.max(bandwidths))
     return bandwidth, beside if tracking is None else tracking, rate if actuator_rate is None else actuator_rate
 
 
@@ -237,13 +238,13 @@ def _robust(axis: Axis, s: np.ndarray, actuators, bandwidth, tracking, order: in
         poles = (z - 1) ** 2 + (2 - 2 * decay) * (z - 1) + dt * of_estimate
     by_velocity, by_force = of_estimate * (z - 1) / poles, -dt * of_estimate / poles  # d_hat
     if axis.lag:
-        kept, lead = np.exp(-dt / axis.lag), axis.lag * actuators
-        force = (1 - kept) * lead / (z - kept - (1 - kept) * (1 - lead))  # per commanded force
-        given = (1 - lead) * force + lead
+        pole, lead = np.exp(-dt / axis.lag), axis.lag * actuators
+        force = (1 - pole) * lead / (z - pole - (1 - pole) * (1 - lead))  # per commanded force
+        command = (1 - lead) * force + lead
     else:
-        force = given = np.ones_like(z)
-    asked = given / (1 + by_force * force)
-    return LoopTransfer(tracking**2 * asked, (2 * tracking + by_velocity) * asked)
+        force = command = np.ones_like(z)
+    closed_command = command / (1 + by_force * force)
+    return LoopTransfer(tracking**2 * closed_command, (2 * tracking + by_velocity) * closed_command)
 
 
 def _best(axis: Axis, law: Callable[[np.ndarray], LoopTransfer], rates: np.ndarray) -> int:
@@ -256,15 +257,15 @@ def _best(axis: Axis, law: Callable[[np.ndarray], LoopTransfer], rates: np.ndarr
     open_loop = held * (from_y.of_position / s**2 + from_y.of_velocity / s)
     order = np.argsort(_cost(axis, frequency, from_y, held, open_loop), kind="stable")
     for start in range(0, len(order), _AT_ONCE):
-        some = order[start : start + _AT_ONCE]
-        allowed = np.ones(len(some), dtype=bool)
+        batch = order[start : start + _AT_ONCE]
+        allowed = np.ones(len(batch), dtype=bool)
         for factor, added, delay, largest in MARGINS:
-            slower = axis.unknown_delay * (UNKNOWN_LAG if added and axis.lag is None else added)
-            late = np.exp(-s * delay * axis.unknown_delay)
-            behind = late / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * slower))
-            allowed &= _keeps(open_loop[some] * behind, largest)
+            unknown_lag = axis.unknown_delay * (UNKNOWN_LAG if added and axis.lag is None else added)
+            unknown_delay = np.exp(-s * delay * axis.unknown_delay)
+            transfer = unknown_delay / ((1 + s * factor * (axis.lag or 0.0)) * (1 + s * unknown_lag))
+            allowed &= _keeps(open_loop[batch] * transfer, largest)
         if allowed.any():
-            return int(some[allowed.argmax()])
+            return int(batch[allowed.argmax()])
     return int(rates.argmin())
 
 

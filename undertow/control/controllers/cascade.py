@@ -118,22 +118,23 @@ def ardusub(
         BadInput: a plant that is not a vehicle with six axes, or a value is out of its range.
     """
     model = model.in_body_axes()
-    most = _authority(model, conditions, authority)
-    level, vertical, tilt, yaw = most[:2] / (_LEAN * _GRAVITY), most[2:3], most[3:5], most[5:]
+    full_demand = _authority(model, conditions, authority)
+    level = full_demand[:2] / (_LEAN * _GRAVITY)
+    vertical, tilt, yaw = full_demand[2:3], full_demand[3:5], full_demand[5:]
     loop = 1 + _THROTTLE * 0.5 * vertical
-    joined = lambda *parts: jnp.concatenate([jnp.broadcast_to(jnp.asarray(one, dtype=float), n) for one, n in parts])
-    each = lambda a, b, c, d: joined((a, 2), (b, 1), (c, 2), (d, 1))
+    joined = lambda *parts: jnp.concatenate([jnp.broadcast_to(jnp.asarray(gain, dtype=float), n) for gain, n in parts])
+    per_axis = lambda a, b, c, d: joined((a, 2), (b, 1), (c, 2), (d, 1))
     return _cascade(
         model,
         conditions.sampling_time,
         actuation,
-        outer=each(1.0, 3.0, 6.0, 6.0),
-        inner=each(6.0 * level, 8.0 * (loop - 1) / loop, 0.135 * tilt, 0.18 * yaw),
-        integral=each(0.5 * level, 8.0 * _THROTTLE * 0.1 * vertical / loop, 0.09 * tilt, 0.018 * yaw),
-        derivative=each(0.0, 0.0, 0.0036 * tilt, 0.0),
+        outer=per_axis(1.0, 3.0, 6.0, 6.0),
+        inner=per_axis(6.0 * level, 8.0 * (loop - 1) / loop, 0.135 * tilt, 0.18 * yaw),
+        integral=per_axis(0.5 * level, 8.0 * _THROTTLE * 0.1 * vertical / loop, 0.09 * tilt, 0.018 * yaw),
+        derivative=per_axis(0.0, 0.0, 0.0036 * tilt, 0.0),
         derivative_filter=2 * math.pi * 30.0,
-        rate_limit=each(1.0, 1.0, jnp.inf, math.pi),
-        integral_limit=each(10.0 * level, vertical, 0.444 * tilt, 0.222 * yaw),
+        rate_limit=per_axis(1.0, 1.0, jnp.inf, math.pi),
+        integral_limit=per_axis(10.0 * level, vertical, 0.444 * tilt, 0.222 * yaw),
     )
 
 
@@ -174,7 +175,7 @@ def px4(
         BadInput: a plant that is not a vehicle with six axes, or a value is out of its range.
     """
     model = model.in_body_axes()
-    most = _authority(model, conditions, authority)
+    full_demand = _authority(model, conditions, authority)
     proportional = jnp.asarray([1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
     damping = jnp.asarray([0.2, 0.2, 0.2, 1.5, 2.0, 2.0])
     checks.positive("saturation", saturation)
@@ -184,8 +185,8 @@ def px4(
         conditions.sampling_time,
         actuation,
         outer=proportional / damping,
-        inner=damping * most,
-        limit=jnp.repeat(jnp.asarray(saturation, dtype=float), 3) * most,
+        inner=damping * full_demand,
+        limit=jnp.repeat(jnp.asarray(saturation, dtype=float), 3) * full_demand,
     )
 
 
@@ -213,16 +214,16 @@ def cascade(model: Model, *, preset: str = "placed", **options: Any) -> Cascade:
 cascade.presets = PRESETS  # pyright: ignore[reportFunctionMemberAccess] - a scenario and `describe` find their options here
 
 
-def _authority(model: Model, conditions: DesignConditions, given):
+def _authority(model: Model, conditions: DesignConditions, authority):
     """Acceleration of a demand of 1 in each of the six axes."""
     if len(model.coordinates.axes) != _AXES:
         raise BadInput("preset", "be `placed` for a plant that is not a vehicle with six axes", "that of an autopilot")
-    if given is not None:
-        checks.positive("authority", given, "m/s^2, rad/s^2")
-        checks.per_axis("authority", given, _AXES)
-        return jnp.broadcast_to(jnp.asarray(given, dtype=float), _AXES)
-    found = np.array([axis.authority for axis in axes_of(model, conditions)])
-    return jnp.asarray(found if (found < _UNLIMITED).all() else _BLUEROV2_HEAVY)
+    if authority is not None:
+        checks.positive("authority", authority, "m/s^2, rad/s^2")
+        checks.per_axis("authority", authority, _AXES)
+        return jnp.broadcast_to(jnp.asarray(authority, dtype=float), _AXES)
+    default = np.array([axis.authority for axis in axes_of(model, conditions)])
+    return jnp.asarray(default if (default < _UNLIMITED).all() else _BLUEROV2_HEAVY)
 
 
 def _cascade(

@@ -46,44 +46,46 @@ class Cascade(AbstractAccelerationLaw):
 
     def __check_init__(self):
         gains, limits = ("outer", "inner", "derivative_filter"), ("rate_limit", "integral_limit", "limit")
-        rest = ("integral", "derivative")
+        optional_gains = ("integral", "derivative")
         for name in gains:
             checks.positive(name, getattr(self, name))
-        for name in rest:
+        for name in optional_gains:
             checks.not_negative(name, getattr(self, name))
         for name in limits:
             checks.positive(name, getattr(self, name), finite=False)
-        for name in (*gains, *rest, *limits):
+        for name in (*gains, *optional_gains, *limits):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
     def begin(self, y: Measurement, r: Target) -> CascadeState:
         still = jnp.zeros_like(y.position)
         return CascadeState(still, still, jnp.zeros(()))
 
-    def demand(self, own: CascadeState, y: Measurement, off: TrackingError):
-        error = self._rate_error(off)
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
-        slope = jnp.where(own.elapsed > 0, self._new(own) * (error - own.smooth) / step, 0.0)
-        demanded = off.acceleration + self.inner * error + own.integral + self.derivative * slope
-        return jnp.clip(demanded, -self.limit, self.limit), {"estimate": -own.integral}
+    def demand(self, state: CascadeState, y: Measurement, tracking_error: TrackingError):
+        error = self._rate_error(tracking_error)
+        step = jnp.where(state.elapsed > 0, state.elapsed, 1.0)
+        slope = jnp.where(state.elapsed > 0, self._new(state) * (error - state.smooth) / step, 0.0)
+        demanded = tracking_error.acceleration + self.inner * error + state.integral + self.derivative * slope
+        return jnp.clip(demanded, -self.limit, self.limit), {"estimate": -state.integral}
 
-    def adapt(self, own: CascadeState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> CascadeState:
+    def adapt(
+        self, state: CascadeState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> CascadeState:
         """Anti-windup of the integral by back-calculation, with the time constant of `pid`."""
-        error = self._rate_error(off)
+        error = self._rate_error(tracking_error)
         squared = self.integral * self.outer / self.inner
         rate = safe_sqrt(squared)
-        back = jnp.minimum(rate, 1 / dt) * given.missing
-        integral = own.integral + dt * (self.integral * error + back)
-        smooth = jnp.where(own.elapsed > 0, own.smooth + self._new(own) * (error - own.smooth), error)
+        back = jnp.minimum(rate, 1 / dt) * actuation.missing
+        integral = state.integral + dt * (self.integral * error + back)
+        smooth = jnp.where(state.elapsed > 0, state.smooth + self._new(state) * (error - state.smooth), error)
         return CascadeState(jnp.clip(integral, -self.integral_limit, self.integral_limit), smooth, dt)
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
 
-    def _rate_error(self, off: TrackingError) -> PerAxis:
-        return off.rate + jnp.clip(self.outer * off.error, -self.rate_limit, self.rate_limit)
+    def _rate_error(self, tracking_error: TrackingError) -> PerAxis:
+        return tracking_error.rate + jnp.clip(self.outer * tracking_error.error, -self.rate_limit, self.rate_limit)
 
-    def _new(self, own: CascadeState) -> Float[Array, "..."]:
+    def _new(self, state: CascadeState) -> Float[Array, "..."]:
         """Share of the newest error in the filter of the derivative."""
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
+        step = jnp.where(state.elapsed > 0, state.elapsed, 1.0)
         return -jnp.expm1(-self.derivative_filter * step)

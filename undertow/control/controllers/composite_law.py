@@ -129,11 +129,13 @@ class RCAF(AbstractContinuousController):
         g(x, V) = the acceleration that Eq. (23) gives by G.
         """
         dynamics, coordinates, _ = self.model
-        off = self._tracking(y, r)
+        tracking_error = self._tracking(y, r)
         eps = self.identification.error(z.predicted_velocity, coordinates.velocity(y))
         d_hat = self.fuzzy.output(z.weights, self._basis(eps, y))
-        u_r = self.robust_gain * switch(off.filtered, self.layer, self.switching)
-        desired = -dynamics.drift(y) - d_hat + off.feedback(self.feedback) + off.acceleration + u_r
+        u_r = self.robust_gain * switch(tracking_error.filtered, self.layer, self.switching)
+        desired = (
+            -dynamics.drift(y) - d_hat + tracking_error.feedback(self.feedback) + tracking_error.acceleration + u_r
+        )
         u = input_for(dynamics, y, desired)
         signals = {
             "estimate": d_hat,
@@ -143,7 +145,7 @@ class RCAF(AbstractContinuousController):
             "predicted_velocity": z.predicted_velocity,
             "attained_share": share_given(desired, forced_acceleration(dynamics, y, u)),
         }
-        signals |= lyapunov_signals(off, self.lyapunov(), self.weight)
+        signals |= lyapunov_signals(tracking_error, self.lyapunov(), self.weight)
         return u, signals | weight_signals(z.weights, self.weights_bound)
 
     def flow(self, z: RCAFState, y: Measurement, r: Target, u_applied) -> RCAFState:
@@ -154,13 +156,13 @@ class RCAF(AbstractContinuousController):
         xi = self._basis(eps, y)
         d_hat = self.fuzzy.output(z.weights, xi)
         u = u_applied if self.identification_input == "applied" else self.command(z, y, r)[0]
-        known = dynamics.drift(y) + forced_acceleration(dynamics, y, u)
+        modelled = dynamics.drift(y) + forced_acceleration(dynamics, y, u)
         theta_rate = -(self.adaptation * (s + self.composite * eps))[:, None] * xi
         if self.modification is not None:
             theta_rate = self.modification.rate(theta_rate, self.adaptation, eps, z.weights)
         return RCAFState(
             predicted_position=z.predicted_velocity,
-            predicted_velocity=self.identification.acceleration(eps, known, d_hat),
+            predicted_velocity=self.identification.acceleration(eps, modelled, d_hat),
             weights=projected_rate(z.weights, theta_rate, self._box()),
         )
 

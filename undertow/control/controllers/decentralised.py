@@ -36,25 +36,31 @@ class Decentralised(AbstractController):
     laws: tuple[AbstractController, ...]
 
     def init(self, y: Measurement, r: Target) -> tuple[PyTree, ...]:
-        return tuple(law.init(own, target) for law, own, target in self._each(y, r))
+        return tuple(law.init(measurement, target) for law, measurement, target in self._each(y, r))
 
     def command(self, z: tuple[PyTree, ...], y: Measurement, r: Target):
-        answers = [law.command(state, *seen) for state, (law, *seen) in zip(z, self._each(y, r), strict=True)]
-        signals = {name: self._joined(name, [found[name] for _, found in answers]) for name in self._declared()}
-        return jnp.concatenate([u for u, _ in answers]), signals
+        subsystems = zip(z, self._each(y, r), strict=True)
+        commands = [law.command(state, measurement, target) for state, (law, measurement, target) in subsystems]
+        signals = {name: self._joined(name, [values[name] for _, values in commands]) for name in self._declared()}
+        return jnp.concatenate([u for u, _ in commands]), signals
 
     def advance(self, z: tuple[PyTree, ...], y: Measurement, r: Target, u_applied: Inputs, dt) -> tuple[PyTree, ...]:
-        each = zip(z, self._each(y, r), split(u_applied, self._inputs()), strict=True)
-        return tuple(law.advance(state, own, target, u, dt) for state, (law, own, target), u in each)
+        subsystems = zip(z, self._each(y, r), split(u_applied, self._inputs()), strict=True)
+        return tuple(
+            law.advance(state, measurement, target, u, dt) for state, (law, measurement, target), u in subsystems
+        )
 
     def known_acceleration(self, z: tuple[PyTree, ...], y: Measurement, u_applied: Inputs) -> Outputs:
-        each = zip(self.laws, z, self._measured(y), split(u_applied, self._inputs()), strict=True)
-        return jnp.concatenate([law.known_acceleration(state, own, u) for law, state, own, u in each])
+        subsystems = zip(self.laws, z, self._measured(y), split(u_applied, self._inputs()), strict=True)
+        return jnp.concatenate(
+            [law.known_acceleration(state, measurement, u) for law, state, measurement, u in subsystems]
+        )
 
     def signals(self):
-        several = lambda one: one._replace(dimensions=("subsystem", *one.dimensions))
-        kept = lambda one: not one.dimensions or one.dimensions[0] in _JOINED
-        return {name: one if kept(one) else several(one) for name, one in self._declared().items()}
+        joined = lambda signal: not signal.dimensions or signal.dimensions[0] in _JOINED
+        of_subsystems = lambda signal: signal._replace(dimensions=("subsystem", *signal.dimensions))
+        declared = self._declared()
+        return {name: signal if joined(signal) else of_subsystems(signal) for name, signal in declared.items()}
 
     def _declared(self) -> dict[str, Signal]:
         return self.laws[0].signals()
@@ -94,5 +100,6 @@ def decentralised(
     laws = tuple(map(law, parts)) if callable(law) else tuple(law)
     if len(laws) != len(parts):
         raise BadInput("law", f"be one for each of the {len(parts)} subsystems", f"{len(laws)} laws")
-    known = composite_model(tuple(one.model for one in laws), inputs) if len(parts) > 1 else laws[0].model
-    return Decentralised(known, laws)
+    models = tuple(subsystem_law.model for subsystem_law in laws)
+    nominal_model = composite_model(models, inputs) if len(parts) > 1 else models[0]
+    return Decentralised(nominal_model, laws)

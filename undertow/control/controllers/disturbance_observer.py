@@ -54,24 +54,29 @@ class DisturbanceObserver(AbstractAccelerationLaw):
         velocity = self.model.coordinates.velocity(y)
         return DisturbanceObserverState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
-    def demand(self, own: DisturbanceObserverState, y: Measurement, off: TrackingError):
-        estimate = self._estimate(own, y)
-        return pole_placement(off, self.tracking, self.damping) - estimate, {"estimate": estimate}
+    def demand(self, state: DisturbanceObserverState, y: Measurement, tracking_error: TrackingError):
+        estimate = self._estimate(state, y)
+        return pole_placement(tracking_error, self.tracking, self.damping) - estimate, {"estimate": estimate}
 
     def adapt(
-        self, own: DisturbanceObserverState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self,
+        state: DisturbanceObserverState,
+        y: Measurement,
+        tracking_error: TrackingError,
+        actuation: ActuationResult,
+        dt,
     ) -> DisturbanceObserverState:
-        estimate = self._estimate(own, y)
+        estimate = self._estimate(state, y)
         return DisturbanceObserverState(
-            self.model.coordinates.velocity(y) + dt * (given.known + estimate), estimate, dt
+            self.model.coordinates.velocity(y) + dt * (actuation.known + estimate), estimate, dt
         )
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
 
-    def _estimate(self, own: DisturbanceObserverState, y: Measurement) -> PerAxis:
+    def _estimate(self, state: DisturbanceObserverState, y: Measurement) -> PerAxis:
         velocity = self.model.coordinates.velocity(y)
-        return corrected_disturbance(own.estimate, own.predicted, velocity, self.bandwidth, own.elapsed)
+        return corrected_disturbance(state.estimate, state.predicted, velocity, self.bandwidth, state.elapsed)
 
 
 @flat_options()

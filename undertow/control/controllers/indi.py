@@ -50,16 +50,20 @@ class INDI(AbstractAccelerationLaw):
         zero = jnp.zeros_like(rates)
         return INDIState(rates, zero, zero, zero)
 
-    def demand(self, own: INDIState, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
-        missing = own.acceleration - own.known
+    def demand(self, state: INDIState, y: Measurement, tracking_error: TrackingError):
+        error, rate, acceleration = tracking_error
+        missing = state.acceleration - state.known
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
-        signals = {"estimate": missing, "modelling_error": own.velocity - self.model.coordinates.velocity(y)}
+        signals = {"estimate": missing, "modelling_error": state.velocity - self.model.coordinates.velocity(y)}
         return feedback - missing, signals
 
-    def adapt(self, own: INDIState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> INDIState:
-        velocity, acceleration = self._filtered(own.velocity, own.acceleration, self.model.coordinates.velocity(y), dt)
-        return INDIState(velocity, acceleration, *self._filtered(own.known, own.known_rate, given.known, dt))
+    def adapt(
+        self, state: INDIState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> INDIState:
+        velocity, acceleration = self._filtered(
+            state.velocity, state.acceleration, self.model.coordinates.velocity(y), dt
+        )
+        return INDIState(velocity, acceleration, *self._filtered(state.known, state.known_rate, actuation.known, dt))
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE

@@ -59,24 +59,26 @@ class IntegralSlidingMode(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> SlidingState:
         return SlidingState(jnp.zeros_like(y.position), jnp.zeros(()))
 
-    def demand(self, own: SlidingState, y: Measurement, off: TrackingError):
-        surface, switching = self._surface(own, off)
-        demanded = off.acceleration + self._nominal(off) + switching
+    def demand(self, state: SlidingState, y: Measurement, tracking_error: TrackingError):
+        surface, switching = self._surface(state, tracking_error)
+        demanded = tracking_error.acceleration + self._nominal(tracking_error) + switching
         return demanded, {"estimate": -switching, "surface": surface}
 
-    def adapt(self, own: SlidingState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> SlidingState:
-        start = jnp.where(own.begun > 0, own.integral, -off.rate)
-        return SlidingState(start + dt * (self._nominal(off) + given.missing), jnp.ones(()))
+    def adapt(
+        self, state: SlidingState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> SlidingState:
+        integral = jnp.where(state.begun > 0, state.integral, -tracking_error.rate)
+        return SlidingState(integral + dt * (self._nominal(tracking_error) + actuation.missing), jnp.ones(()))
 
     def signals(self):
         return ESTIMATE | {"surface": Signal(("axis",), "[axis]/s", "distance s from the surface")} | ATTAINED_SHARE
 
-    def _nominal(self, off: TrackingError) -> PerAxis:
-        return self.frequency**2 * off.error + 2 * self.damping * self.frequency * off.rate
+    def _nominal(self, tracking_error: TrackingError) -> PerAxis:
+        return self.frequency**2 * tracking_error.error + 2 * self.damping * self.frequency * tracking_error.rate
 
-    def _surface(self, own: SlidingState, off: TrackingError) -> tuple[PerAxis, PerAxis]:
+    def _surface(self, state: SlidingState, tracking_error: TrackingError) -> tuple[PerAxis, PerAxis]:
         """s, and M sat(s / phi)."""
-        surface = jnp.where(own.begun > 0, off.rate + own.integral, 0.0)
+        surface = jnp.where(state.begun > 0, tracking_error.rate + state.integral, 0.0)
         return surface, self.amplitude * jnp.clip(surface / self.layer, -1, 1)
 
 

@@ -64,30 +64,31 @@ class L1Adaptive(AbstractAccelerationLaw):
         velocity = self.model.coordinates.velocity(y)
         return PredictorState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
-    def demand(self, own: PredictorState, y: Measurement, off: TrackingError):
-        seen = self._adapted(own, y)
-        return pole_placement(off, self.tracking, self.damping) - seen.filtered, {
-            "estimate": seen.filtered,
-            "modelling_error": seen.error,
+    def demand(self, state: PredictorState, y: Measurement, tracking_error: TrackingError):
+        adapted = self._adapted(state, y)
+        return pole_placement(tracking_error, self.tracking, self.damping) - adapted.filtered, {
+            "estimate": adapted.filtered,
+            "modelling_error": adapted.error,
         }
 
     def adapt(
-        self, own: PredictorState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self, state: PredictorState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> PredictorState:
-        seen, velocity = self._adapted(own, y), self.model.coordinates.velocity(y)
-        lost = -jnp.expm1(-self.predictor * dt)
-        moved = (1 - lost) * seen.error + lost / self.predictor * seen.uncertainty
-        return PredictorState(velocity + dt * given.known + moved, seen.filtered, dt)
+        adapted = self._adapted(state, y)
+        velocity = self.model.coordinates.velocity(y)
+        decayed = -jnp.expm1(-self.predictor * dt)
+        correction = (1 - decayed) * adapted.error + decayed / self.predictor * adapted.uncertainty
+        return PredictorState(velocity + dt * actuation.known + correction, adapted.filtered, dt)
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE
 
-    def _adapted(self, own: PredictorState, y: Measurement) -> Adapted:
-        step = jnp.where(own.elapsed > 0, own.elapsed, 1.0)
-        error = own.predicted - self.model.coordinates.velocity(y)
+    def _adapted(self, state: PredictorState, y: Measurement) -> Adapted:
+        step = jnp.where(state.elapsed > 0, state.elapsed, 1.0)
+        error = state.predicted - self.model.coordinates.velocity(y)
         uncertainty = -self.predictor / jnp.expm1(self.predictor * step) * error
-        share = -jnp.expm1(-self.bandwidth * own.elapsed)
-        return Adapted(error, uncertainty, own.filtered + share * (uncertainty - own.filtered))
+        share = -jnp.expm1(-self.bandwidth * state.elapsed)
+        return Adapted(error, uncertainty, state.filtered + share * (uncertainty - state.filtered))
 
 
 @flat_options()

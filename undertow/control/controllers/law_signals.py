@@ -41,10 +41,10 @@ ADAPTIVE_LAW = ESTIMATE | ROBUST_TERM | MODELLING_ERROR | WEIGHTS | LYAPUNOV | A
 
 
 def lyapunov_signals(
-    off: Tracking, lyapunov: Float[Array, "*#n 2 2"], weight: Float[Array, "*#n 2 2"]
+    tracking_error: Tracking, lyapunov: Float[Array, "*#n 2 2"], weight: Float[Array, "*#n 2 2"]
 ) -> dict[str, Scalar]:
     """1/2 E^T P E of Eq. (46) and 1/2 E^T Q E of Eq. (58), with the law's own E, summed over axes."""
-    return {"lyapunov_tracking": _half(off, lyapunov), "lyapunov_decay": _half(off, weight)}
+    return {"lyapunov_tracking": _half(tracking_error, lyapunov), "lyapunov_decay": _half(tracking_error, weight)}
 
 
 def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."]) -> dict[str, Array]:
@@ -58,13 +58,13 @@ def weight_signals(weights: Float[Array, "n rules"], bound: Float[Array, "..."])
     }
 
 
-def share_given(desired: PerAxis, given: PerAxis) -> Scalar:
+def share_given(desired: PerAxis, attained: PerAxis) -> Scalar:
     """Share of a desired acceleration that another one gives, along its direction, 0 to 1; 1 where none is desired."""
     size = (desired**2).sum()
-    share = (desired * given).sum() / jnp.where(size > 0, size, 1.0)
+    share = (desired * attained).sum() / jnp.where(size > 0, size, 1.0)
     return jnp.where(size > 0, jnp.clip(share, 0.0, 1.0), 1.0)
 
 
-def _half(off: Tracking, matrix: Float[Array, "*#n 2 2"]) -> Scalar:
-    diagonal = matrix[..., 0, 0] * off.error**2 + matrix[..., 1, 1] * off.rate**2
-    return (diagonal / 2 + matrix[..., 0, 1] * off.error * off.rate).sum()
+def _half(tracking_error: Tracking, matrix: Float[Array, "*#n 2 2"]) -> Scalar:
+    diagonal = matrix[..., 0, 0] * tracking_error.error**2 + matrix[..., 1, 1] * tracking_error.rate**2
+    return (diagonal / 2 + matrix[..., 0, 1] * tracking_error.error * tracking_error.rate).sum()

@@ -66,21 +66,24 @@ class LQI(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> LQIState:
         return LQIState(jnp.zeros_like(y.position), jnp.zeros_like(y.position))
 
-    def demand(self, own: LQIState, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
-        _, of_error, of_rate, of_given = jnp.moveaxis(self.gains, -1, 0)
-        demanded = acceleration + of_error * error + of_rate * rate + own.integral
-        return demanded - of_given * (own.acceleration - acceleration), {"estimate": -own.integral / (1 + of_given)}
+    def demand(self, state: LQIState, y: Measurement, tracking_error: TrackingError):
+        error, rate, acceleration = tracking_error
+        _, of_error, of_rate, of_acceleration = jnp.moveaxis(self.gains, -1, 0)
+        demanded = acceleration + of_error * error + of_rate * rate + state.integral
+        demanded = demanded - of_acceleration * (state.acceleration - acceleration)
+        return demanded, {"estimate": -state.integral / (1 + of_acceleration)}
 
-    def adapt(self, own: LQIState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> LQIState:
+    def adapt(
+        self, state: LQIState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> LQIState:
         """State one sampling time later; what limits take away is given back to the integral, as in `pid`."""
         of_integral, _, of_rate, _ = jnp.moveaxis(self.gains, -1, 0)
-        back = jnp.minimum(jnp.sqrt(of_integral / of_rate), 1 / dt) * given.missing
-        driven, _ = self.demand(own, y, off)
-        reached = -jnp.expm1(-dt / jnp.maximum(self.lag, _LEAST_LAG))
+        back_calculation = jnp.minimum(jnp.sqrt(of_integral / of_rate), 1 / dt) * actuation.missing
+        demanded, _ = self.demand(state, y, tracking_error)
+        lag_share = -jnp.expm1(-dt / jnp.maximum(self.lag, _LEAST_LAG))
         return LQIState(
-            own.integral + dt * (of_integral * off.error + back),
-            own.acceleration + reached * (driven + given.missing - own.acceleration),
+            state.integral + dt * (of_integral * tracking_error.error + back_calculation),
+            state.acceleration + lag_share * (demanded + actuation.missing - state.acceleration),
         )
 
     def signals(self):
@@ -89,20 +92,20 @@ class LQI(AbstractAccelerationLaw):
 
 def lqi_gains(frequency, integral_weight, rate_weight, lag, dt) -> Float[Array, "4"]:
     """Gains on the integral (1/s^3), error (1/s^2), its rate (1/s) and the given acceleration, of one axis."""
-    kept = jnp.exp(-dt / jnp.maximum(lag, _LEAST_LAG))
-    moved = lag * (1 - kept)  # integral of the decaying part, and the integral of that
-    drift = lag * (dt - moved)
+    decay = jnp.exp(-dt / jnp.maximum(lag, _LEAST_LAG))
+    decayed_time = lag * (1 - decay)  # integral of the decaying part, and the integral of that
+    drift = lag * (dt - decayed_time)
     zero, one = jnp.zeros_like(dt), jnp.ones_like(dt)
     # State: integral, error, rate of the error, given acceleration; the last one lowers the rate.
     transition = jnp.stack(
         [
             jnp.stack([one, dt, zero, zero]),
             jnp.stack([zero, one, dt, -drift]),
-            jnp.stack([zero, zero, one, -moved]),
-            jnp.stack([zero, zero, zero, kept]),
+            jnp.stack([zero, zero, one, -decayed_time]),
+            jnp.stack([zero, zero, zero, decay]),
         ]
     )
-    entry = jnp.stack([zero, -(dt**2 / 2 - drift), -(dt - moved), 1 - kept])
+    entry = jnp.stack([zero, -(dt**2 / 2 - drift), -(dt - decayed_time), 1 - decay])
     weight = jnp.stack([integral_weight * frequency**3, frequency**2, rate_weight * frequency, zero]) ** 2
     gain = regulator_gain(transition, entry, jnp.diag(weight))
     return gain * jnp.asarray([-1.0, -1.0, -1.0, 1.0])
@@ -123,9 +126,9 @@ def lqi_frequency(axis: Axis, integral_weight: float, rate_weight: float, lag: f
         gains = np.asarray(_gains_of_axes(jnp.asarray(bandwidth_grid(axis), dtype=float), *numbers))
 
     def law(_, s):
-        kept = np.exp(-dt / max(lag, _LEAST_LAG))
-        of_integral, of_error, of_rate, of_given = (column[:, None] for column in gains.T)
-        inner = 1 + of_given * (1 - kept) / (np.exp(s * dt) - kept)
+        decay = np.exp(-dt / max(lag, _LEAST_LAG))
+        of_integral, of_error, of_rate, of_acceleration = (column[:, None] for column in gains.T)
+        inner = 1 + of_acceleration * (1 - decay) / (np.exp(s * dt) - decay)
         return LoopTransfer((of_error + of_integral / s) / inner, of_rate / inner)
 
     return best_frequency(axis, law)
@@ -162,25 +165,26 @@ def lqi(
     """
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
-    known = (axes[0].lag or 0.0) if lag is None else lag
+    actuator_lag = (axes[0].lag or 0.0) if lag is None else lag
     if frequency is None:
-        given = ((integral_weight, _INTEGRAL), (rate_weight, _RATE), (known, 0.0))
-        nominal = [float(np.max(value)) if checks.known(value) else usual for value, usual in given]
+        weights_and_lag = ((integral_weight, _INTEGRAL), (rate_weight, _RATE), (actuator_lag, 0.0))
+        nominal = [float(np.max(value)) if checks.known(value) else usual for value, usual in weights_and_lag]
         frequency = alike([lqi_frequency(axis, *nominal) for axis in axes])
     for name, value in (("frequency", frequency), ("integral_weight", integral_weight), ("rate_weight", rate_weight)):
         checks.per_axis(name, value, len(axes))
         checks.positive(name, value)
-    checks.not_negative("lag", known, "s")
+    checks.not_negative("lag", actuator_lag, "s")
     numbers = (jnp.asarray(value, dtype=float) for value in (frequency, integral_weight, rate_weight))
     rows = jnp.broadcast_arrays(jnp.zeros(len(axes)), *numbers)[1:]
-    gains = _gains_of_axes(*rows, *(jnp.asarray(value, dtype=float) for value in (known, conditions.sampling_time)))
+    times = (jnp.asarray(value, dtype=float) for value in (actuator_lag, conditions.sampling_time))
+    gains = _gains_of_axes(*rows, *times)
     return LQI(
         model=model,
         actuation=actuation_for(conditions.sampling_time, frequency, actuation),
         frequency=frequency,
         integral_weight=integral_weight,
         rate_weight=rate_weight,
-        lag=known,
+        lag=actuator_lag,
         sampling_time=conditions.sampling_time,
         gains=gains,
     )

@@ -78,30 +78,32 @@ class MRAC(AbstractAccelerationLaw):
         still = jnp.zeros_like(y.position)
         return AdaptiveState(jnp.zeros((still.size, 4)), still, still, jnp.zeros(()))
 
-    def demand(self, own: AdaptiveState, y: Measurement, off: TrackingError):
-        nominal, basis = self._basis(y, off)
-        adapted = (own.parameters * basis).sum(-1)
-        behind = jnp.where(own.begun > 0, off.error - own.error, 0.0)
-        return nominal - adapted, {"estimate": adapted, "model_error": behind}
+    def demand(self, state: AdaptiveState, y: Measurement, tracking_error: TrackingError):
+        nominal, basis = self._basis(y, tracking_error)
+        adapted = (state.parameters * basis).sum(-1)
+        model_error = jnp.where(state.begun > 0, tracking_error.error - state.error, 0.0)
+        return nominal - adapted, {"estimate": adapted, "model_error": model_error}
 
     def adapt(
-        self, own: AdaptiveState, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self, state: AdaptiveState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> AdaptiveState:
         """State one sampling time later; the reference model is sampled as a double integrator is.
 
         Where Phi is large, adaptation is slowed to gamma |Phi|^2 = zeta w / T: from twice that on Euler's method adds
         more energy to the oscillation of E and theta than the reference model takes away.
         """
-        _, basis = self._basis(y, off)
-        error, rate = jnp.where(own.begun > 0, own.error, off.error), jnp.where(own.begun > 0, own.rate, off.rate)
-        filtered = (off.rate - rate + self.filter_ratio * self.frequency * (off.error - error))[:, None]
-        share = jnp.broadcast_to(self.e_modification, off.error.shape)[:, None]
-        moved = basis * filtered + share * jnp.abs(filtered) * own.parameters
+        _, basis = self._basis(y, tracking_error)
+        error = jnp.where(state.begun > 0, state.error, tracking_error.error)
+        rate = jnp.where(state.begun > 0, state.rate, tracking_error.rate)
+        filtered = tracking_error.rate - rate + self.filter_ratio * self.frequency * (tracking_error.error - error)
+        filtered = filtered[:, None]
+        share = jnp.broadcast_to(self.e_modification, tracking_error.error.shape)[:, None]
+        gradient = basis * filtered + share * jnp.abs(filtered) * state.parameters
         speed = jnp.minimum(self.adaptation, self.damping * self.frequency / (dt * (basis**2).sum(-1)))[:, None]
-        box = jnp.broadcast_to(self.bound, off.error.shape)[:, None]
-        pull = -(self.frequency**2) * error - 2 * self.damping * self.frequency * rate - given.missing
+        box = jnp.broadcast_to(self.bound, tracking_error.error.shape)[:, None]
+        pull = -(self.frequency**2) * error - 2 * self.damping * self.frequency * rate - actuation.missing
         return AdaptiveState(
-            parameters=jnp.clip(own.parameters - dt * speed * moved, -box, box),
+            parameters=jnp.clip(state.parameters - dt * speed * gradient, -box, box),
             error=error + dt * rate + dt**2 / 2 * pull,
             rate=rate + dt * pull,
             begun=jnp.ones(()),
@@ -111,9 +113,9 @@ class MRAC(AbstractAccelerationLaw):
         behind = Signal(("axis",), "[axis]", "error of the reference model subtracted from the error")
         return ESTIMATE | {"model_error": behind} | ATTAINED_SHARE
 
-    def _basis(self, y: Measurement, off: TrackingError) -> tuple[PerAxis, Float[Array, "n 4"]]:
+    def _basis(self, y: Measurement, tracking_error: TrackingError) -> tuple[PerAxis, Float[Array, "n 4"]]:
         """Acceleration of the nominal law, and Phi."""
-        nominal = pole_placement(off, self.frequency, self.damping)
+        nominal = pole_placement(tracking_error, self.frequency, self.damping)
         v = self.model.coordinates.velocity(y)
         return nominal, jnp.stack([jnp.ones_like(v), v, jnp.abs(v) * v, nominal / self.scale], -1)
 

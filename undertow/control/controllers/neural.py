@@ -78,39 +78,40 @@ class Neural(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> NetworkWeights:
         return NetworkWeights(jnp.zeros((self.start.shape[1] + 1, y.position.shape[0])), self.start)
 
-    def demand(self, own: NetworkWeights, y: Measurement, off: TrackingError):
-        seen = self._seen(own, y, off)
-        learnt = own.output[0] + matvec(own.output[1:].T, seen.layer)
-        robust = self.robust_gain * (seen.size + self.weights_bound) * seen.filtered
-        demanded = off.acceleration + self.slope * off.rate + self.gain * seen.filtered + learnt + robust
-        return demanded, {"estimate": -learnt, "robust_term": robust, "weights_size": seen.size}
+    def demand(self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError):
+        network = self._evaluate(state, y, tracking_error)
+        learned = state.output[0] + matvec(state.output[1:].T, network.layer)
+        robust = self.robust_gain * (network.size + self.weights_bound) * network.filtered
+        feedback = tracking_error.acceleration + self.slope * tracking_error.rate + self.gain * network.filtered
+        demanded = feedback + learned + robust
+        return demanded, {"estimate": -learned, "robust_term": robust, "weights_size": network.size}
 
     def adapt(
-        self, own: NetworkWeights, y: Measurement, off: TrackingError, given: ActuationResult, dt
+        self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> NetworkWeights:
-        seen = self._seen(own, y, off)
-        inner = seen.layer * (1 - seen.layer)  # sigma' of a sigmoid
-        r = self._within_reach(y, seen.filtered)  # an error that no input moves would be learnt for ever
-        size = safe_sqrt((r**2).sum())
-        regressor = jnp.concatenate([jnp.ones(1), seen.layer - inner * matvec(own.hidden.T, seen.inputs)])
-        by_output = (self.adaptation * r)[None, :] * regressor[:, None] - (
-            self.e_modification * size * self.adaptation * own.output
+        network = self._evaluate(state, y, tracking_error)
+        inner = network.layer * (1 - network.layer)  # sigma' of a sigmoid
+        reachable = self._within_reach(y, network.filtered)  # an error that no input moves would be learnt for ever
+        size = safe_sqrt((reachable**2).sum())
+        regressor = jnp.concatenate([jnp.ones(1), network.layer - inner * matvec(state.hidden.T, network.inputs)])
+        by_output = (self.adaptation * reachable)[None, :] * regressor[:, None] - (
+            self.e_modification * size * self.adaptation * state.output
         )
-        back = inner * matvec(own.output[1:], r)
+        backpropagated = inner * matvec(state.output[1:], reachable)
         by_hidden = self.hidden_adaptation * (
-            seen.inputs[:, None] * back[None, :] - self.e_modification * size * own.hidden
+            network.inputs[:, None] * backpropagated[None, :] - self.e_modification * size * state.hidden
         )
-        step = jnp.where(given.share < _WHOLE, 0.0, dt)
-        return NetworkWeights(own.output + step * by_output, own.hidden + step * by_hidden)
+        step = jnp.where(actuation.share < _WHOLE, 0.0, dt)
+        return NetworkWeights(state.output + step * by_output, state.hidden + step * by_hidden)
 
     def signals(self):
         return ESTIMATE | ROBUST_TERM | _SIZE | ATTAINED_SHARE
 
-    def _seen(self, own: NetworkWeights, y: Measurement, off: TrackingError) -> NetworkEvaluation:
-        inputs = _inputs(self.model, y, off)
-        layer = jax.nn.sigmoid(matvec(own.hidden.T, inputs))
-        size = safe_sqrt((own.output**2).sum() + (own.hidden**2).sum())
-        return NetworkEvaluation(off.rate + self.slope * off.error, inputs, layer, size)
+    def _evaluate(self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError) -> NetworkEvaluation:
+        inputs = _inputs(self.model, y, tracking_error)
+        layer = jax.nn.sigmoid(matvec(state.hidden.T, inputs))
+        size = safe_sqrt((state.output**2).sum() + (state.hidden**2).sum())
+        return NetworkEvaluation(tracking_error.rate + self.slope * tracking_error.error, inputs, layer, size)
 
 
 @flat_options()
@@ -182,8 +183,9 @@ def neural(
     )
 
 
-def _inputs(model: Model, y: Measurement, off: TrackingError) -> Float[Array, " inputs"]:
+def _inputs(model: Model, y: Measurement, tracking_error: TrackingError) -> Float[Array, " inputs"]:
     """Inputs x of the network."""
     turning = np.flatnonzero(np.array(model.coordinates.angles))
     sines = jnp.sin(y.position[turning])
-    return jnp.concatenate([jnp.ones(1), off.error, off.rate, model.coordinates.velocity(y), off.acceleration, sines])
+    error, rate, acceleration = tracking_error
+    return jnp.concatenate([jnp.ones(1), error, rate, model.coordinates.velocity(y), acceleration, sines])

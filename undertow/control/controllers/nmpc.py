@@ -71,62 +71,67 @@ class NMPC(AbstractAccelerationLaw):
         plan = Improved(jnp.zeros((self.steps, inputs)), start, jnp.zeros((inputs, start.shape[0])))
         return PlannedState(plan, still, velocity, still, jnp.zeros(()))
 
-    def demand(self, own: PlannedState, y: Measurement, off: TrackingError):
-        dynamics, estimate, horizon = self.model.dynamics, self._estimate(own, y), self._horizon(y)
-        state = jnp.concatenate([off.error, off.rate])
-        force = own.plan.forces[0] + matvec(own.plan.gain, state - own.plan.start)
-        planned = self._compensated(y, off) + matvec(dynamics.gain(y), jnp.clip(force, horizon.low, horizon.high))
+    def demand(self, state: PlannedState, y: Measurement, tracking_error: TrackingError):
+        dynamics, estimate, horizon = self.model.dynamics, self._estimate(state, y), self._horizon(y)
+        error_state = jnp.concatenate([tracking_error.error, tracking_error.rate])
+        force = state.plan.forces[0] + matvec(state.plan.gain, error_state - state.plan.start)
+        compensated, effect = self._compensated(y, tracking_error), dynamics.gain(y)
+        planned = compensated + matvec(effect, jnp.clip(force, horizon.low, horizon.high))
         # What has become known since the plan enters at once.
-        planned = planned + (off.acceleration - own.acceleration) - (estimate - own.estimate)
+        planned = planned + (tracking_error.acceleration - state.acceleration) - (estimate - state.estimate)
         gains = regulator(horizon)[1]
-        alone = off.acceleration + gains[:, 0] * off.error + gains[:, 1] * off.rate - estimate
-        usable = (own.elapsed > 0) & jnp.isfinite(planned).all()
-        return jnp.where(usable, planned, alone), {"estimate": estimate}
+        error, rate, acceleration = tracking_error
+        fallback = acceleration + gains[:, 0] * error + gains[:, 1] * rate - estimate
+        usable = (state.elapsed > 0) & jnp.isfinite(planned).all()
+        return jnp.where(usable, planned, fallback), {"estimate": estimate}
 
-    def adapt(self, own: PlannedState, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PlannedState:
+    def adapt(
+        self, state: PlannedState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> PlannedState:
         """The plan, moved on by dt and improved from the measured state; made anew where it was not finite."""
-        estimate, horizon = self._estimate(own, y), self._horizon(y)
-        forces = own.plan.forces
-        share = jnp.minimum(own.elapsed / horizon.step, 1.0)
-        moved = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
-        moved = jnp.where(jnp.isfinite(moved).all(), jnp.clip(moved, horizon.low[None, :], horizon.high[None, :]), 0.0)
-        start = jnp.concatenate([off.error, off.rate])
-        motion = self._motion(y, off, estimate)
-        again = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
-        plan, _ = jax.lax.scan(again, own.plan._replace(forces=moved, start=start), None, self.iterations)
-        predicted = self.model.coordinates.velocity(y) + dt * (given.known + estimate)
-        return PlannedState(plan, off.acceleration, predicted, estimate, dt)
+        estimate, horizon = self._estimate(state, y), self._horizon(y)
+        forces = state.plan.forces
+        share = jnp.minimum(state.elapsed / horizon.step, 1.0)
+        warm_start = forces + share * (jnp.concatenate([forces[1:], forces[-1:]]) - forces)
+        usable = jnp.isfinite(warm_start).all()
+        warm_start = jnp.where(usable, jnp.clip(warm_start, horizon.low[None, :], horizon.high[None, :]), 0.0)
+        start = jnp.concatenate([tracking_error.error, tracking_error.rate])
+        motion = self._motion(y, tracking_error, estimate)
+        iterate = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
+        plan, _ = jax.lax.scan(iterate, state.plan._replace(forces=warm_start, start=start), None, self.iterations)
+        predicted = self.model.coordinates.velocity(y) + dt * (actuation.known + estimate)
+        return PlannedState(plan, tracking_error.acceleration, predicted, estimate, dt)
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE
 
-    def _estimate(self, own: PlannedState, y: Measurement) -> PerAxis:
+    def _estimate(self, state: PlannedState, y: Measurement) -> PerAxis:
         velocity = self.model.coordinates.velocity(y)
-        return corrected_disturbance(own.estimate, own.predicted, velocity, self.bandwidth, own.elapsed)
+        return corrected_disturbance(state.estimate, state.predicted, velocity, self.bandwidth, state.elapsed)
 
     def _horizon(self, y: Measurement) -> Horizon:
         inputs, axes = self.model.dynamics.gain(y).shape[1], y.position.shape[0]
         held = self.model.actuators.quasi_static()
-        low, high = (jnp.broadcast_to(one, (inputs,)) for one in held.range(held.init(), jnp.ones(())))
+        low, high = (jnp.broadcast_to(bound, (inputs,)) for bound in held.range(held.init(), jnp.ones(())))
         w = jnp.broadcast_to(self.tracking, (axes,))
         return Horizon(
             self.horizon / self.steps, w**4, 2 * w**2, jnp.maximum(low, -_LIMITLESS), jnp.minimum(high, _LIMITLESS)
         )
 
-    def _motion(self, y: Measurement, off: TrackingError, estimate: PerAxis) -> Any:
+    def _motion(self, y: Measurement, tracking_error: TrackingError, estimate: PerAxis) -> Any:
         """Bending of the error along the predicted motion, for `receding_horizon`."""
         dynamics, coordinates, _ = self.model
         velocity = coordinates.velocity(y)
 
         def motion(t, state):
             error, rate = jnp.split(state, 2)
-            desired = velocity + off.rate  # of the target, now
-            gone = t * desired + t**2 / 2 * off.acceleration - (error - off.error)
-            position = y.position + coordinates.output_velocity(y, gone)
-            there = coordinates.measurement(position, jnp.zeros_like(position), y.actuator)
-            speed = coordinates.output_velocity(there, desired + t * off.acceleration - rate)
-            there = coordinates.measurement(position, speed, y.actuator)
-            return off.acceleration - dynamics.drift(there) - estimate, -dynamics.gain(there)
+            desired = velocity + tracking_error.rate  # of the target, now
+            displacement = t * desired + t**2 / 2 * tracking_error.acceleration - (error - tracking_error.error)
+            position = y.position + coordinates.output_velocity(y, displacement)
+            predicted = coordinates.measurement(position, jnp.zeros_like(position), y.actuator)
+            speed = coordinates.output_velocity(predicted, desired + t * tracking_error.acceleration - rate)
+            predicted = coordinates.measurement(position, speed, y.actuator)
+            return tracking_error.acceleration - dynamics.drift(predicted) - estimate, -dynamics.gain(predicted)
 
         return motion
 

@@ -29,8 +29,8 @@ def gains_and_path(
     """
     axes = axes_of(model, conditions)
     bandwidth, tracking, actuator_rate = completed(axes, *gains, actuation.actuator_rate, order=order)
-    chosen = dataclasses.replace(actuation, actuator_rate=actuator_rate)
-    return bandwidth, tracking, actuation_for(conditions.sampling_time, tracking, chosen)
+    path_options = dataclasses.replace(actuation, actuator_rate=actuator_rate)
+    return bandwidth, tracking, actuation_for(conditions.sampling_time, tracking, path_options)
 
 
 def gains_with_feedback(

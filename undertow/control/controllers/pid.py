@@ -46,18 +46,20 @@ class PID(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> PerAxis:
         return jnp.zeros_like(y.position)
 
-    def demand(self, own: PerAxis, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
-        demanded = acceleration + self.proportional * error + self.derivative * rate + own
-        return demanded, {"estimate": -own}
+    def demand(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
+        error, rate, acceleration = tracking_error
+        demanded = acceleration + self.proportional * error + self.derivative * rate + state
+        return demanded, {"estimate": -state}
 
-    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PerAxis:
+    def adapt(
+        self, state: PerAxis, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> PerAxis:
         """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
 
         Its time constant is the geometric mean of those of integral and derivative, or one step where that is longer.
         """
-        back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * given.missing
-        return own + dt * (self.integral * off.error + back)
+        back = jnp.minimum(jnp.sqrt(self.integral / self.derivative), 1 / dt) * actuation.missing
+        return state + dt * (self.integral * tracking_error.error + back)
 
     def signals(self):
         return ESTIMATE | ATTAINED_SHARE

@@ -29,10 +29,10 @@ class Network(eqx.Module):
     weights: tuple[Float[Array, "out in"], ...]
     biases: tuple[Float[Array, " out"], ...]
 
-    def __call__(self, seen: Observation) -> Action:
+    def __call__(self, values: Observation) -> Action:
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            seen = jnp.tanh(matvec(weight, seen) + bias)
-        return matvec(self.weights[-1], seen) + self.biases[-1]
+            values = jnp.tanh(matvec(weight, values) + bias)
+        return matvec(self.weights[-1], values) + self.biases[-1]
 
 
 class Function(eqx.Module):
@@ -40,8 +40,8 @@ class Function(eqx.Module):
 
     function: Callable[[Observation], Action] = eqx.field(static=True)
 
-    def __call__(self, seen: Observation) -> Action:
-        return jnp.asarray(self.function(seen), dtype=seen.dtype)
+    def __call__(self, observation: Observation) -> Action:
+        return jnp.asarray(self.function(observation), dtype=observation.dtype)
 
 
 class Policy(AbstractController):
@@ -89,17 +89,18 @@ def policy(model: Model, function: Annotated[str, catalogue.FILE], action: str =
         BadInput: no such function or file, a network that does not fit, or an action of another length.
     """
     interface = policy_interface_of(model, action, scale)
-    found = _found(function)
+    act = _found(function)
     zero = jnp.zeros(len(model.coordinates.angles))
-    seen = interface.observation(model.coordinates.measurement(zero, zero), Target(zero, zero, zero), interface.first())
-    if isinstance(found, Network) and found.weights[0].shape[1] != seen.size:
+    at_rest = model.coordinates.measurement(zero, zero)
+    observation = interface.observation(at_rest, Target(zero, zero, zero), interface.first())
+    if isinstance(act, Network) and act.weights[0].shape[1] != observation.size:
         raise BadInput(
-            "function", f"take an observation of {seen.size} entries", f"a network of {found.weights[0].shape[1]}"
+            "function", f"take an observation of {observation.size} entries", f"a network of {act.weights[0].shape[1]}"
         )
-    shape = jax.eval_shape(found, seen).shape
+    shape = jax.eval_shape(act, observation).shape
     if shape != (interface.actions,):
         raise BadInput("function", f"give an action of shape ({interface.actions},)", f"one of shape {shape}")
-    return Policy(model, interface, found)
+    return Policy(model, interface, act)
 
 
 def _found(name: str) -> Network | Function:
@@ -117,13 +118,13 @@ def _network(path: Path) -> Network:
         BadInput: it cannot be read, or its layers do not fit.
     """
     try:
-        data = io.BytesIO(path.read_bytes())
-        with zipfile.ZipFile(data) as file:
-            size = sum(one.file_size for one in file.infolist())
+        buffer = io.BytesIO(path.read_bytes())
+        with zipfile.ZipFile(buffer) as file:
+            size = sum(entry.file_size for entry in file.infolist())
         if size > _LARGEST:
             raise ValueError(f"its arrays have {size} bytes, more than the {_LARGEST} that are read")
-        data.seek(0)
-        with np.load(data, allow_pickle=False) as file:
+        buffer.seek(0)
+        with np.load(buffer, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except Exception as error:  # whatever the readers of zip files and of arrays raise
         raise BadInput("function", "be an .npz file of numbers", f"{path.name}: {error}") from None
@@ -134,11 +135,11 @@ def _network(path: Path) -> Network:
     if any(array.dtype.kind not in "fiu" or not np.isfinite(array).all() for array in arrays.values()):
         raise BadInput("function", "hold finite numbers", f"of {path.name}")
     weights, biases = ([arrays[name.format(number)] for number in range(count)] for name in _LAYER)
-    before = weights[0].shape[-1] if weights[0].ndim else 0
+    inputs = weights[0].shape[-1] if weights[0].ndim else 0
     for number, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
-        if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != before or not weight.size:
-            shapes = f"of shapes {weight.shape} and {bias.shape} in layer {number}, after {before} numbers"
+        if weight.ndim != 2 or bias.shape != weight.shape[:1] or weight.shape[1] != inputs or not weight.size:
+            shapes = f"of shapes {weight.shape} and {bias.shape} in layer {number}, after {inputs} numbers"
             raise BadInput("function", "hold weights of shape (out, in) and biases of shape (out,) that fit", shapes)
-        before = weight.shape[0]
-    own = lambda arrays: tuple(jnp.asarray(array, dtype=float) for array in arrays)
-    return Network(own(weights), own(biases))
+        inputs = weight.shape[0]
+    as_arrays = lambda arrays: tuple(jnp.asarray(array, dtype=float) for array in arrays)
+    return Network(as_arrays(weights), as_arrays(biases))

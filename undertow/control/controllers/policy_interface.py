@@ -61,8 +61,8 @@ class PolicyInterface(eqx.Module):
             assert y.body is not None
             parts += [y.body.nu, y.body.attitude]
         bound = jnp.asarray(self.bounds())
-        seen = jnp.clip(jnp.concatenate(parts), -bound, bound)
-        return jnp.concatenate([seen, before])
+        outputs = jnp.clip(jnp.concatenate(parts), -bound, bound)
+        return jnp.concatenate([outputs, before])
 
     def bounds(self) -> np.ndarray:
         """Largest sizes of the observation's entries, without those of the action before."""
@@ -105,28 +105,31 @@ def policy_interface_of(model: Model, action: str, scale: Any = None) -> PolicyI
         BadInput: another word, a scale that is not positive, or a wrench for a plant without body axes.
     """
     checks.choice("action", action, ACTIONS)
-    own, body = model.in_body_axes(), bool(model.in_body_axes().coordinates.axes)
-    actuators, rest, unused = own.actuators.quasi_static(), jnp.zeros(len(model.coordinates.angles)), jnp.zeros(())
-    effect = own.dynamics.gain(model.coordinates.measurement(rest, rest))
-    each = lambda value: jnp.broadcast_to(value, effect.shape[1:])
-    least, most = map(each, actuators.range(actuators.init(), unused))
+    body_model = model.in_body_axes()
+    body = bool(body_model.coordinates.axes)
+    actuators = body_model.actuators.quasi_static()
+    still, unused = jnp.zeros(len(model.coordinates.angles)), jnp.zeros(())
+    effect = body_model.dynamics.gain(model.coordinates.measurement(still, still))
+    per_actuator = lambda value: jnp.broadcast_to(value, effect.shape[1:])
+    least_force, largest_force = map(per_actuator, actuators.range(actuators.init(), unused))
     if scale is not None:
         checks.positive("scale", scale)
-        low, high = each(-jnp.asarray(scale, dtype=float)), each(jnp.asarray(scale, dtype=float))
+        low, high = per_actuator(-jnp.asarray(scale, dtype=float)), per_actuator(jnp.asarray(scale, dtype=float))
     else:
         unit = lambda force, sign: jnp.where(jnp.isfinite(force), force, sign)  # without a limit
         low, high = (
             actuators.command(actuators.init(), unit(force, sign), unused)
-            for force, sign in ((least, -1.0), (most, 1.0))
+            for force, sign in ((least_force, -1.0), (largest_force, 1.0))
         )
     of_wrench = None
     if action == "wrench":
         if not body:
             raise BadInput("action", "be normalised or input for a plant without body axes", action)
-        if not checks.assumed(lambda low, high: (abs(low) < np.inf).all() & (abs(high) < np.inf).all(), least, most):
+        limited = lambda low, high: (abs(low) < np.inf).all() & (abs(high) < np.inf).all()
+        if not checks.assumed(limited, least_force, largest_force):
             hint = "Give the thruster a supply"
             raise BadInput("action", "be normalised or input for thrusters without limits", action, hint=hint)
         # In units of the largest acceleration that the thrusters give in each axis, which is the largest wrench times
         # the inverse of the mass matrix.
-        of_wrench = jnp.linalg.pinv(effect) * (jnp.abs(effect) @ jnp.minimum(-least, most))[None]
-    return PolicyInterface(model.coordinates, actuators, each(low), each(high), of_wrench, action, body)
+        of_wrench = jnp.linalg.pinv(effect) * (jnp.abs(effect) @ jnp.minimum(-least_force, largest_force))[None]
+    return PolicyInterface(model.coordinates, actuators, per_actuator(low), per_actuator(high), of_wrench, action, body)

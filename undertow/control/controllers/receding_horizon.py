@@ -70,8 +70,8 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
         free, per_force = motion(t, s)
         return free + matvec(per_force, force)
 
-    def rolled(s, now):
-        t, force = now
+    def rolled(s, stage):
+        t, force = stage
         return moved(s, bending(t, s, force)), s
 
     last, states = jax.lax.scan(rolled, start, (times, forces))
@@ -79,9 +79,9 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
     def linear(t, s, force):
         return bending(t, s, force), jax.jacfwd(lambda s: bending(t, s, force))(s), motion(t, s)[1]
 
-    def backward(after, now):
+    def backward(after, stage):
         slope, curve = after
-        s, force, bend, by_state, by_force = now
+        s, force, bend, by_state, by_force = stage
         axes, ridge = bend.shape[0], _LEAST * h * (by_force**2).sum(0).max()
         spread = h * jnp.concatenate([h / 2 * jnp.eye(axes), jnp.eye(axes)])
         a = jnp.eye(2 * axes) + h * jnp.eye(2 * axes, k=axes) + _product(spread, by_state)
@@ -104,16 +104,16 @@ def improved(motion: Motion, horizon: Horizon, start: State, forces: Float[Array
         return (slope, (curve + curve.T) / 2), (step, gain)
 
     end = _end(horizon)
-    known = (states, forces, *jax.vmap(linear)(times, states, forces))
-    _, (steps, gains) = jax.lax.scan(backward, (matvec(end, last), end), known, reverse=True)
+    trajectory = (states, forces, *jax.vmap(linear)(times, states, forces))
+    _, (steps, gains) = jax.lax.scan(backward, (matvec(end, last), end), trajectory, reverse=True)
 
-    def forward(s, now):
-        t, before, force, step, gain = now
-        new = jnp.clip(force + step + matvec(gain, s - before), low, high)
-        return moved(s, bending(t, s, new)), new
+    def forward(s, stage):
+        t, nominal_state, force, step, gain = stage
+        new_force = jnp.clip(force + step + matvec(gain, s - nominal_state), low, high)
+        return moved(s, bending(t, s, new_force)), new_force
 
-    _, found = jax.lax.scan(forward, start, (times, states, forces, steps, gains))
-    return Improved(found, start, gains[0])
+    _, improved_forces = jax.lax.scan(forward, start, (times, states, forces, steps, gains))
+    return Improved(improved_forces, start, gains[0])
 
 
 def regulator(horizon: Horizon) -> tuple[Float[Array, "n 2 2"], Float[Array, "n 2"]]:
@@ -121,14 +121,14 @@ def regulator(horizon: Horizon) -> tuple[Float[Array, "n 2 2"], Float[Array, "n 
 
     By doubling: Chu, Fan and Lin (2005).
     """
-    h, one = horizon.step, jnp.eye(2)
-    a = one + h * jnp.eye(2, k=1)
+    h, identity = horizon.step, jnp.eye(2)
+    a = identity + h * jnp.eye(2, k=1)
     b = jnp.stack([h**2 / 2, h])
-    cost = h * jnp.stack([horizon.position, horizon.rate], -1)[:, :, None] * one[None, :, :]
+    cost = h * jnp.stack([horizon.position, horizon.rate], -1)[:, :, None] * identity[None, :, :]
 
-    def double(_, now):
-        a, reach, cost = now
-        within = _inverse(one[None, :, :] + _each(reach, cost))
+    def double(_, matrices):
+        a, reach, cost = matrices
+        within = _inverse(identity[None, :, :] + _each(reach, cost))
         back = _each(a, within)
         turned = jnp.swapaxes(a, 1, 2)
         return (

@@ -57,7 +57,7 @@ class ReferenceFilter(eqx.Module):
     def smoothed(self, state: FilterState, r: Target, coordinates: AbstractCoordinates) -> Target:
         """The reference with the remainder of its jumps."""
         offset = self._offset(state, r, coordinates)
-        return Target(*(own + left for own, left in zip(r, offset, strict=True)))
+        return Target(*(reference + remainder for reference, remainder in zip(r, offset, strict=True)))
 
     def advance(
         self, state: FilterState, r: Target, coordinates: AbstractCoordinates, share, dt, room: Room = UNLIMITED
@@ -74,8 +74,9 @@ class ReferenceFilter(eqx.Module):
         """
         away, rate, bend = self._offset(state, r, coordinates)
         # From far away it is slower, so that the return takes half of the authority of the actuators.
-        far = jnp.maximum(jnp.abs(away), _NEAR)
-        w, t = jnp.minimum(self.frequency, jnp.sqrt(jnp.maximum(room.most, _LEAST) / (2 * _PEAK * far))), share * dt
+        distance = jnp.maximum(jnp.abs(away), _NEAR)
+        w = jnp.minimum(self.frequency, jnp.sqrt(jnp.maximum(room.most, _LEAST) / (2 * _PEAK * distance)))
+        t = share * dt
         # exp(A t) = exp(-w t) (1 + N t + N^2 t^2 / 2) with N = A + w nilpotent.
         first, second = rate + w * away, bend + 2 * w * rate + w**2 * away
         third = -(w**3) * away - 3 * w**2 * rate - 2 * w * bend

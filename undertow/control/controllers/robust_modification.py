@@ -39,13 +39,13 @@ class RobustModification(eqx.Module):
             weights: theta, m/s^2 and rad/s^2.
         """
         size = jnp.abs(error)
-        learnt = jnp.where((size < self.dead_zone)[:, None], 0.0, rate)
-        return learnt - (adaptation * (self.leakage + self.e_modification * size))[:, None] * weights
+        adaptive_rate = jnp.where((size < self.dead_zone)[:, None], 0.0, rate)
+        return adaptive_rate - (adaptation * (self.leakage + self.e_modification * size))[:, None] * weights
 
 
 def modification_of(leakage, e_modification, dead_zone) -> RobustModification | None:
     """Modification with these values; None, which costs nothing, where all of them are zero."""
     values = (leakage, e_modification, dead_zone)
-    if not any(checks.assumed(lambda given: (given != 0).any(), value) for value in values):
+    if not any(checks.assumed(lambda number: (number != 0).any(), value) for value in values):
         return None
     return RobustModification(*values)

@@ -43,12 +43,12 @@ class DiagonalDynamics(AbstractParametricDynamics):
         return self.dynamics.invert(y, acceleration)
 
     def parametrization(self) -> Parametrization:
-        one = jnp.ones(self.axes)
+        ones = jnp.ones(self.axes)
         return Parametrization(
-            nominal=jnp.concatenate([one, one, 0 * one]),
-            most=jnp.concatenate([0.8 * one, 0.8 * one, _USUAL**2 * one]),
-            rates=jnp.concatenate([one / _USUAL**2, one / _USUAL**2, one]),
-            inertia=one,
+            nominal=jnp.concatenate([ones, ones, 0 * ones]),
+            most=jnp.concatenate([0.8 * ones, 0.8 * ones, _USUAL**2 * ones]),
+            rates=jnp.concatenate([ones / _USUAL**2, ones / _USUAL**2, ones]),
+            inertia=ones,
         )
 
     def generalized_force(self, y: Measurement, parameters: Parameters, velocity, acceleration) -> Outputs:
@@ -99,45 +99,49 @@ class SlotineLi(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> Parameters:
         return self.regressor.parametrization().nominal
 
-    def demand(self, own: Parameters, y: Measurement, off: TrackingError):
-        structure, surface = self.regressor.parametrization(), self._surface(off)
-        force, nominal = self._force(own, y, off), self._force(structure.nominal, y, off)
+    def demand(self, state: Parameters, y: Measurement, tracking_error: TrackingError):
+        structure, surface = self.regressor.parametrization(), self._surface(tracking_error)
+        force, nominal = self._force(state, y, tracking_error), self._force(structure.nominal, y, tracking_error)
         # This is the whole acceleration; the path that all laws share compensates the modelled forces once more.
         demanded = self.regressor.accelerated_by(y, force + self.gain * structure.inertia * surface)
         signals = {
             "estimate": self.regressor.accelerated_by(y, nominal - force),
             "surface": surface,
-            "parameter_change": (jnp.abs(own - structure.nominal) / structure.most).max(),
+            "parameter_change": (jnp.abs(state - structure.nominal) / structure.most).max(),
         }
-        return demanded + self._compensated(y, off), signals
+        return demanded + self._compensated(y, tracking_error), signals
 
-    def adapt(self, own: Parameters, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> Parameters:
+    def adapt(
+        self, state: Parameters, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> Parameters:
         """Parameters one sampling time later.
 
         Euler's method adds T / 2 theta_dot^T (gamma Gamma)^-1 theta_dot to V_dot. Where that is more than half of what
         feedback takes away, adaptation is slowed down to it, so that V falls at any sampling time. Nothing is learnt
         from errors that no input moves.
         """
-        structure, surface = self.regressor.parametrization(), self._surface(off)
-        _, transposed = jax.vjp(lambda parameters: self._force(parameters, y, off), own)
+        structure, surface = self.regressor.parametrization(), self._surface(tracking_error)
+        _, transposed = jax.vjp(lambda parameters: self._force(parameters, y, tracking_error), state)
         (slope,) = transposed(self._within_reach(y, surface))
         rate = self.adaptation_rate * structure.rates * slope
-        added, taken = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
-        share = jnp.where(added > taken, taken / jnp.where(added > taken, added, 1.0), 1.0)
-        share = jnp.where(given.share < _WHOLE, 0.0, share)
-        return jnp.clip(own + dt * share * rate, structure.nominal - structure.most, structure.nominal + structure.most)
+        added, dissipated = dt * (slope * rate).sum(), (self.gain * structure.inertia * surface**2).sum()
+        share = jnp.where(added > dissipated, dissipated / jnp.where(added > dissipated, added, 1.0), 1.0)
+        share = jnp.where(actuation.share < _WHOLE, 0.0, share)
+        adapted = state + dt * share * rate
+        return jnp.clip(adapted, structure.nominal - structure.most, structure.nominal + structure.most)
 
     def signals(self):
         surface = Signal(("axis",), "[axis]/s", "distance s from the surface")
         return ESTIMATE | {"surface": surface, "parameter_change": _CHANGE} | ATTAINED_SHARE
 
-    def _surface(self, off: TrackingError) -> PerAxis:
-        return off.rate + self.slope * jnp.clip(off.error, -self.reach, self.reach)
+    def _surface(self, tracking_error: TrackingError) -> PerAxis:
+        return tracking_error.rate + self.slope * jnp.clip(tracking_error.error, -self.reach, self.reach)
 
-    def _force(self, parameters: Parameters, y: Measurement, off: TrackingError) -> PerAxis:
-        velocity = self.model.coordinates.velocity(y) + self._surface(off)
-        counting = jnp.where(jnp.abs(off.error) < self.reach, off.rate, 0.0)
-        return self.regressor.generalized_force(y, parameters, velocity, off.acceleration + self.slope * counting)
+    def _force(self, parameters: Parameters, y: Measurement, tracking_error: TrackingError) -> PerAxis:
+        velocity = self.model.coordinates.velocity(y) + self._surface(tracking_error)
+        counting = jnp.where(jnp.abs(tracking_error.error) < self.reach, tracking_error.rate, 0.0)
+        acceleration = tracking_error.acceleration + self.slope * counting
+        return self.regressor.generalized_force(y, parameters, velocity, acceleration)
 
 
 @flat_options("feedforward")
@@ -180,9 +184,9 @@ def slotine_li(
     checks.positive("slope", slope)
     gain = slope if gain is None else gain
     if reach is None:
-        most = [axis.authority for axis in axes]
-        steep = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
-        reach = jnp.minimum(_HALF * jnp.asarray(most, dtype=float) / steep, _FAR)
+        authorities = [axis.authority for axis in axes]
+        stiffness = jnp.asarray(slope, dtype=float) * jnp.asarray(gain, dtype=float)
+        reach = jnp.minimum(_HALF * jnp.asarray(authorities, dtype=float) / stiffness, _FAR)
     if adaptation_rate is None:
         adaptation_rate = _ADAPTATION * jnp.min(jnp.asarray(slope, dtype=float)) ** 2
     dynamics = model.dynamics

@@ -60,20 +60,22 @@ class SuperTwisting(AbstractAccelerationLaw):
     def begin(self, y: Measurement, r: Target) -> PerAxis:
         return jnp.zeros_like(y.position)
 
-    def demand(self, own: PerAxis, y: Measurement, off: TrackingError):
-        error, rate, acceleration = off
+    def demand(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
+        error, rate, acceleration = tracking_error
         surface = rate + self.slope * error
         root = surface / jnp.sqrt(jnp.maximum(jnp.abs(surface), self.layer))
-        demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + own
-        return demanded, {"estimate": -own, "surface": surface}
+        demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + state
+        return demanded, {"estimate": -state, "surface": surface}
 
-    def adapt(self, own: PerAxis, y: Measurement, off: TrackingError, given: ActuationResult, dt) -> PerAxis:
+    def adapt(
+        self, state: PerAxis, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
+    ) -> PerAxis:
         """w one sampling time later; what limits take away is given back to it, as to the integral of `pid`."""
-        surface = off.rate + self.slope * off.error
+        surface = tracking_error.rate + self.slope * tracking_error.error
         second = self.second * self.rate_bound
         steepest = self.slope + self.first * jnp.sqrt(self.rate_bound / self.layer)
-        back = jnp.minimum(jnp.sqrt(self.slope * second / self.layer / steepest), 1 / dt) * given.missing
-        return own + dt * (second * surface / jnp.maximum(jnp.abs(surface), self.layer) + back)
+        back = jnp.minimum(jnp.sqrt(self.slope * second / self.layer / steepest), 1 / dt) * actuation.missing
+        return state + dt * (second * surface / jnp.maximum(jnp.abs(surface), self.layer) + back)
 
     def signals(self):
         return ESTIMATE | {"surface": Signal(("axis",), "[axis]/s", "distance s from the surface")} | ATTAINED_SHARE
@@ -90,12 +92,14 @@ def contraction(first, second):
     first, second = xp.broadcast_arrays(first, second)
     a, slow, fast = first / 2, 2 * xp.maximum(second - 1, _TINY), 2 * (second + 1)
     # Squared cosines of the two angles less 1; at 0 both quotients are 1 / slow^(1/2).
-    off = (slow - a**2) / slow
-    off = xp.where(abs(off) < _TINY, _TINY, off)
-    turn = xp.arccos(xp.sqrt(1 - xp.maximum(off, 0.0))) + xp.arccosh(xp.sqrt(1 - xp.minimum(off, 0.0)))
+    discriminant = (slow - a**2) / slow
+    discriminant = xp.where(abs(discriminant) < _TINY, _TINY, discriminant)
+    circular = xp.arccos(xp.sqrt(1 - xp.maximum(discriminant, 0.0)))
+    hyperbolic = xp.arccosh(xp.sqrt(1 - xp.minimum(discriminant, 0.0)))
+    turn = circular + hyperbolic  # one of them is 0
     left = xp.maximum(fast - a**2, _TINY)
     surface = xp.arccos(-a / xp.sqrt(a**2 + left)) / xp.sqrt(left)
-    ratio = xp.sqrt(fast / slow) * xp.exp(-a * (turn / xp.sqrt(abs(off) * slow) + surface))
+    ratio = xp.sqrt(fast / slow) * xp.exp(-a * (turn / xp.sqrt(abs(discriminant) * slow) + surface))
     ratio = xp.where(a**2 < fast, ratio, 0.0)  # else the surface is reached without a further crossing
     return xp.where(second > 1, ratio, xp.inf)
 

@@ -33,9 +33,9 @@ def allocate(
     return jax.lax.cond(fits, lambda: forces, solve)
 
 
-def attained(effect: Float[Array, "n m"], desired: Float[Array, " m"], given: Float[Array, " m"]) -> Float[Array, ""]:
+def attained(effect: Float[Array, "n m"], desired: Float[Array, " m"], forces: Float[Array, " m"]) -> Float[Array, ""]:
     """Share of the acceleration of the desired forces that other forces give, along its direction; at most 1."""
-    return share_given(matvec(effect, desired), matvec(effect, given))
+    return share_given(matvec(effect, desired), matvec(effect, forces))
 
 
 def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
@@ -50,7 +50,7 @@ def _programme(effect, forces, low, high, direction) -> Float[Array, " m"]:
     m = forces.shape[0]
     use = jnp.full(m + 1, _USE).at[m].set(1.0)
     linear = jnp.zeros(m + 1).at[m].set(1.0)
-    least = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
-    most = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
-    found = box_minimum(use, factor, linear, least, most)
-    return unit * found[:m]
+    lower = jnp.concatenate([jnp.broadcast_to(low, (m,)) / unit, jnp.zeros(1)])
+    upper = jnp.concatenate([jnp.broadcast_to(high, (m,)) / unit, jnp.ones(1)])
+    solution = box_minimum(use, factor, linear, lower, upper)
+    return unit * solution[:m]

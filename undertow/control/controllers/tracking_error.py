@@ -33,15 +33,21 @@ def tracking(coordinates: AbstractCoordinates, lyapunov: Matrices, y: Measuremen
     return Tracking(error, rate, lyapunov[..., 0, 1] * error + lyapunov[..., 1, 1] * rate, acceleration)
 
 
-def pole_placement(off: TrackingError, frequency: Float[Array, "..."], damping: Float[Array, "..."]) -> PerAxis:
+def pole_placement(
+    tracking_error: TrackingError, frequency: Float[Array, "..."], damping: Float[Array, "..."]
+) -> PerAxis:
     """a_d + w^2 e + 2 zeta w e_dot, m/s^2 and rad/s^2: where it is given, e_ddot = -w^2 e - 2 zeta w e_dot.
 
     Args:
-        off: errors from the target, and its acceleration.
+        tracking_error: errors from the target, and its acceleration.
         frequency: w, rad/s; one number or one per axis.
         damping: zeta.
     """
-    return off.acceleration + frequency**2 * off.error + 2 * damping * frequency * off.rate
+    return (
+        tracking_error.acceleration
+        + frequency**2 * tracking_error.error
+        + 2 * damping * frequency * tracking_error.rate
+    )
 
 
 def check_gains(feedback: Array, weight: Array, per_axis: dict[str, Any], axes: int) -> None:

@@ -59,7 +59,7 @@ def _by_neighbours(x, centres, widths):
     anchors = np.round(np.linspace(0, count - 1, -(-(count - 1) // _APART) + 1)).astype(int)
     nearest = np.abs(np.arange(count)[:, None] - anchors).argmin(1)
     steps = np.arange(count) - anchors[nearest]
-    most = int(np.abs(steps).max())
+    reach = int(np.abs(steps).max())
     middle, half = (centres[0] + centres[-1]) / 2, (centres[-1] - centres[0]) / 2
     spacing, offset = 2 * half / (count - 1) / width, (x - middle) / width
     inside = jnp.clip(offset, -half / width, half / width)
@@ -67,15 +67,15 @@ def _by_neighbours(x, centres, widths):
     away = inside[:, None] - ((centres[anchors] - middle) / width)[None, :]
     anchor = jnp.exp(-jnp.abs(away) * (jnp.abs(away) + 2 * jnp.abs(beyond)[:, None]))
     # Where the ratio is limited the anchor weighs nothing.
-    limit = _LARGEST_EXPONENT / most
+    limit = _LARGEST_EXPONENT / reach
     ratio = jnp.exp(jnp.clip(2 * spacing * (away + beyond[:, None]), -limit, limit))
-    powers = [anchor] * (2 * most + 1)
+    powers = [anchor] * (2 * reach + 1)
     inverse = 1 / ratio
-    for i in range(1, most + 1):
-        powers[most + i] = powers[most + i - 1] * ratio
-        powers[most - i] = powers[most - i + 1] * inverse
+    for i in range(1, reach + 1):
+        powers[reach + i] = powers[reach + i - 1] * ratio
+        powers[reach - i] = powers[reach - i + 1] * inverse
     falling = jnp.exp(-((jnp.asarray(steps, dtype=centres.dtype) * spacing) ** 2))
-    weights = falling[None, :] * jnp.stack(powers, 0)[most + steps, :, nearest].T
+    weights = falling[None, :] * jnp.stack(powers, 0)[reach + steps, :, nearest].T
     return weights * (1 / weights.sum(-1, keepdims=True))
 
 
@@ -133,8 +133,8 @@ class FuzzySystem(eqx.Module):
         degrees = even_memberships if self.evenly_spaced else memberships
         basis = degrees(inputs[:, 0], self.centres[0], self.widths[0])
         for j in range(1, self.inputs):
-            other = degrees(inputs[:, j], self.centres[j], self.widths[j])
-            basis = (basis[:, :, None] * other[:, None, :]).reshape(basis.shape[0], -1)
+            degrees_of_input = degrees(inputs[:, j], self.centres[j], self.widths[j])
+            basis = (basis[:, :, None] * degrees_of_input[:, None, :]).reshape(basis.shape[0], -1)
         return basis
 
     def output(self, weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, " n"]:

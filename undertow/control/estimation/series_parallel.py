@@ -40,12 +40,12 @@ class SeriesParallel(eqx.Module):
         """v, m/s^2 and rad/s^2. Eq. (33), Remark 5."""
         return self.compensation_gain * switch(error, self.compensation_layer, self.switching)
 
-    def acceleration(self, error: PerAxis, known: PerAxis, estimate: PerAxis) -> PerAxis:
+    def acceleration(self, error: PerAxis, modelled: PerAxis, estimate: PerAxis) -> PerAxis:
         """x_hat_ddot, m/s^2 and rad/s^2. Eq. (32).
 
         Args:
             error: eps.
-            known: F + G u with the input that was applied; Eq. (30) without d.
+            modelled: F + G u with the input that was applied; Eq. (30) without d.
             estimate: d_hat.
         """
-        return -self.pole * error + known + estimate - self.compensation(error)
+        return -self.pole * error + modelled + estimate - self.compensation(error)

@@ -69,7 +69,7 @@ class InnovationConsistency(NamedTuple):
 
     def inconsistent(self, periods: PerSensor) -> PerSensor:
         """1 for a sensor whose innovations are larger or more correlated than chance makes them, else 0."""
-        entries = np.array([len(one) for one in self.last], dtype=float)
+        entries = np.array([len(innovations) for innovations in self.last], dtype=float)
         independent = jnp.maximum(jnp.minimum(self.readings, _WINDOW / periods), 1.0) * entries
         larger = self.squares > _RMS**2 * (1 + _SURE * jnp.sqrt(2 / independent))
         alike = self.correlation() > _CORRELATION + _SURE / jnp.sqrt(independent)

@@ -49,8 +49,8 @@ class Degraded(AbstractNoiseOnly):
 
     def init(self, realization, truth: Measurement) -> DegradedState:
         for name, sampling in (("position", self.position), ("velocity", self.velocity)):
-            given = {"noise": sampling.noise, "bias": getattr(self, f"{name}_bias"), "resolution": sampling.resolution}
-            for error, value in given.items():
+            errors = {"noise": sampling.noise, "bias": getattr(self, f"{name}_bias"), "resolution": sampling.resolution}
+            for error, value in errors.items():
                 checks.per_axis(f"{name}_{error}", value, len(truth.position))
         none = jnp.zeros_like(truth.position)
         held = (truth.position, truth.velocity)

@@ -36,27 +36,28 @@ class Disagreement(NamedTuple):
         return self._replace(silent=self.silent + elapsed)
 
     def after(
-        self, sensor: int, taken: Bool[Array, ""], known: Bool[Array, ""], square: Number, period: Number
+        self, sensor: int, accepted: Bool[Array, ""], delivered: Bool[Array, ""], square: Number, period: Number
     ) -> "Disagreement":
         """With a reading of a sensor.
 
         Args:
             sensor: its place.
-            taken: whether the filter took it.
-            known: whether there is one.
+            accepted: whether the filter took it.
+            delivered: whether there is one.
             square: normalised square of an entry.
             period: between readings, s.
         """
         tolerance, excess = self.tolerance[sensor], self.excess[sensor]
         step = 2 ** jnp.minimum(period / _DOUBLING, 1.0)
         # What is taken lowers it as slowly: where a wrong reading was believed, the right ones soon are.
-        moved = jnp.where(taken, jnp.maximum(tolerance / step, 1.0), jnp.minimum(tolerance * step, _MOST_TOLERATED))
-        following = jnp.where(known, moved, tolerance)
-        beyond = jnp.where(known, jnp.where(taken, 0.0, jnp.minimum(square, _MOST_TOLERATED)), excess)
+        lowered, raised = jnp.maximum(tolerance / step, 1.0), jnp.minimum(tolerance * step, _MOST_TOLERATED)
+        adjusted = jnp.where(accepted, lowered, raised)
+        new_tolerance = jnp.where(delivered, adjusted, tolerance)
+        new_excess = jnp.where(delivered, jnp.where(accepted, 0.0, jnp.minimum(square, _MOST_TOLERATED)), excess)
         return self._replace(
-            tolerance=self.tolerance.at[sensor].set(following),
-            excess=self.excess.at[sensor].set(beyond),
-            silent=self.silent.at[sensor].set(jnp.where(known, 0.0, self.silent[sensor])),
+            tolerance=self.tolerance.at[sensor].set(new_tolerance),
+            excess=self.excess.at[sensor].set(new_excess),
+            silent=self.silent.at[sensor].set(jnp.where(delivered, 0.0, self.silent[sensor])),
         )
 
     def reopening(
@@ -79,17 +80,17 @@ class Disagreement(NamedTuple):
         growth = jnp.sqrt(jnp.maximum(jnp.where(against, self.excess, 0.0).max(), 1.0))
         deviation = jnp.sqrt(jnp.diagonal(covariance))
         factor = jnp.ones(len(covariance))
-        for part, most in _UNKNOWN:
-            factor = factor.at[part].set(jnp.clip(most / deviation[part], 1.0, growth))
+        for part, largest_deviation in _UNKNOWN:
+            factor = factor.at[part].set(jnp.clip(largest_deviation / deviation[part], 1.0, growth))
         for part in (GYRO_BIAS, FORCE_BIAS):
             factor = factor.at[part].set(jnp.maximum(initial[part] / deviation[part], 1.0))
         factor = jnp.where(outvoted, factor, 1.0)
-        again = self._replace(
+        reopened = self._replace(
             tolerance=jnp.where(outvoted, 1.0, self.tolerance),
             excess=jnp.where(outvoted, 0.0, self.excess),
             reopened=self.reopened + jnp.where(outvoted, 1, 0),
         )
-        return again, covariance * factor[:, None] * factor[None, :]
+        return reopened, covariance * factor[:, None] * factor[None, :]
 
 
 def no_disagreement(sensors: int) -> Disagreement:

@@ -27,19 +27,18 @@ class _Error(NamedTuple):
 
 def drift_advice(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: float) -> tuple[str, ...]:
     """A sentence where an output drifts in `duration` (s), with the sensors that prevent it."""
-    found = drifts(sensors, dvl_blend, duration)
-    if not found:
+    drift_of = drifts(sensors, dvl_blend, duration)
+    if not drift_of:
         return ()
-    sizes = {
-        what: f"{np.degrees(size):.2g} degrees" if what == "yaw" else f"{size:.2g} m" for what, size in found.items()
-    }
-    far = " and ".join(f"{size} ({what})" for what, size in sizes.items())
-    remedies = " and ".join(f"`{_REMEDIES[what]}`" for what in found)
-    unbiased = not any(np.any(np.asarray(one.sampling.bias)) for one in sensors)
-    alone = " by noise alone, to which the biases of real sensors add" if unbiased else ""
+    in_unit = lambda output, size: f"{np.degrees(size):.2g} degrees" if output == "yaw" else f"{size:.2g} m"
+    sizes = {output: in_unit(output, size) for output, size in drift_of.items()}
+    drift_text = " and ".join(f"{size} ({output})" for output, size in sizes.items())
+    remedies = " and ".join(f"`{_REMEDIES[output]}`" for output in drift_of)
+    unbiased = not any(np.any(np.asarray(sensor.sampling.bias)) for sensor in sensors)
+    noise_only = " by noise alone, to which the biases of real sensors add" if unbiased else ""
     return (
-        f"no sensor measures {', '.join(found)}: the estimate drifts by about {far} in {duration:g} s, one standard "
-        f"deviation{alone}. Add {remedies} to `navigation.sensors`",
+        f"no sensor measures {', '.join(drift_of)}: the estimate drifts by about {drift_text} in {duration:g} s, "
+        f"one standard deviation{noise_only}. Add {remedies} to `navigation.sensors`",
     )
 
 
@@ -48,34 +47,35 @@ def drifts(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: fl
 
     Empty where a sensor does not say what it measures, or without an IMU.
     """
-    imu = next((one for one in sensors if isinstance(one, IMU)), None)
-    if imu is None or any(one.fixes is None for one in sensors):
+    imu = next((sensor for sensor in sensors if isinstance(sensor, IMU)), None)
+    if imu is None or any(sensor.fixes is None for sensor in sensors):
         return {}
-    fixed = {output for one in sensors for output in one.fixes or ()}
-    noise, bias = (np.broadcast_to(np.asarray(one, dtype=float), 8) for one in (imu.sampling.noise, imu.sampling.bias))
+    fixed = {output for sensor in sensors for output in sensor.fixes or ()}
+    noise = np.broadcast_to(np.asarray(imu.sampling.noise, dtype=float), 8)
+    bias = np.broadcast_to(np.asarray(imu.sampling.bias, dtype=float), 8)
     g, period = float(gravity()[2]), float(imu.sampling.period)
     error = lambda index, of_gravity: _Error(
         period * (noise[index] ** 2 + (of_gravity * noise[0]) ** 2), float(np.hypot(bias[index], of_gravity * bias[0]))
     )
-    found = {}
+    drift_of = {}
     if not {"north", "east"} <= fixed:
-        found["north and east"] = _of_position(sensors, dvl_blend, error(5, g), 0, duration)
+        drift_of["north and east"] = _of_position(sensors, dvl_blend, error(5, g), 0, duration)
     if "down" not in fixed:
-        found["down"] = _of_position(sensors, dvl_blend, error(7, 0.0), 2, duration)
+        drift_of["down"] = _of_position(sensors, dvl_blend, error(7, 0.0), 2, duration)
     if "yaw" not in fixed:
-        found["yaw"] = _once(error(4, 0.0), duration)
-    return {what: float(drift) for what, drift in found.items() if drift > 0}
+        drift_of["yaw"] = _once(error(4, 0.0), duration)
+    return {output_name: float(drift) for output_name, drift in drift_of.items() if drift > 0}
 
 
 def _of_position(
     sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, acceleration: _Error, axis: int, duration: float
 ) -> float:
     """With the first sensor of velocity, or from the acceleration alone."""
-    for one in sensors:
-        if isinstance(one, AbstractVelocitySensor) and np.isfinite(noise := float(one.velocity_noise()[axis])):
-            held = float(np.asarray(one.sampling.period) / np.asarray(dvl_blend))
-            offset = float(np.ravel(np.broadcast_to(np.asarray(one.sampling.bias, dtype=float), 3))[axis])
-            density = float(one.sampling.period) * noise**2 + acceleration.density * held**2
+    for sensor in sensors:
+        if isinstance(sensor, AbstractVelocitySensor) and np.isfinite(noise := float(sensor.velocity_noise()[axis])):
+            held = float(np.asarray(sensor.sampling.period) / np.asarray(dvl_blend))
+            offset = float(np.ravel(np.broadcast_to(np.asarray(sensor.sampling.bias, dtype=float), 3))[axis])
+            density = float(sensor.sampling.period) * noise**2 + acceleration.density * held**2
             return _once(_Error(density, float(np.hypot(offset, acceleration.offset * held))), duration)
     return float(np.sqrt(acceleration.density * duration**3 / 3 + (acceleration.offset * duration**2 / 2) ** 2))
 

@@ -98,7 +98,8 @@ class SensorNavigation(AbstractInformedNavigation):
 
     def realize(self, key):
         """A key for each sensor, then one for their faults and one for their correlated errors, where there are any."""
-        count, disturbed = len(self.filter.sensors), any(count_errors(one) for one in self.filter.sensors)
+        count = len(self.filter.sensors)
+        disturbed = any(count_errors(sensor) for sensor in self.filter.sensors)
         return jax.random.split(key, count + (self.faults is not None) + disturbed)
 
     def simulated_sensors(self):
@@ -106,9 +107,9 @@ class SensorNavigation(AbstractInformedNavigation):
 
     def velocity_noise(self, dt):
         """Noise density of all sensors, spread over every control step; the memory of the filters is neglected."""
-        sensors = [one for one in self.filter.sensors if isinstance(one, AbstractVelocitySensor)]
-        densities = [one.velocity_noise() ** 2 * one.sampling.period for one in sensors]
-        density = 1 / sum(1 / jnp.maximum(each, _NOISELESS) for each in densities)
+        sensors = [sensor for sensor in self.filter.sensors if isinstance(sensor, AbstractVelocitySensor)]
+        densities = [sensor.velocity_noise() ** 2 * sensor.sampling.period for sensor in sensors]
+        density = 1 / sum(1 / jnp.maximum(sensor_density, _NOISELESS) for sensor_density in densities)
         return jnp.where(jnp.isfinite(density) & (density > 2 * _NOISELESS), jnp.sqrt(density / dt), 0.0)
 
     def init(self, realization, truth: Measurement) -> SensorNavigationState:
@@ -139,9 +140,9 @@ class SensorNavigation(AbstractInformedNavigation):
         faults = state.faults
         if self.faults is not None:
             received, faults = self.faults.received(realization[len(received)], faults, t, received)
-        lost = [one.fresh & ~jnp.isfinite(one.reading).all() for one in received]
+        unusable = [delivery.fresh & ~jnp.isfinite(delivery.reading).all() for delivery in received]
         estimated = self.filter.update(state.filter, t - state.time, received)
-        ignored = state.ignored + sum(jnp.where(one, 1, 0) for one in lost)
+        ignored = state.ignored + sum(jnp.where(flag, 1, 0) for flag in unusable)
         after = SensorNavigationState(t, velocity, states, estimated, ignored, faults, self._errors(estimated, truth))
         return self.filter.measurement(estimated), after
 
@@ -169,17 +170,17 @@ class SensorNavigation(AbstractInformedNavigation):
         return received, tuple(states for _, states in deliveries), motion.velocity
 
     def signals(self):
-        found = self.filter.signals()
+        signals = self.filter.signals()
         if isinstance(self.filter, AbstractCovarianceFilter):
             meaning = "normalised estimation error squared of position, velocity and attitude; 9 is as the filter says"
-            found = found | {"nees": Signal((), "1", meaning)}
-        return found
+            signals = signals | {"nees": Signal((), "1", meaning)}
+        return signals
 
     def diagnostics(self, state: SensorNavigationState):
-        found = self.filter.diagnostics(state.filter)
+        values = self.filter.diagnostics(state.filter)
         if isinstance(self.filter, AbstractCovarianceFilter):
-            found = found | {"nees": normalised_square(state.errors, self.filter.error_covariance(state.filter))}
-        return found
+            values = values | {"nees": normalised_square(state.errors, self.filter.error_covariance(state.filter))}
+        return values
 
     def _errors(self, estimated: PyTree, truth: Measurement) -> Any:
         return self.filter.errors(estimated, truth) if isinstance(self.filter, AbstractCovarianceFilter) else ()
@@ -200,12 +201,12 @@ def count_errors(sensor: AbstractSensor) -> int:
 
 def sensor_names(sensors: Sequence[AbstractSensor]) -> list[str]:
     """A name for each sensor: that of its class in lower case, with a number from the second on."""
-    found: list[str] = []
+    names: list[str] = []
     for sensor in sensors:
         plain = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(sensor).__name__).lower()
-        same = sum(name == plain or name.startswith(f"{plain}_") for name in found)
-        found.append(f"{plain}_{same + 1}" if same else plain)
-    return found
+        same = sum(name == plain or name.startswith(f"{plain}_") for name in names)
+        names.append(f"{plain}_{same + 1}" if same else plain)
+    return names
 
 
 def check_sensors(sensors: Sequence[AbstractSensor]) -> None:
@@ -224,10 +225,10 @@ def check_sensors(sensors: Sequence[AbstractSensor]) -> None:
 
 def _chances(keys, numbers, readings) -> list:
     """Standard normal numbers, one per entry of each reading and one more, in one call, which compiles faster."""
-    most = max(reading.size for reading in readings) + 1
-    normal = lambda key, number: jax.random.normal(numbered(key, number), (most,), dtype=readings[0].dtype)
-    together = jax.vmap(normal)(keys, numbers)
-    return [row[: reading.size + 1] for row, reading in zip(together, readings, strict=True)]
+    width = max(reading.size for reading in readings) + 1
+    normal = lambda key, number: jax.random.normal(numbered(key, number), (width,), dtype=readings[0].dtype)
+    rows = jax.vmap(normal)(keys, numbers)
+    return [row[: reading.size + 1] for row, reading in zip(rows, readings, strict=True)]
 
 
 def _error_chances(key, numbers, sensors: Sequence[AbstractSensor], dtype) -> list[Array | None]:
@@ -236,5 +237,5 @@ def _error_chances(key, numbers, sensors: Sequence[AbstractSensor], dtype) -> li
     if not any(counts):
         return [None] * len(sensors)
     normal = lambda key, number: jax.random.normal(numbered(key, number), (max(counts),), dtype=dtype)
-    together = jax.vmap(normal)(jax.random.split(key, len(sensors)), numbers)
-    return [row[:count] if count else None for row, count in zip(together, counts, strict=True)]
+    rows = jax.vmap(normal)(jax.random.split(key, len(sensors)), numbers)
+    return [row[:count] if count else None for row, count in zip(rows, counts, strict=True)]

@@ -54,11 +54,11 @@ def spread(
     in_world = lambda density: (rotation[:, None, :] * rotation[None, :, :] * density[None, None, :]).sum(-1)
     turning = in_world(of_rates)
     sideways = product(across, turning)  # noise of the gyroscopes turns the velocity in body axes
-    gained = jnp.zeros(covariance.shape)
-    gained = gained.at[ATTITUDE, ATTITUDE].set(turning).at[GYRO_BIAS, GYRO_BIAS].set(of_gyro_bias * jnp.eye(3))
-    gained = gained.at[VELOCITY, ATTITUDE].set(sideways).at[ATTITUDE, VELOCITY].set(sideways.T)
-    gained = gained.at[VELOCITY, VELOCITY].set(in_world(of_force) - product(sideways, across))
-    return covariance + h * gained.at[FORCE_BIAS, FORCE_BIAS].set(of_force_bias * jnp.eye(3))
+    noise = jnp.zeros(covariance.shape)
+    noise = noise.at[ATTITUDE, ATTITUDE].set(turning).at[GYRO_BIAS, GYRO_BIAS].set(of_gyro_bias * jnp.eye(3))
+    noise = noise.at[VELOCITY, ATTITUDE].set(sideways).at[ATTITUDE, VELOCITY].set(sideways.T)
+    noise = noise.at[VELOCITY, VELOCITY].set(in_world(of_force) - product(sideways, across))
+    return covariance + h * noise.at[FORCE_BIAS, FORCE_BIAS].set(of_force_bias * jnp.eye(3))
 
 
 def product(a: Array, b: Array) -> Array:

@@ -58,8 +58,10 @@ class InertialGate(eqx.Module):
     def _acceleration(self) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
         """The largest ones along and about the axes of the body, m/s^2 and rad/s^2."""
         linear, angular = (
-            jnp.where(given > 0, jnp.maximum(self.inertial_factor * given, least), unknown)
-            for given, least, unknown in zip((self.authority[:3], self.authority[3:]), _LEAST, _UNKNOWN, strict=True)
+            jnp.where(authority > 0, jnp.maximum(self.inertial_factor * authority, least), unknown)
+            for authority, least, unknown in zip(
+                (self.authority[:3], self.authority[3:]), _LEAST, _UNKNOWN, strict=True
+            )
         )
         return linear, angular
 
@@ -140,11 +142,11 @@ def gate_for(authority, inertial_factor, largest_rate) -> InertialGate:
     """
     checks.positive("inertial_factor", inertial_factor)
     checks.positive("largest_rate", largest_rate, "rad/s")
-    given = as_array(np.zeros(6) if authority is None else authority)
-    if given.shape != (6,):
-        raise BadInput("authority", "be six numbers, m/s^2 and rad/s^2", f"of shape {given.shape}")
-    checks.not_negative("authority", given, "m/s^2, rad/s^2")
-    return InertialGate(given, inertial_factor, largest_rate)
+    authority_per_axis = as_array(np.zeros(6) if authority is None else authority)
+    if authority_per_axis.shape != (6,):
+        raise BadInput("authority", "be six numbers, m/s^2 and rad/s^2", f"of shape {authority_per_axis.shape}")
+    checks.not_negative("authority", authority_per_axis, "m/s^2, rad/s^2")
+    return InertialGate(authority_per_axis, inertial_factor, largest_rate)
 
 
 def inertial_deviation(imu: IMU, scale: Number = 1.0) -> Inertial:

@@ -119,9 +119,8 @@ class Kalman(AbstractCovarianceFilter):
         )
 
     def update(self, state: KalmanState, elapsed: Number, received: tuple[Received, ...]) -> KalmanState:
-        imu, inertial = next(
-            (sensor, one) for sensor, one in zip(self.sensors, received, strict=True) if isinstance(sensor, IMU)
-        )
+        deliveries = tuple(zip(self.sensors, received, strict=True))
+        imu, inertial = next((sensor, delivery) for sensor, delivery in deliveries if isinstance(sensor, IMU))
         deviation = inertial_deviation(imu, self.noise_scale)
         memory = self.inertial.received(state.inertial, elapsed, inertial.reading[2:], inertial.fresh, deviation)
         covariance = self.covariance(state)
@@ -148,11 +147,11 @@ class Kalman(AbstractCovarianceFilter):
             covariance = faded(covariance, errors, elapsed)
             state = state._replace(sensor_errors=errors.kept(elapsed) * state.sensor_errors)
         opened = jnp.zeros(len(covariance))
-        for i, (sensor, one) in enumerate(zip(self.sensors, received, strict=True)):
+        for i, (sensor, delivery) in enumerate(deliveries):
             if isinstance(sensor, PropellerSpeed):
-                state = state._replace(actuator=_propellers(state.actuator, sensor, one))
+                state = state._replace(actuator=_propellers(state.actuator, sensor, delivery))
             else:
-                state, covariance, distrust = self._corrected(state, covariance, i, one)
+                state, covariance, distrust = self._corrected(state, covariance, i, delivery)
                 opened = opened + distrust
         # What is tolerated after many rejections opens the gate for the next reading.
         covariance = covariance + jnp.where(np.eye(len(covariance), dtype=bool), opened[:, None], 0.0)
@@ -226,7 +225,7 @@ class Kalman(AbstractCovarianceFilter):
     def advice(self, duration):
         # One program: by itself each of its hundred operations would be compiled.
         sensed, initial, noise = jax.tree.map(np.asarray, eqx.filter_jit(Kalman._at_rest)(self))
-        return drift_sentences([Sensed(*one) for one in sensed], initial, noise, duration)
+        return drift_sentences([Sensed(*entry) for entry in sensed], initial, noise, duration)
 
     def _at_rest(self) -> tuple[list[tuple[Array, Array, Array]], Array, Array]:
         """Of a vehicle at rest and level: slopes, variance and period of each sensor, deviations at first, noise."""
@@ -236,17 +235,17 @@ class Kalman(AbstractCovarianceFilter):
             if not isinstance(sensor, PropellerSpeed):
                 slopes = expected_reading(level, sensor, 0.0, None)[1]
                 sensed.append((slopes, self.variance(sensor, len(slopes)), jnp.asarray(sensor.sampling.period)))
-        of_rates, of_force = self.inertial_noise(next(one for one in self.sensors if isinstance(one, IMU)))
-        one = jnp.ones(3)
-        drifts = [of_rates, self.gyro_drift**2 * one, of_force, self.force_drift**2 * one, 0 * one]
+        of_rates, of_force = self.inertial_noise(next(sensor for sensor in self.sensors if isinstance(sensor, IMU)))
+        ones = jnp.ones(3)
+        drifts = [of_rates, self.gyro_drift**2 * ones, of_force, self.force_drift**2 * ones, 0 * ones]
         return sensed, self.initial_deviations(), jnp.concatenate(drifts)
 
     def initial_deviations(self) -> Float[Array, "15"]:
         """Standard deviations of the errors at the start."""
         tilt, heading, biased = self.tilt_deviation, self.heading_deviation, self.gyro_bias_deviation
-        whole = [tilt, tilt, heading, *[biased] * 3, *[self.velocity_deviation] * 3]
-        whole += [*[self.force_bias_deviation] * 3, *[self.position_deviation] * 3]
-        return jnp.stack([jnp.asarray(one, dtype=float) for one in whole])
+        deviations = [tilt, tilt, heading, *[biased] * 3, *[self.velocity_deviation] * 3]
+        deviations += [*[self.force_bias_deviation] * 3, *[self.position_deviation] * 3]
+        return jnp.stack([jnp.asarray(deviation, dtype=float) for deviation in deviations])
 
     def _sensor_errors(self) -> CorrelatedErrors | None:
         """Correlated errors of the sensors that are states of this filter."""
@@ -273,52 +272,56 @@ class Kalman(AbstractCovarianceFilter):
         """Variance of each entry of a reading: of noise, resolution and offset."""
         sampling = sensor.sampling
         square = jnp.asarray(sampling.noise) ** 2 + jnp.asarray(sampling.resolution) ** 2 / 12
-        whole = (square + jnp.asarray(sampling.bias) ** 2) * self.noise_scale**2
+        variance = (square + jnp.asarray(sampling.bias) ** 2) * self.noise_scale**2
         if isinstance(sensor, IMU):
-            whole = jnp.broadcast_to(whole, (8,))[:width]
-        return jnp.maximum(jnp.broadcast_to(whole, (width,)), _LEAST_VARIANCE)
+            variance = jnp.broadcast_to(variance, (8,))[:width]
+        return jnp.maximum(jnp.broadcast_to(variance, (width,)), _LEAST_VARIANCE)
 
     def _corrected(
-        self, state: KalmanState, covariance: Covariance, i: int, one: Received
+        self, state: KalmanState, covariance: Covariance, i: int, delivery: Received
     ) -> tuple[KalmanState, Covariance, Float[Array, " states"]]:
         """State and covariance with a reading, entry by entry; as they are where it is rejected or there is none.
 
         And the variances that a reading adds which is rejected, but tolerated.
         """
         sensor = self.sensors[i]
-        reading = one.reading[:2] if isinstance(sensor, IMU) else one.reading
+        reading = delivery.reading[:2] if isinstance(sensor, IMU) else delivery.reading
         states = error_states(self.sensors, MOTION_STATES)[i] if state.sensor_errors is not None else None
-        expected, slopes = expected_reading(state, sensor, jnp.minimum(one.age, self.longest_delay), states)
+        expected, slopes = expected_reading(state, sensor, jnp.minimum(delivery.age, self.longest_delay), states)
         error = reading - expected
         for entry in sensor.angles:
             error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
-        there = jnp.isfinite(reading)
-        error, posterior = jnp.where(there, error, 0.0), covariance
+        readable = jnp.isfinite(reading)
+        error, posterior = jnp.where(readable, error, 0.0), covariance
         correction, square, normalised = jnp.zeros(len(covariance)), jnp.zeros(()), []
         diagonal = np.eye(len(covariance), dtype=bool)
+        # The noise of the entries is independent, so that one scalar update after the other is the update by all of
+        # them, without the inverse of a matrix. Each subtracts the square of a vector: the covariance stays symmetric.
         for k, variance in enumerate(self.variance(sensor, len(reading))):
             shared = product(posterior, slopes[k])
             total = (slopes[k] * shared).sum() + variance
-            left = error[k] - (slopes[k] * correction).sum()
-            gain, share = shared / jnp.sqrt(total), jnp.where(there[k], 1.0, 0.0)
-            square = square + share * left**2 / total
-            normalised.append(share * left / jnp.sqrt(total))
-            correction = correction + share * left / total * shared
+            residual = error[k] - (slopes[k] * correction).sum()
+            gain, share = shared / jnp.sqrt(total), jnp.where(readable[k], 1.0, 0.0)
+            square = square + share * residual**2 / total
+            normalised.append(share * residual / jnp.sqrt(total))
+            correction = correction + share * residual / total * shared
             posterior = posterior - share * gain[:, None] * gain[None, :]
-            least = share * (gain**2 / total) * variance  # no variance is below what the reading's noise leaves
-            posterior = jnp.where(diagonal, jnp.maximum(posterior, least[:, None]), posterior)
-        count = jnp.where(there, 1.0, 0.0).sum()
-        known, gate = one.fresh & (count > 0), self.gate**2 * count
-        taken = known & (square <= gate)
+            # No variance is below what the reading's noise leaves.
+            least_variance = share * (gain**2 / total) * variance
+            posterior = jnp.where(diagonal, jnp.maximum(posterior, least_variance[:, None]), posterior)
+        count = jnp.where(readable, 1.0, 0.0).sum()
+        delivered = delivery.fresh & (count > 0)
+        gate = self.gate**2 * count
+        accepted = delivered & (square <= gate)
         period = sensor.sampling.period
-        tolerated = known & ~taken & (square <= gate * state.disagreement.tolerance[i])
-        disagreement = state.disagreement.after(i, taken, known, square / jnp.maximum(count, 1.0), period)
+        tolerated = delivered & ~accepted & (square <= gate * state.disagreement.tolerance[i])
+        disagreement = state.disagreement.after(i, accepted, delivered, square / jnp.maximum(count, 1.0), period)
         # One reading far away says nothing of the others: it counts as at the gate.
-        most = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
-        innovation = jnp.clip(jnp.stack(normalised), -most, most)
-        innovation = jnp.where(jnp.isnan(innovation), most, innovation)
-        monitor = state.monitor.updated(i, innovation, count, known, period)
-        correction = jnp.where(taken, correction, 0.0)
+        largest_innovation = self.gate * jnp.sqrt(jnp.maximum(count, 1.0))
+        innovation = jnp.clip(jnp.stack(normalised), -largest_innovation, largest_innovation)
+        innovation = jnp.where(jnp.isnan(innovation), largest_innovation, innovation)
+        monitor = state.monitor.updated(i, innovation, count, delivered, period)
+        correction = jnp.where(accepted, correction, 0.0)
         turn = quaternion_of_turn(correction[ATTITUDE])
         turned = quaternion_product(turn, state.attitude)
         after = state._replace(
@@ -328,12 +331,12 @@ class Kalman(AbstractCovarianceFilter):
             gyro_bias=state.gyro_bias + correction[GYRO_BIAS],
             force_bias=state.force_bias + correction[FORCE_BIAS],
             disagreement=disagreement,
-            rejected=state.rejected + jnp.where(known & ~taken, 1, 0),
+            rejected=state.rejected + jnp.where(delivered & ~accepted, 1, 0),
             monitor=monitor,
             sensor_errors=None if state.sensor_errors is None else state.sensor_errors + correction[MOTION_STATES:],
         )
         opened = jnp.where(tolerated, distrusted(covariance, slopes, error), 0.0)
-        return after, jnp.where(taken, posterior, covariance), opened
+        return after, jnp.where(accepted, posterior, covariance), opened
 
 
 _DEVIATIONS = (
@@ -354,13 +357,13 @@ def _turned(attitude: Quaternion, turn: Vector3) -> Quaternion:
     return after / jnp.sqrt((after * after).sum())
 
 
-def _propellers(report: Any, sensor: PropellerSpeed, one: Received) -> Any:
+def _propellers(report: Any, sensor: PropellerSpeed, delivery: Received) -> Any:
     """Speeds as read; their rate of change is the difference of successive readings."""
-    new = one.fresh & jnp.isfinite(one.reading)
-    after = report._replace(speed=jnp.where(new, one.reading, report.speed))
+    new = delivery.fresh & jnp.isfinite(delivery.reading)
+    after = report._replace(speed=jnp.where(new, delivery.reading, report.speed))
     if report.acceleration is None:
         return after
-    rate = (one.reading - report.speed) / sensor.sampling.period
+    rate = (delivery.reading - report.speed) / sensor.sampling.period
     return after._replace(acceleration=jnp.where(new, rate, report.acceleration))
 
 

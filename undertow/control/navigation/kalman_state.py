@@ -72,23 +72,24 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
         of_errors: states of the correlated errors of this sensor; None where those of no sensor are states.
     """
     past = state.history.at(age)
-    then = quaternion_product(state.attitude, quaternion_product(conjugate(state.history.attitude), past.attitude))
-    rotation, fallen = rotation_from_quaternion(then), age * gravity()
+    turn_back = quaternion_product(conjugate(state.history.attitude), past.attitude)
+    past_attitude = quaternion_product(state.attitude, turn_back)
+    rotation, fallen = rotation_from_quaternion(past_attitude), age * gravity()
     estimated = jnp.zeros(0)
     if of_errors is not None and state.sensor_errors is not None:
         estimated = state.sensor_errors[of_errors.start - MOTION_STATES : of_errors.stop - MOTION_STATES]
 
     def read(errors):
-        turn, faster, moved = errors[:3], errors[3:6], errors[6:9]
-        velocity = state.velocity + faster + cross(turn, state.velocity)
-        turned = rotation + product(skew(turn), rotation)
+        attitude_error, velocity_error, position_error = errors[:3], errors[3:6], errors[6:9]
+        velocity = state.velocity + velocity_error + cross(attitude_error, state.velocity)
+        turned = rotation + product(skew(attitude_error), rotation)
         # What accelerated the body since then is turned with it, gravity is not.
-        displaced = past.displacement + cross(turn, past.displacement - age / 2 * fallen)
+        displaced = past.displacement + cross(attitude_error, past.displacement - age / 2 * fallen)
         motion = Motion(
-            position=state.position + moved + displaced - age * velocity,
+            position=state.position + position_error + displaced - age * velocity,
             angles=euler_from_rotation(turned),
             rotation=turned,
-            velocity=velocity + past.velocity + cross(turn, past.velocity + fallen),
+            velocity=velocity + past.velocity + cross(attitude_error, past.velocity + fallen),
             rates=state.rates - state.gyro_bias,
             specific_force=state.force - state.force_bias,
             actuator=state.actuator,
@@ -102,15 +103,15 @@ def expected_reading(state: KalmanState, sensor: AbstractSensor, age: Number, of
     slopes, zero = jax.jacfwd(read)(none), jnp.zeros
     of = lambda errors: slopes[:, errors]
     rows = slopes.shape[0]
-    whole = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
+    blocks = [of(slice(0, 3)), zero((rows, 3)), of(slice(3, 6)), zero((rows, 3)), of(slice(6, 9))]
     if of_errors is not None and state.sensor_errors is not None:
         # Where tilt is known from the accelerometers alone, a late velocity without this would tell it from their bias.
-        faster, moved = age * rotation, age**2 / 2 * rotation
-        whole[3] = product(of(slice(3, 6)), faster) + product(of(slice(6, 9)), moved)
+        velocity_slope, position_slope = age * rotation, age**2 / 2 * rotation
+        blocks[3] = product(of(slice(3, 6)), velocity_slope) + product(of(slice(6, 9)), position_slope)
         last = MOTION_STATES + len(state.sensor_errors)
-        whole += [
+        blocks += [
             zero((rows, of_errors.start - MOTION_STATES)),
             of(slice(9, None)),
             zero((rows, last - of_errors.stop)),
         ]
-    return read(none), jnp.concatenate(whole, axis=1)
+    return read(none), jnp.concatenate(blocks, axis=1)

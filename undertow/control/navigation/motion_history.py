@@ -41,37 +41,37 @@ class MotionHistory(NamedTuple):
             attitude: afterwards, without corrections.
             spacing: between two slots, s.
         """
-        gained = elapsed * acceleration[None]
+        velocity_gain = elapsed * acceleration[None]
         age = self.age + elapsed
         # Relative to the new velocity, which is larger by what was gained, an old place lies ahead.
-        displacement = self.displacement + (self.age + elapsed / 2)[:, None] * gained
-        old = age, displacement, self.velocity - gained, self.attitudes
+        displacement = self.displacement + (self.age + elapsed / 2)[:, None] * velocity_gain
+        old = age, displacement, self.velocity - velocity_gain, self.attitudes
         now = jnp.zeros(()), jnp.zeros(3), jnp.zeros(3), attitude
         due = age[0] >= spacing
         shifted = [
-            jnp.where(due, jnp.concatenate([jnp.asarray(new)[None], kept[:-1]]), kept)
-            for new, kept in zip(now, old, strict=True)
+            jnp.where(due, jnp.concatenate([jnp.asarray(new)[None], slots[:-1]]), slots)
+            for new, slots in zip(now, old, strict=True)
         ]
         return MotionHistory(*shifted, attitude=attitude)
 
     def at(self, age: Number) -> Past:
         """The motion `age` (s) ago, by cubic interpolation; the oldest kept one before that."""
         newer = jnp.concatenate([jnp.zeros(1), self.age[:-1]])
-        here = ((newer <= age) & (age < self.age))[:, None]
+        enclosing = ((newer <= age) & (age < self.age))[:, None]
         beyond = age >= self.age[-1]
         before = lambda values, now: jnp.concatenate([now[None], values[:-1]])
-        chosen = lambda values: jnp.where(here, values, 0.0).sum(0)
+        in_slot = lambda values: jnp.where(enclosing, values, 0.0).sum(0)
         zero = jnp.zeros(3)
-        start, end = chosen(newer[:, None])[0], chosen(self.age[:, None])[0]
+        start, end = in_slot(newer[:, None])[0], in_slot(self.age[:, None])[0]
         length = jnp.where(beyond, 1.0, end - start)
         s = jnp.where(beyond, 0.0, (age - start) / length)
-        p0, p1 = chosen(before(self.displacement, zero)), chosen(self.displacement)
-        v0, v1 = chosen(before(self.velocity, zero)), chosen(self.velocity)
+        p0, p1 = in_slot(before(self.displacement, zero)), in_slot(self.displacement)
+        v0, v1 = in_slot(before(self.velocity, zero)), in_slot(self.velocity)
         # Hermite's cubic; the displacement falls with age at the rate of the velocity.
         m0, m1 = -length * v0, -length * v1
         position = p0 + s * (m0 + s * (3 * (p1 - p0) - 2 * m0 - m1 + s * (2 * (p0 - p1) + m0 + m1)))
         rate = m0 + s * (6 * (p1 - p0) - 4 * m0 - 2 * m1 + 3 * s * (2 * (p0 - p1) + m0 + m1))
-        q0, q1 = chosen(before(self.attitudes, self.attitude)), chosen(self.attitudes)
+        q0, q1 = in_slot(before(self.attitudes, self.attitude)), in_slot(self.attitudes)
         turned = (1 - s) * q0 + s * jnp.where((q0 * q1).sum() < 0, -q1, q1)
         turned = jnp.where(beyond, self.attitudes[-1], turned)
         attitude = turned / jnp.sqrt((turned * turned).sum())

@@ -27,23 +27,26 @@ class Sensed(NamedTuple):
 
 def error_dynamics() -> np.ndarray:
     """Matrix A of e_dot = A e at rest: gravity turns an error of the attitude into one of the acceleration."""
-    a, one = np.zeros((_SIZE, _SIZE)), np.eye(3)
+    a, identity = np.zeros((_SIZE, _SIZE)), np.eye(3)
     g = float(gravity()[2])
     force = np.array([[0, g, 0], [-g, 0, 0], [0, 0, 0]])  # cross product with the specific force (0, 0, -g)
-    a[0:3, 3:6], a[6:9, 0:3], a[6:9, 9:12], a[12:15, 6:9] = -one, -force, -one, one
+    a[0:3, 3:6] = -identity
+    a[6:9, 0:3] = -force
+    a[6:9, 9:12] = -identity
+    a[12:15, 6:9] = identity
     return a
 
 
 def unobservable(sensed: list[Sensed]) -> list[str]:
     """Outputs that no sensor determines, by the rank of the observability matrix."""
     a = error_dynamics()
-    rows = np.concatenate([one.slopes for one in sensed]) if sensed else np.zeros((0, _SIZE))
+    rows = np.concatenate([sensor.slopes for sensor in sensed]) if sensed else np.zeros((0, _SIZE))
     blocks = [rows]
     for _ in range(_SIZE - 1):
         blocks.append(blocks[-1] @ a)
     _, sizes, directions = np.linalg.svd(np.concatenate(blocks))
-    seen = directions[: int((sizes > 1e-9 * max(1.0, sizes.max(initial=0.0))).sum())]
-    return [name for name, i in _OUTPUTS.items() if 1 - (seen[:, i] ** 2).sum() > _NEGLIGIBLE]
+    observed = directions[: int((sizes > 1e-9 * max(1.0, sizes.max(initial=0.0))).sum())]
+    return [name for name, i in _OUTPUTS.items() if 1 - (observed[:, i] ** 2).sum() > _NEGLIGIBLE]
 
 
 def deviations(sensed: list[Sensed], initial: np.ndarray, noise: np.ndarray, duration: float) -> dict[str, float]:
@@ -61,12 +64,12 @@ def deviations(sensed: list[Sensed], initial: np.ndarray, noise: np.ndarray, dur
     step = max(0.02, duration / _STEPS)
     a = step * error_dynamics()
     after = np.eye(_SIZE) + a + a @ a / 2 + a @ a @ a / 6
-    covariance, gained = np.diag(np.asarray(initial) ** 2), step * np.diag(noise)
-    slopes = np.concatenate([one.slopes for one in sensed]) if sensed else np.zeros((0, _SIZE))
+    covariance, process_noise = np.diag(np.asarray(initial) ** 2), step * np.diag(noise)
+    slopes = np.concatenate([sensor.slopes for sensor in sensed]) if sensed else np.zeros((0, _SIZE))
     # As much information per second as the readings have.
-    variance = np.concatenate([one.variance * one.period / step for one in sensed]) if sensed else np.zeros(0)
+    variance = np.concatenate([sensor.variance * sensor.period / step for sensor in sensed]) if sensed else np.zeros(0)
     for _ in range(round(duration / step)):
-        covariance = after @ covariance @ after.T + gained
+        covariance = after @ covariance @ after.T + process_noise
         shared = covariance @ slopes.T
         covariance = covariance - shared @ np.linalg.solve(slopes @ shared + np.diag(variance), shared.T)
         covariance = (covariance + covariance.T) / 2
@@ -78,15 +81,17 @@ def drift_sentences(sensed: list[Sensed], initial: np.ndarray, noise: np.ndarray
     unseen = unobservable(sensed)
     if not unseen:
         return ()
-    found = deviations(sensed, initial, noise, duration)
+    deviation_of = deviations(sensed, initial, noise, duration)
+    is_angle = lambda name: name in _OUTPUTS and _OUTPUTS[name] < 3
     sized = lambda name: (
-        f"{np.degrees(found[name]):.2g} degrees" if name in _OUTPUTS and _OUTPUTS[name] < 3 else f"{found[name]:.2g} m"
+        f"{np.degrees(deviation_of[name]):.2g} degrees" if is_angle(name) else f"{deviation_of[name]:.2g} m"
     )
-    far = ", ".join(f"{sized(name)} ({name})" for name in unseen)
+    drift_text = ", ".join(f"{sized(name)} ({name})" for name in unseen)
     remedies = " and ".join(
         f"`{remedy}`" for remedy in dict.fromkeys(_REMEDIES[name] for name in unseen if name in _REMEDIES)
     )
     return (
-        f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest: the estimate drifts by about {far} in "
-        f"{duration:g} s, one standard deviation" + (f". Add {remedies} to `navigation.sensors`" if remedies else ""),
+        f"the sensors cannot observe {', '.join(unseen)} of a vehicle at rest: the estimate drifts by "
+        f"about {drift_text} in {duration:g} s, one standard deviation"
+        + (f". Add {remedies} to `navigation.sensors`" if remedies else ""),
     )

@@ -84,17 +84,17 @@ class Observer(AbstractFilter):
     def update(
         self, state: NavigationObserverState, elapsed, received: tuple[Received, ...]
     ) -> NavigationObserverState:
-        news = [
-            (sensor, one.reading, one.fresh & jnp.isfinite(one.reading).all(), one.age)
-            for sensor, one in zip(self.sensors, received, strict=True)
+        readings = [
+            (sensor, delivery.reading, delivery.fresh & jnp.isfinite(delivery.reading).all(), delivery.age)
+            for sensor, delivery in zip(self.sensors, received, strict=True)
         ]
         estimate, memory = state
-        for sensor, reading, new, _ in news:
+        for sensor, reading, new, _ in readings:
             if isinstance(sensor, IMU):
                 memory = self.inertial.received(memory, elapsed, reading[2:], new, inertial_deviation(sensor))
                 estimate = _either(new, _with_inertial(estimate, memory.values), estimate)
         estimate = estimate.predicted(elapsed)
-        for sensor, reading, new, age in news:
+        for sensor, reading, new, age in readings:
             correct = next(_CORRECTIONS[kind] for kind in _CORRECTIONS if isinstance(sensor, kind))
             estimate = _either(new, correct(self, sensor, estimate, reading, age), estimate)
         return NavigationObserverState(estimate, memory)
@@ -119,34 +119,34 @@ def _with_inertial(estimate: Estimate, sample: Inertial) -> Estimate:
     return estimate._replace(rates=sample[:3], acceleration=acceleration)
 
 
-def _inclination(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
-    return _turned(estimate, jnp.concatenate([reading[:2], estimate.angles()[2:]]), own.imu_blend)
+def _inclination(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _turned(estimate, jnp.concatenate([reading[:2], estimate.angles()[2:]]), observer.imu_blend)
 
 
-def _heading(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
-    now = reading + age * estimate.rates[2]
-    return _turned(estimate, jnp.concatenate([estimate.angles()[:2], now]), own.compass_blend)
+def _heading(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    heading = reading + age * estimate.rates[2]
+    return _turned(estimate, jnp.concatenate([estimate.angles()[:2], heading]), observer.compass_blend)
 
 
-def _velocity(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+def _velocity(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
     """Compare the reading with the velocity at its time, from the acceleration since."""
-    then = estimate.velocity - age * estimate.acceleration
-    error = matvec(estimate.rotation(), reading) - then
-    return estimate._replace(velocity=estimate.velocity + own.dvl_blend * error)
+    past_velocity = estimate.velocity - age * estimate.acceleration
+    error = matvec(estimate.rotation(), reading) - past_velocity
+    return estimate._replace(velocity=estimate.velocity + observer.dvl_blend * error)
 
 
-def _down(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
-    return _fixed(estimate, slice(2, 3), reading, age, sensor.sampling.period, own.depth_blend)
+def _down(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _fixed(estimate, slice(2, 3), reading, age, sensor.sampling.period, observer.depth_blend)
 
 
-def _level(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
-    return _fixed(estimate, slice(0, 2), reading, age, sensor.sampling.period, own.fix_blend)
+def _level(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+    return _fixed(estimate, slice(0, 2), reading, age, sensor.sampling.period, observer.fix_blend)
 
 
-def _propellers(own: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
+def _propellers(observer: Observer, sensor, estimate: Estimate, reading, age) -> Estimate:
     """Speeds; their rate of change is the difference of successive readings."""
     before = estimate.actuator.speed
-    speed = before + own.propeller_blend * (reading - before)
+    speed = before + observer.propeller_blend * (reading - before)
     report = estimate.actuator._replace(speed=speed)
     if report.acceleration is not None:
         report = report._replace(acceleration=(speed - before) / sensor.sampling.period)
@@ -166,8 +166,8 @@ _CORRECTIONS = {
 
 def _turned(estimate: Estimate, angles: Vector3, share) -> Estimate:
     """The estimate with its attitude turned by a share of the way towards Euler angles (rad)."""
-    there = quaternion_from_euler(angles)
-    aligned = jnp.where((there * estimate.attitude).sum() < 0, -there, there)
+    goal = quaternion_from_euler(angles)
+    aligned = jnp.where((goal * estimate.attitude).sum() < 0, -goal, goal)
     between = (1 - share) * estimate.attitude + share * aligned
     return estimate._replace(attitude=between / jnp.sqrt((between * between).sum()))
 
@@ -177,8 +177,8 @@ def _fixed(estimate: Estimate, axes: slice, reading: Float[Array, " k"], age, pe
 
     beta = alpha^2 / (2 - alpha) is that of Benedict and Bordner (1962), optimal for a given noise.
     """
-    then = estimate.position[axes] - age * estimate.velocity[axes]
-    error, beta = jnp.zeros(3).at[axes].set(reading - then), share**2 / (2 - share)
+    past_position = estimate.position[axes] - age * estimate.velocity[axes]
+    error, beta = jnp.zeros(3).at[axes].set(reading - past_position), share**2 / (2 - share)
     return estimate._replace(
         position=estimate.position + share * error, velocity=estimate.velocity + beta / period * error
     )

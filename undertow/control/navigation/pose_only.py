@@ -71,11 +71,11 @@ class PoseOnly(AbstractNoiseOnly):
 
         It is not white: the law that takes it for white expects more of it at low frequencies than there is.
         """
-        kept = self._kept()
+        pole = self._pole()
         if self.order == 2:
-            gain = 2 * ((1 - kept) / (1 + kept)) ** 3
+            gain = 2 * ((1 - pole) / (1 + pole)) ** 3
         else:
-            gain = (13 + 50 * kept + 49 * kept**2) * (1 - kept) ** 3 / (2 * (1 + kept) ** 5)
+            gain = (13 + 50 * pole + 49 * pole**2) * (1 - pole) ** 3 / (2 * (1 + pole) ** 5)
         return self.noise * jnp.sqrt(gain) / self.sampling_time
 
     def init(self, realization, truth: Measurement) -> PoseOnlyState:
@@ -99,21 +99,21 @@ class PoseOnly(AbstractNoiseOnly):
 
     def _corrected(self, state: PoseOnlyState, read: Float[Array, " n"], turns: bool) -> PoseOnlyState:
         """The state corrected by a reading; `turns` for a vehicle, whose last three outputs are angles."""
-        dt, kept = self.sampling_time, self._kept()
-        off = read - state.position
+        dt, pole = self.sampling_time, self._pole()
+        error = read - state.position
         if turns:
-            off = off - 2 * jnp.pi * jnp.round(off / (2 * jnp.pi)) * jnp.asarray([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+            error = error - 2 * jnp.pi * jnp.round(error / (2 * jnp.pi)) * jnp.asarray([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
         if self.order == 2:
             return state._replace(
-                position=state.position + (1 - kept**2) * off, velocity=state.velocity + (1 - kept) ** 2 / dt * off
+                position=state.position + (1 - pole**2) * error, velocity=state.velocity + (1 - pole) ** 2 / dt * error
             )
         return state._replace(
-            position=state.position + (1 - kept**3) * off,
-            velocity=state.velocity + 1.5 * (1 - kept) ** 2 * (1 + kept) / dt * off,
-            acceleration=state.acceleration + (1 - kept) ** 3 / dt**2 * off,
+            position=state.position + (1 - pole**3) * error,
+            velocity=state.velocity + 1.5 * (1 - pole) ** 2 * (1 + pole) / dt * error,
+            acceleration=state.acceleration + (1 - pole) ** 3 / dt**2 * error,
         )
 
-    def _kept(self) -> Float[Array, "..."]:
+    def _pole(self) -> Float[Array, "..."]:
         """Poles in the z-plane, exp(-w T)."""
         return jnp.exp(-self.bandwidth * self.sampling_time)
 

@@ -33,26 +33,26 @@ def packing(size: int) -> Packing:
 
 def error_states(sensors: tuple[AbstractSensor, ...], first: int) -> list[slice]:
     """States of the correlated errors of each sensor, from state `first` on; an empty slice for one without."""
-    found = []
+    states = []
     for sensor in sensors:
         last = first + count_errors(sensor)
-        found.append(slice(first, last))
+        states.append(slice(first, last))
         first = last
-    return found
+    return states
 
 
 def all_errors(sensors: tuple[AbstractSensor, ...], scale: Number) -> CorrelatedErrors | None:
     """The correlated errors of all sensors together, with deviations times a scale; None where there are none."""
-    found = [sensor.sampling.errors for sensor in sensors if sensor.sampling.errors is not None]
-    if not found:
+    per_sensor = [sensor.sampling.errors for sensor in sensors if sensor.sampling.errors is not None]
+    if not per_sensor:
         return None
-    deviations = scale * jnp.concatenate([one.deviation for one in found])
-    return CorrelatedErrors(deviations, jnp.concatenate([one.correlation_time for one in found]))
+    deviations = scale * jnp.concatenate([errors.deviation for errors in per_sensor])
+    return CorrelatedErrors(deviations, jnp.concatenate([errors.correlation_time for errors in per_sensor]))
 
 
 def faded(covariance: Covariance, errors: CorrelatedErrors, elapsed: Number) -> Covariance:
     """The covariance `elapsed` (s) later, whose last states are these errors."""
     motion = len(covariance) - len(errors.deviation)
-    kept = jnp.concatenate([jnp.ones(motion), errors.kept(elapsed)])
-    gained = jnp.concatenate([jnp.zeros(motion), errors.gained(elapsed)])
-    return covariance * kept[:, None] * kept[None, :] + jnp.diag(gained)
+    decay = jnp.concatenate([jnp.ones(motion), errors.kept(elapsed)])
+    growth = jnp.concatenate([jnp.zeros(motion), errors.gained(elapsed)])
+    return covariance * decay[:, None] * decay[None, :] + jnp.diag(growth)

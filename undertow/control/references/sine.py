@@ -23,9 +23,9 @@ class Sine(AbstractReference):
     phase: Float[Param, " n"] = param("rad", "phase at t = 0")
 
     def __init__(self, amplitude, frequency, offset, phase):
-        given = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}
-        axes = max(np.size(value) for value in given.values())
-        for name, value in given.items():
+        parameters = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}
+        axes = max(np.size(value) for value in parameters.values())
+        for name, value in parameters.items():
             if np.shape(value) not in ((), (1,), (axes,)):
                 raise BadInput(name, f"be one number, or {axes} of them, one per output", f"of shape {np.shape(value)}")
             checks.finite(name, value)

@@ -69,23 +69,23 @@ class ConditionValues(eqx.Module):
         for name in ("max_estimate", "max_variation"):
             checks.positive(name, getattr(self, name), finite=False)
 
-    def values(self, view: View, what: Occasion, coordinates: AbstractCoordinates) -> PerCondition:
+    def values(self, view: View, occasion: Occasion, coordinates: AbstractCoordinates) -> PerCondition:
         """Values of all conditions; those of a law that does not control are zero."""
         passed, signals = view.passed, view.signals
         # An actuator of one direction rests at its limit of zero.
-        at_limit = ((what.u <= self.low) & (self.low < 0)) | ((what.u >= self.high) & (self.high > 0))
+        at_limit = ((occasion.u <= self.low) & (self.low < 0)) | ((occasion.u >= self.high) & (self.high > 0))
         controlled = {
             "output_not_finite": (~jnp.isfinite(view.command)).sum(dtype=float),
             "saturated": at_limit.sum(dtype=float),
-            "chattering": jnp.maximum(what.variation / self.max_variation, what.swings / _SWINGS),
+            "chattering": jnp.maximum(occasion.variation / self.max_variation, occasion.swings / _SWINGS),
             "reference_infeasible": 1 - signals.get("attained_share", jnp.ones(())),
-            "position_error": what.errors[0],
-            "attitude_error": what.errors[1],
+            "position_error": occasion.errors[0],
+            "attitude_error": occasion.errors[1],
         }
-        found = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
+        values = {name: jnp.where(view.controls, value, 0.0) for name, value in controlled.items()}
         euler = passed.measurement.body is not None and not coordinates.axes
-        lost = lambda name: jnp.asarray(signals.get(name, jnp.zeros(1)), dtype=float).sum()
-        found |= {
+        count_of = lambda name: jnp.asarray(signals.get(name, jnp.zeros(1)), dtype=float).sum()
+        values |= {
             "measurement_not_finite": passed.not_finite,
             "measurement_implausible": passed.implausible,
             "measurement_jump": passed.jump,
@@ -93,32 +93,32 @@ class ConditionValues(eqx.Module):
             "measurement_noisy": passed.noise,
             "measurement_stuck": passed.missing,
             "report_lost": passed.unreported,
-            "applied_contradicted": what.contradicted,
+            "applied_contradicted": occasion.contradicted,
             "reference_rejected": view.rejected,
-            "place_held": what.place_held,
-            "estimator_diverged": jnp.where(what.broken, jnp.inf, self._estimate_ratio(view)),
-            "restarts_exhausted": what.restarts,
-            "thruster_lost": lost("lost_thrusters"),
-            "axes_lost": lost("lost_axes"),
+            "place_held": occasion.place_held,
+            "estimator_diverged": jnp.where(occasion.broken, jnp.inf, self._estimate_ratio(view)),
+            "restarts_exhausted": occasion.restarts,
+            "thruster_lost": count_of("lost_thrusters"),
+            "axes_lost": count_of("lost_axes"),
             "near_vertical": jnp.abs(passed.measurement.position[4]) if euler else jnp.zeros(()),
-            "overrun": jnp.where(jnp.isfinite(what.elapsed), what.elapsed, 0.0),
-            "clock_fault": jnp.where(what.elapsed <= CLOCK_FAULT, 0.0, 1.0),
+            "overrun": jnp.where(jnp.isfinite(occasion.elapsed), occasion.elapsed, 0.0),
+            "clock_fault": jnp.where(occasion.elapsed <= CLOCK_FAULT, 0.0, 1.0),
         }
-        return jnp.stack([jnp.asarray(found[name], dtype=float) for name in NAMES])
+        return jnp.stack([jnp.asarray(values[name], dtype=float) for name in NAMES])
 
     def limits(self) -> PerCondition:
         """Limits of all conditions: 0 of what is counted, 1 of what is relative to a limit, and a few others."""
         counted = ("measurement_not_finite", "report_lost", "reference_rejected", "output_not_finite", "saturated")
-        found = dict.fromkeys(NAMES, 1.0) | dict.fromkeys(
+        limits = dict.fromkeys(NAMES, 1.0) | dict.fromkeys(
             (*counted, "thruster_lost", "axes_lost", "clock_fault", "place_held"), 0.0
         )
-        found |= {
+        limits |= {
             "restarts_exhausted": float(self.restarts),
             "reference_infeasible": _INFEASIBLE,
             "near_vertical": _NEAR_VERTICAL,
             "overrun": _OVERRUN,
         }
-        return jnp.stack([jnp.asarray(found[name], dtype=float) for name in NAMES])
+        return jnp.stack([jnp.asarray(limits[name], dtype=float) for name in NAMES])
 
     def _estimate_ratio(self, view: View) -> Scalar:
         """Estimated uncertainty relative to the largest plausible one."""

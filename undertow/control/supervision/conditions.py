@@ -315,10 +315,11 @@ def held_for(
     held = jnp.maximum(state.held + jnp.where(holds, dt, -dt), 0.0)
     clear = jnp.where(holds, 0.0, state.clear + dt)
     # A step counts in whole: what holds at k instants has held for k sampling times.
-    reached = jnp.where(holds & (held >= degraded * _WHOLE), 1.0, 0.0)
-    reached = jnp.where(holds & (held >= safe * _WHOLE), jnp.where(tolerated, 1.0, 2.0), reached)
-    kept = jnp.where(clear >= recovers * _WHOLE, 0.0, state.level)
-    return Conditions(held, clear, jnp.maximum(reached, jnp.where(tolerated, jnp.minimum(kept, 1.0), kept)))
+    level = jnp.where(holds & (held >= degraded * _WHOLE), 1.0, 0.0)
+    level = jnp.where(holds & (held >= safe * _WHOLE), jnp.where(tolerated, 1.0, 2.0), level)
+    previous = jnp.where(clear >= recovers * _WHOLE, 0.0, state.level)
+    previous = jnp.where(tolerated, jnp.minimum(previous, 1.0), previous)
+    return Conditions(held, clear, jnp.maximum(level, previous))
 
 
 # Sums of sampling times are rounded.

@@ -55,19 +55,19 @@ def one_thruster(
     missing = state.along / jnp.where(state.size > 0, state.size, 1.0)
     possible = (missing > 0) & (missing < bounds.most_share + 0.2) & (used > 0)[None]
     explained = jnp.where(possible, missing * state.along, 0.0)
-    each = explained.max(0)
-    best = each.max()
+    explained_by = explained.max(0)
+    best = explained_by.max()
     is_best = (explained >= best) & (best > 0)
     of_best = lambda value: jnp.where(is_best, value, 0.0).max()
-    second = jnp.where(is_best.any(0), 0.0, each).max()
+    second = jnp.where(is_best.any(0), 0.0, explained_by).max()
     share, force = of_best(missing), of_best(missing * jnp.abs(missing_now) / bounds.force[None])
-    rest = of_best(state.total[:, None]) - best
+    unexplained = of_best(state.total[:, None]) - best
     axes = state.covariance.shape[0]
     freedom = axes * of_best(jnp.arange(1.0, len(state.total) + 1)[:, None]) - 1
-    alone = best > bounds.explained * (rest + best - freedom)
-    noise = _noise(rest, freedom)
+    sufficient = best > bounds.explained * (unexplained + best - freedom)
+    noise = _noise(unexplained, freedom)
     best, second = best / noise, second / noise
-    clear = alone & (best > bounds.square) & (best - second > jnp.maximum(bounds.margin, _AHEAD * best))
+    clear = sufficient & (best > bounds.square) & (best - second > jnp.maximum(bounds.margin, _AHEAD * best))
     believable = (share > bounds.least_share) & (share < bounds.most_share) & (force > 1)
     return jnp.where(is_best.any(0) & clear & believable, 1.0, 0.0), best
 
@@ -91,17 +91,17 @@ def two_thrusters(wide: Wide, forces: PerActuator, used: PerActuator, bounds: Fa
     def solved():
         squares = size[:, None] * size[None, :]
         determinant = squares - products * products
-        apart = determinant > _APART * squares  # never so for a thruster and itself
+        separable = determinant > _APART * squares  # never so for a thruster and itself
         # Force of thruster i (row) in the pair of i and j (column).
         force = size[None, :] * along[:, None] - products * along[None, :]
-        force = force / jnp.where(apart, determinant, 1.0)
+        force = force / jnp.where(separable, determinant, 1.0)
         explained = force * along[:, None]
         explained = explained + explained.T
         nominal, missing = jnp.abs(forces)[:, None], -force * jnp.sign(forces)[:, None]
-        off = (missing > _OFF_LEAST * nominal) & (missing < _OFF_MOST * nominal)
-        fits = off & (jnp.abs(force) > bounds.force[:, None]) & (used > 0)[:, None]
+        stopped = (missing > _OFF_LEAST * nominal) & (missing < _OFF_MOST * nominal)
+        fits = stopped & (jnp.abs(force) > bounds.force[:, None]) & (used > 0)[:, None]
         once = jnp.triu(jnp.ones_like(explained), 1) > 0  # rounding may differ between (i, j) and (j, i)
-        explained = jnp.where(apart & fits & fits.T & once, explained, 0.0)
+        explained = jnp.where(separable & fits & fits.T & once, explained, 0.0)
         best = explained.max()
         is_best = explained >= best
         second = jnp.where(is_best, 0.0, explained).max()
@@ -111,26 +111,26 @@ def two_thrusters(wide: Wide, forces: PerActuator, used: PerActuator, bounds: Fa
             & (best - single > bounds.square)
             & (best - second > jnp.maximum(_PAIR_MARGIN * bounds.margin, total - best))
         )
-        found = jnp.where(is_best & clear, 1.0, 0.0)
-        return jnp.maximum(found.max(0), found.max(1))
+        pair = jnp.where(is_best & clear, 1.0, 0.0)
+        return jnp.maximum(pair.max(0), pair.max(1))
 
     return jax.lax.cond(total - single > bounds.square, solved, lambda: jnp.zeros_like(forces))
 
 
-def missing_effect(seen: Weighed, changes: PerActuator) -> Float[Array, "m m"]:
+def missing_effect(weighed: Weighed, changes: PerActuator) -> Float[Array, "m m"]:
     """Log-likelihood ratio of "off" to "healthy" by one vector: of each thruster (diagonal) and of each pair.
 
     Args:
-        seen: the vector and directions.
+        weighed: the vector and directions.
         changes: what the vector would contain of the nominal forces if they had no effect, N, with its sign reversed.
     """
-    single = -2 * changes * seen.along - changes * changes * seen.size
-    both = 2 * changes[:, None] * changes[None, :] * seen.products
-    pair = single[:, None] + single[None, :] - both
+    single = -2 * changes * weighed.along - changes * changes * weighed.size
+    interaction = 2 * changes[:, None] * changes[None, :] * weighed.products
+    pair = single[:, None] + single[None, :] - interaction
     diagonal = jnp.eye(len(changes))
     return jnp.where(diagonal > 0, single[:, None] * diagonal, pair)
 
 
-def _noise(rest: Float[Array, ""], freedom) -> Float[Array, ""]:
+def _noise(unexplained: Float[Array, ""], freedom) -> Float[Array, ""]:
     """Factor by which the noise is greater than the covariance says, if it is."""
-    return jnp.maximum(1.0, _EXCESS * rest / freedom)
+    return jnp.maximum(1.0, _EXCESS * unexplained / freedom)

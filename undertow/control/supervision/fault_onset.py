@@ -75,12 +75,13 @@ def wide_covariance(axes: int) -> Float[Array, "n n"]:
 def weighed(effect: Float[Array, "n m"], covariance: Float[Array, "n n"], vector: PerAxis) -> Weighed:
     """A vector and directions, weighed by the inverse of a covariance."""
     inverse = inverse_symmetric(covariance)
-    pulled = matvec(inverse, vector)
+    weighted_vector = matvec(inverse, vector)
     columns = effect.T
-    stretched = (columns[:, None, :] * inverse[None, :, :]).sum(-1)
-    products = (stretched[:, None, :] * columns[None, :, :]).sum(-1)
-    own = (stretched * columns).sum(-1)
-    return Weighed(products, jnp.where(own > 0, own, 1.0), matvec(columns, pulled), (vector * pulled).sum())
+    weighted_columns = (columns[:, None, :] * inverse[None, :, :]).sum(-1)
+    products = (weighted_columns[:, None, :] * columns[None, :, :]).sum(-1)
+    squares = (weighted_columns * columns).sum(-1)
+    size = jnp.where(squares > 0, squares, 1.0)
+    return Weighed(products, size, matvec(columns, weighted_vector), (vector * weighted_vector).sum())
 
 
 def transients(bandwidth, decay, elapsed, onsets: int = ONSETS) -> Float[Array, "k+1 3"]:
@@ -101,8 +102,8 @@ def transients(bandwidth, decay, elapsed, onsets: int = ONSETS) -> Float[Array, 
     slow = jnp.exp(-bandwidth * t)
     rate = 1 / decay
     rate = jnp.where(jnp.abs(bandwidth - rate) < 0.01 * bandwidth, 0.99 * bandwidth, rate)  # the limit of equal ones
-    apart = bandwidth - rate
-    stopped = (bandwidth / apart) ** 2 * (jnp.exp(-rate * t) - slow * (1 + apart * t))
+    difference = bandwidth - rate
+    stopped = (bandwidth / difference) ** 2 * (jnp.exp(-rate * t) - slow * (1 + difference * t))
     return jnp.stack([slow, slow * bandwidth * t, stopped], axis=1)
 
 
@@ -133,7 +134,8 @@ def examine(
     before, unit = past.forces[:, 0], jnp.eye(len(residual))
     innovation = residual - 2 * past.residuals[0] + past.residuals[1]
     change = forces[0] - 2 * before[0] + before[1]
-    now = weighed(effect, past.covariance + _FLOOR * unit + _unknown(effect, error_share * change), innovation)
+    covariance = past.covariance + _FLOOR * unit + _unknown(effect, error_share * change)
+    weighed_innovation = weighed(effect, covariance, innovation)
     # Second difference of the missing force, which is zero at the onset and before.
     bent = jnp.concatenate([remains[1:2], remains[2:] - 2 * remains[1:-1] + remains[:-2]])
     first = (jnp.arange(len(past.total)) == 0)[:, None]
@@ -142,10 +144,10 @@ def examine(
     after = OnsetState(
         residuals=jnp.concatenate([residual[None], past.residuals[:-1]]),
         forces=jnp.concatenate([forces[None], past.forces[:-1]]),
-        along=_later(past.along) - added * now.along[None],
-        size=_later(past.size) + added * added * now.size[None],
-        total=_later(past.total) + now.total,
-        covariance=_learned(past.covariance, learned, innovation, now.total),
+        along=_later(past.along) - added * weighed_innovation.along[None],
+        size=_later(past.size) + added * added * weighed_innovation.size[None],
+        total=_later(past.total) + weighed_innovation.total,
+        covariance=_learned(past.covariance, learned, innovation, weighed_innovation.total),
     )
     return after, missing
 
@@ -183,14 +185,14 @@ def cleared(state: OnsetState, when: Array) -> OnsetState:
 
 def first_weight(examinations: Float[Array, ""], elapsed, memory) -> Float[Array, ""]:
     """Part of the covariance that the next innovation replaces: a mean at first, then fading memory."""
-    known = examinations - (ONSETS + 2)
-    return jnp.where(known < 0, 0.0, jnp.maximum(elapsed / memory, 1 / (jnp.maximum(known, 0.0) + _FIRST)))
+    innovations = examinations - (ONSETS + 2)
+    return jnp.where(innovations < 0, 0.0, jnp.maximum(elapsed / memory, 1 / (jnp.maximum(innovations, 0.0) + _FIRST)))
 
 
 def _unknown(effect: Float[Array, "n m"], forces: PerActuator) -> Float[Array, "n n"]:
     """Covariance of forces of these standard deviations."""
-    each = forces[None, :] * effect
-    return (each[:, None, :] * each[None, :, :]).sum(-1)
+    columns = forces[None, :] * effect
+    return (columns[:, None, :] * columns[None, :, :]).sum(-1)
 
 
 def _learned(covariance: Float[Array, "n n"], part, vector: PerAxis, size) -> Float[Array, "n n"]:

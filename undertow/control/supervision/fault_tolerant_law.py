@@ -73,12 +73,12 @@ class FaultTolerantController(AbstractController):
     def command(self, z: FaultTolerantState, y: Measurement, r: Target):
         used = self._used(z.monitor, y)
         u, signals = self._reduced(used).command(z.law, y, r)
-        own = {
+        fault_signals = {
             "lost_thrusters": 1.0 - used,
             "lost_axes": self._lost_axes(used, y),
             "fault_evidence": z.monitor.evidence,
         }
-        return jnp.where(used > 0, u, 0.0), signals | own
+        return jnp.where(used > 0, u, 0.0), signals | fault_signals
 
     def advance(self, z: FaultTolerantState, y: Measurement, r: Target, u_applied, dt) -> FaultTolerantState:
         used = self._used(z.monitor, y)
@@ -102,8 +102,8 @@ class FaultTolerantController(AbstractController):
     def _lost_axes(self, used: PerActuator, y: Measurement) -> Float[Array, " n"]:
         gain, everything = self.body_model.dynamics.gain(y), jnp.ones_like(used)
         share = lambda used: attained_share(gain, used, self.priority)
-        lost = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
-        return jax.lax.cond((used < 1).any(), lost, lambda: jnp.zeros_like(self.priority))
+        lost_axes = lambda: jnp.where(share(everything) - share(used) > _LOST, 1.0, 0.0)
+        return jax.lax.cond((used < 1).any(), lost_axes, lambda: jnp.zeros_like(self.priority))
 
 
 @double_outside_runs
@@ -130,20 +130,20 @@ def fault_tolerant(
         BadInput: a value is out of its range, or no parameter of the monitor.
     """
     checks.positive("sampling_time", sampling_time, "s")
-    own = law.model.in_body_axes()
-    effect = np.asarray(_gain_at_rest(own))
-    largest = _largest(own, effect, limits)
+    body_model = law.model.in_body_axes()
+    effect = np.asarray(_gain_at_rest(body_model))
+    largest = _largest(body_model, effect, limits)
     unit = 0.02 * np.abs(effect * largest).max(1)
-    known = set(ThrusterMonitor.__dataclass_fields__) - {"unit", "largest"}
+    option_names = set(ThrusterMonitor.__dataclass_fields__) - {"unit", "largest"}
     for name in monitor:
-        if name not in known:
-            raise BadInput(name, f"be one of {', '.join(sorted(known))}")
-    given = {"persistence": max(0.05, 2.5 * sampling_time)} | monitor
-    watch = ThrusterMonitor(np.where(unit > 0, unit, 1.0), largest, **given)
+        if name not in option_names:
+            raise BadInput(name, f"be one of {', '.join(sorted(option_names))}")
+    options = {"persistence": max(0.05, 2.5 * sampling_time)} | monitor
+    watch = ThrusterMonitor(np.where(unit > 0, unit, 1.0), largest, **options)
     priority = default_priority(law.model) if priority is None else priority
     checks.positive("priority", priority)
     priority = np.broadcast_to(np.asarray(priority, dtype=float), (effect.shape[0],))
-    return FaultTolerantController(law, watch, None if own is law.model else own, priority)  # pyright: ignore[reportArgumentType] - an abstract field is no argument
+    return FaultTolerantController(law, watch, None if body_model is law.model else body_model, priority)  # pyright: ignore[reportArgumentType] - an abstract field is no argument
 
 
 def _gain_at_rest(model: Model):

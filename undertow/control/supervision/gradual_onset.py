@@ -72,10 +72,10 @@ def examine_next(
         used, bounds: as in `fault_hypotheses.one_thruster`.
         elapsed: time since the examination before of the same series, s.
     """
-    past, other = series
+    past, waiting = series
     of_all = remains.sum(1, keepdims=True)
     onsets, missing = examine(past.onsets, residual, forces[None], effect, error_share, of_all, learned)
-    found, explained = one_thruster(onsets, missing, used, bounds)
-    suspected = jnp.where(found > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed / 2, 0.0))
-    evidence = jnp.where(found.any(), jnp.sqrt(explained / bounds.square), 0.0)
-    return other, Gradual(onsets, suspected, evidence)
+    suspect, explained = one_thruster(onsets, missing, used, bounds)
+    suspected = jnp.where(suspect > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed / 2, 0.0))
+    evidence = jnp.where(suspect.any(), jnp.sqrt(explained / bounds.square), 0.0)
+    return waiting, Gradual(onsets, suspected, evidence)

@@ -34,7 +34,7 @@ def no_place(r: Target) -> PlaceState:
 
 def target(state: PlaceState, r: Target) -> Target:
     """What the law pursues now."""
-    return jax.tree.map(lambda place, new: jnp.where(state.held > 0, place, new), state.pursued, r)
+    return jax.tree.map(lambda held, new: jnp.where(state.held > 0, held, new), state.pursued, r)
 
 
 def after_jump(
@@ -52,7 +52,8 @@ def after_jump(
         r: the reference.
     """
     stays = begins & (state.jumped > 0)
-    pursued = jax.tree.map(lambda here, on: jnp.where(stays, here, on), _place(y, r), target(state, r))
+    present, ahead = _place(y, r), target(state, r)
+    pursued = jax.tree.map(lambda held, new: jnp.where(stays, held, new), present, ahead)
     jumped = waits & ((state.jumped > 0) | (safe & jumps))
     return PlaceState(pursued, jnp.where(stays, 1, state.held).astype(int), jumped.astype(int))
 
@@ -70,5 +71,5 @@ def is_another(before: Target, r: Target, coordinates: AbstractCoordinates, elap
 
 def _place(y: Measurement, r: Target) -> Target:
     """The present place as a target at rest; a vehicle is held with roll and pitch of its reference."""
-    here = y.position if y.body is None else jnp.concatenate([y.position[:3], r.position[3:5], y.position[5:]])
-    return Target(here, jnp.zeros_like(here), jnp.zeros_like(here))
+    position = y.position if y.body is None else jnp.concatenate([y.position[:3], r.position[3:5], y.position[5:]])
+    return Target(position, jnp.zeros_like(position), jnp.zeros_like(position))

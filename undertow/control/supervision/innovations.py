@@ -78,11 +78,11 @@ class InnovationMonitor(eqx.Module):
         of_velocity = accepted.velocity - expected.velocity
         straight, turning = split((of_velocity - state.of_velocity) / 2)
         parts = moved, turned, straight / jumps.velocity, turning / jumps.rate
-        known = lambda part: jnp.where(believe & (jnp.abs(part) > 1), 0.0, part)
-        moved, turned, *_ = parts = tuple(map(known, parts))
+        without_jumps = lambda part: jnp.where(believe & (jnp.abs(part) > 1), 0.0, part)
+        moved, turned, *_ = parts = tuple(map(without_jumps, parts))
         sizes = jnp.stack([jnp.abs(part).max(initial=0.0) for part in parts])
-        kept = jnp.maximum(1 - dt / self.memory, 0.0)
-        summed = lambda before, part: jnp.clip(kept * before + part, -_MOST, _MOST)
+        decay = jnp.maximum(1 - dt / self.memory, 0.0)
+        summed = lambda before, part: jnp.clip(decay * before + part, -_MOST, _MOST)
         share = jnp.minimum(dt / self.averaged, 1.0)
         return InnovationState(
             moved=summed(state.moved, moved),

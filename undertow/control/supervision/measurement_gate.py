@@ -105,36 +105,37 @@ class MeasurementGate(eqx.Module):
         stuck_state = self.stuck.after(state.stuck, y, state.rates, state.since)
         stuck = self.stuck.found(stuck_state)
         held = MonitoredMotion(*(part > 0 for part in _of_motion(read, stuck.position, stuck.velocity)))
-        known = lambda ratios, which: MonitoredMotion(
-            *(jnp.where(w, r, 0.0) for w, r in zip(which, ratios, strict=True))
+        where_valid = lambda ratios, valid: MonitoredMotion(
+            *(jnp.where(w, r, 0.0) for w, r in zip(valid, ratios, strict=True))
         )
-        sizes = known(of_size, finite)
+        sizes = where_valid(of_size, finite)
         # What is stuck departs from its prediction, of course.
-        jumps = known(of_jump, MonitoredMotion(*(f & ~h for f, h in zip(finite, held, strict=True))))
+        jumps = where_valid(of_jump, MonitoredMotion(*(f & ~h for f, h in zip(finite, held, strict=True))))
         good = MonitoredMotion(
             *(
-                f & (size <= 1) & ((jump <= 1) | believe) & ~stands
-                for f, size, jump, stands in zip(finite, sizes, jumps, held, strict=True)
+                is_finite & (size <= 1) & ((jump <= 1) | believe) & ~is_held
+                for is_finite, size, jump, is_held in zip(finite, sizes, jumps, held, strict=True)
             )
         )
         # A quaternion is good as a whole, or not at all.
         good = good._replace(attitude=jnp.broadcast_to(good.attitude.all(), good.attitude.shape))
         usable = jax.tree.map(lambda now: jnp.abs(now) <= _FASTEST, y.actuator)  # false for NaN
-        reported = jax.tree.map(lambda good, now, kept: jnp.where(good, now, kept), usable, y.actuator, state.actuator)
+        reported = jax.tree.map(lambda good, now, last: jnp.where(good, now, last), usable, y.actuator, state.actuator)
         unreported = sum((~good).sum(dtype=float) for good in jax.tree.leaves(usable))
         y = y._replace(actuator=reported)
 
-        chosen = MonitoredMotion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
+        motion = MonitoredMotion(*(jnp.where(g, r, e) for g, r, e in zip(good, read, expected, strict=True)))
 
-        all_good = jnp.stack([one.all() for one in good]).all()
-        missing = jnp.stack([(~one).sum(dtype=float) for one in finite]).sum()
-        largest = lambda ratios: jnp.stack([one.max(initial=0.0) for one in ratios]).max()
-        measurement = jax.lax.cond(all_good, lambda: y, lambda: with_motion(y, chosen))
+        all_good = jnp.stack([entries.all() for entries in good]).all()
+        missing = jnp.stack([(~entries).sum(dtype=float) for entries in finite]).sum()
+        largest = lambda ratios: jnp.stack([entries.max(initial=0.0) for entries in ratios]).max()
+        measurement = jax.lax.cond(all_good, lambda: y, lambda: with_motion(y, motion))
         jump_limits = JumpLimits(self.jump_position, self.jump_angle, self.jump_velocity, self.jump_rate)
-        innovations = self.innovations.after(state.innovations, chosen, expected, jump_limits, believe, state.since)
+        innovations = self.innovations.after(state.innovations, motion, expected, jump_limits, believe, state.since)
         # Actuators of which nobody has ever reported anything but rest are not lost.
-        before = jnp.stack([jnp.zeros(()), *(jnp.abs(one).max() for one in jax.tree.leaves(state.actuator))]).max()
-        lost = jnp.where(before > 0, jnp.asarray(unreported, dtype=float), 0.0)
+        reports = jax.tree.leaves(state.actuator)
+        largest_report = jnp.stack([jnp.zeros(()), *(jnp.abs(report).max() for report in reports)]).max()
+        lost_reports = jnp.where(largest_report > 0, jnp.asarray(unreported, dtype=float), 0.0)
         return Passed(
             measurement=measurement,
             stuck=stuck_state,
@@ -145,7 +146,7 @@ class MeasurementGate(eqx.Module):
             contradiction=self.innovations.contradiction(innovations),
             noise=self.innovations.noise_ratio(innovations),
             missing=stuck.missing,
-            unreported=lost,
+            unreported=lost_reports,
         )
 
     def after(self, passed: Passed, rate: Array, dt: Scalar) -> GateState:
@@ -155,13 +156,13 @@ class MeasurementGate(eqx.Module):
         are too long for the drag of a fast vehicle, would grow until it is no number.
         """
         y = passed.measurement
-        now, expected = motion_of(y), predicted(y, rate, dt)
+        motion, expected = motion_of(y), predicted(y, rate, dt)
         speed = _each(expected.velocity, self.max_speed, self.max_rate)
         expected = expected._replace(
             position=jnp.clip(expected.position, -self.max_distance, self.max_distance),
             velocity=jnp.clip(expected.velocity, -speed, speed),
         )
-        expected = MonitoredMotion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, now, strict=True)))
+        expected = MonitoredMotion(*(jnp.where(jnp.isfinite(e), e, n) for e, n in zip(expected, motion, strict=True)))
         return GateState(expected, y.velocity, passed.stuck, passed.innovations, jnp.asarray(dt), y.actuator)
 
     def _sizes(self, read: MonitoredMotion) -> MonitoredMotion:
@@ -175,8 +176,8 @@ class MeasurementGate(eqx.Module):
         """Differences between readings and predictions relative to their limits."""
         turn = jnp.zeros(0)
         if read.attitude.shape[0]:
-            off = attitude_error(read.attitude, expected.attitude)
-            turn = jnp.broadcast_to(length(off) / self.jump_angle, (4,))
+            attitude_difference = attitude_error(read.attitude, expected.attitude)
+            turn = jnp.broadcast_to(length(attitude_difference) / self.jump_angle, (4,))
         return MonitoredMotion(
             jnp.abs(read.position - expected.position) / self.jump_position,
             turn,
@@ -195,5 +196,5 @@ def _each(velocity: Array, linear: Any, angular: Any) -> Array:
     """A value for the linear and one for the angular entries of a velocity."""
     parts = split(velocity)
     return jnp.concatenate(
-        [jnp.broadcast_to(one, part.shape) for one, part in zip((linear, angular), parts, strict=True)]
+        [jnp.broadcast_to(value, part.shape) for value, part in zip((linear, angular), parts, strict=True)]
     )

@@ -85,20 +85,21 @@ class ReportedInput(eqx.Module):
             dt: time from now on, s.
         """
         velocity, dynamics = model.coordinates.velocity(y), model.dynamics
-        forget = jnp.exp(-dt / self.memory)
-        residual = forget * (state.residual + velocity - state.predicted)
+        decay = jnp.exp(-dt / self.memory)
+        residual = decay * (state.residual + velocity - state.predicted)
         missed = jnp.where(self.authority > 0, self.mismatch * self.authority * self.memory, jnp.inf)  # m/s, rad/s
         ratio = ((-2 * residual - state.difference) * state.difference / missed**2).sum() / 2
-        most = 2 * self.threshold
-        likelihood = jnp.clip((1 - dt / self.fading) * state.likelihood + dt / self.memory * ratio, 0.0, most)
+        largest_likelihood = 2 * self.threshold
+        likelihood = (1 - dt / self.fading) * state.likelihood + dt / self.memory * ratio
+        likelihood = jnp.clip(likelihood, 0.0, largest_likelihood)
         actuators, effect = model.actuators.quasi_static(), dynamics.gain(y)
         forces = lambda u: actuators.force(actuators.init(), u)
         by_report = matvec(effect, forces(reported))
-        more = by_report - matvec(effect, forces(command))
+        difference = by_report - matvec(effect, forces(command))
         return ReportState(
             predicted=velocity + dt * (dynamics.drift(y) + by_report),
             residual=residual,
-            difference=forget * (state.difference + dt * more),
+            difference=decay * (state.difference + dt * difference),
             likelihood=likelihood,
             reported=reported,
             command=command,

@@ -90,16 +90,15 @@ class StuckReadings(eqx.Module):
         turns = np.array(self.angles)
         limits = jnp.where(jnp.asarray(turns), self.angle, self.distance)
         alone = jnp.where(state.held >= self.readings, jnp.abs(state.moved) / limits, 0.0)
-        off = state.position - state.from_position
-        off = (
-            jnp.where(jnp.asarray(turns), off - 2 * jnp.pi * jnp.round(off / (2 * jnp.pi)), off) - state.velocity_moved
-        )
+        departure = state.position - state.from_position
+        wrapped = departure - 2 * jnp.pi * jnp.round(departure / (2 * jnp.pi))
+        departure = jnp.where(jnp.asarray(turns), wrapped, departure) - state.velocity_moved
         # One axis of the body moves all outputs of its kind.
-        straight, turned = (length(off * jnp.asarray(kind, dtype=float)) for kind in (~turns, turns))
-        together = jnp.where(jnp.asarray(turns), turned / self.angle, straight / self.distance)
-        together = jnp.where(state.velocity_held >= self.readings, together, 0.0)
-        one = lambda ratio: jnp.where(ratio > 1, 1.0, 0.0)
-        return StuckFlags(one(alone), one(together), jnp.maximum(alone.max(), together.max()))
+        straight, turned = (length(departure * jnp.asarray(kind, dtype=float)) for kind in (~turns, turns))
+        combined = jnp.where(jnp.asarray(turns), turned / self.angle, straight / self.distance)
+        combined = jnp.where(state.velocity_held >= self.readings, combined, 0.0)
+        flag = lambda ratio: jnp.where(ratio > 1, 1.0, 0.0)
+        return StuckFlags(flag(alone), flag(combined), jnp.maximum(alone.max(), combined.max()))
 
 
 def _finite(read: Array) -> Array:

@@ -125,11 +125,11 @@ class Supervised(AbstractController):
         passed = self.gate.pass_through(gate, y, jnp.asarray(True))
         target, _ = self._checked(Target(*map(jnp.zeros_like, r)), r)
         usable = (passed.not_finite == 0) & (passed.implausible <= 1)
-        known = passed.measurement
-        law, fallback = self.law.init(known, target), () if self.fallback is None else self.fallback.init(known, target)
-        new = self._fresh(
-            law, fallback, gate, known, self.tracking.start(self.model.coordinates, known, target), target
-        )
+        measurement = passed.measurement
+        law = self.law.init(measurement, target)
+        fallback = () if self.fallback is None else self.fallback.init(measurement, target)
+        allowance = self.tracking.start(self.model.coordinates, measurement, target)
+        new = self._fresh(law, fallback, gate, measurement, allowance, target)
         log, zero, none = new.log, jnp.zeros(()), jnp.zeros((), dtype=int)
         for entered in (State.READY, State.ACTIVE):
             log = logged(log, usable, (zero, jnp.asarray(int(entered)), none, zero, zero))
@@ -170,7 +170,7 @@ class Supervised(AbstractController):
 
     def command(self, z: SupervisedState, y: Measurement, r: Target):
         view = self._view(z, y, r)
-        own = {
+        supervisor_signals = {
             "supervisor_state": z.state,
             "supervisor_reason": z.reason,
             "supervisor_value": z.cause[0],
@@ -179,7 +179,7 @@ class Supervised(AbstractController):
             "supervisor_restarts": z.restarted,
             "fallback_controls": z.fallback_controls,
         }
-        return view.output, view.signals | own
+        return view.output, view.signals | supervisor_signals
 
     def advance(self, z: SupervisedState, y: Measurement, r: Target, u_applied: Inputs, dt) -> SupervisedState:
         view, nominal = self._view(z, y, r), self.sampling_time
@@ -213,36 +213,36 @@ class Supervised(AbstractController):
         holds = ~(values <= limits)  # NaN is beyond every limit
         conditions = held_for(z.conditions, holds, elapsed, self._tolerated(z))
 
-        wrong = NUMBER["estimator_diverged"]
-        at_once = (jnp.arange(len(NAMES)) == wrong) & broken & view.controls
+        divergence = NUMBER["estimator_diverged"]
+        at_once = (jnp.arange(len(NAMES)) == divergence) & broken & view.controls
         conditions = conditions._replace(level=jnp.where(at_once, jnp.maximum(conditions.level, 1.0), conditions.level))
-        asked, reason = judged(conditions.level)
-        state, reason = self._next(z, view, asked, reason)
+        condition_state, reason = judged(conditions.level)
+        state, reason = self._next(z, view, condition_state, reason)
         begins = _controls(state) & ~view.controls
         diverged = view.controls & (
-            broken | (holds[wrong] & (conditions.held[wrong] >= CONDITIONS[wrong].degraded_after))
+            broken | (holds[divergence] & (conditions.held[divergence] >= CONDITIONS[divergence].degraded_after))
         )
         by_fallback = self._by_whom(z, conditions)
         switches = by_fallback != (z.fallback_controls > 0)
         # A law whose memory was damaged does not advance to a finite state; that is cheaper to see than the damage.
-        others = z._replace(law=(), fallback=())
-        damaged = ~all_finite(others) | jax.lax.cond(
+        without_laws = z._replace(law=(), fallback=())
+        damaged = ~all_finite(without_laws) | jax.lax.cond(
             broken, lambda: ~all_finite((z.law, z.fallback)), lambda: jnp.asarray(False)
         )
-        again = begins | diverged | switches | damaged
+        begins_again = begins | diverged | switches | damaged
         place = released(z.place, is_another(z.reference, view.given, self.model.coordinates, elapsed))
         jumps, safe = self._jumped(conditions), state == int(State.SAFE)
         place = after_jump(place, ~_controls(state), safe, jumps, begins, view.passed.measurement, view.given)
         counted = (begins & (z.state == int(State.SAFE))) | (diverged & _controls(state))
         times = jnp.where(counted, _with_restart(z.restarts, z.time), z.restarts)
         # What has begun again gets its time before it is judged.
-        judged_anew = jnp.arange(len(NAMES)) == wrong
-        conditions = conditions._replace(held=jnp.where(judged_anew & again, 0.0, conditions.held))
+        judged_anew = jnp.arange(len(NAMES)) == divergence
+        conditions = conditions._replace(held=jnp.where(judged_anew & begins_again, 0.0, conditions.held))
         time, changed = z.time + elapsed, (state != z.state) | (reason != z.reason)
         # A condition may be named after it has held: its value is the last one beyond the limit.
         exceeding = jnp.where(holds, jnp.where(jnp.isfinite(values), values, _BIG), z.exceeding)
         cause = jnp.where(changed, _cause(exceeding, limits, reason), z.cause)
-        law, fallback = self._continued(z, view._replace(r=place.pursued), laws, again, broken)
+        law, fallback = self._continued(z, view._replace(r=place.pursued), laws, begins_again, broken)
         after = SupervisedState(
             law=(),
             fallback=(),
@@ -259,7 +259,7 @@ class Supervised(AbstractController):
             time=time,
             safe_for=jnp.where(state == int(State.SAFE), z.safe_for + elapsed, 0.0),
             output=u,
-            transfer=again.astype(int),
+            transfer=begins_again.astype(int),
             beyond=jnp.where(view.controls, view.beyond, 0.0),
             variation=variation,
             swings=swings,
@@ -314,37 +314,38 @@ class Supervised(AbstractController):
         controls = _controls(z.state)
         y = conceivable(y)
         passed = self.gate.pass_through(z.gate, y, ~controls)
-        given, rejected = self._checked(z.reference, r)
-        r = target(z.place, given)
-        y, own = passed.measurement, lambda: self.law.command(z.law, passed.measurement, r)
+        reference, rejected = self._checked(z.reference, r)
+        r = target(z.place, reference)
+        y = passed.measurement
+        by_law = lambda: self.law.command(z.law, y, r)
         if self.fallback is None:
-            command, signals = own()
+            command, signals = by_law()
         else:
-            command, signals = jax.lax.cond((z.fallback_controls > 0), lambda: self._by_fallback(z, y, r), own)
-        most = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
-        within = jnp.clip(command, self.watch.low, self.watch.high)
-        towards = lambda goal: jnp.clip(goal, z.output - most, z.output + most)
+            command, signals = jax.lax.cond((z.fallback_controls > 0), lambda: self._by_fallback(z, y, r), by_law)
+        largest_change = self.slew * (self.watch.high - self.watch.low) * self.sampling_time
+        limited = jnp.clip(command, self.watch.low, self.watch.high)
+        slewed = lambda goal: jnp.clip(goal, z.output - largest_change, z.output + largest_change)
         # The difference at a transfer ends by itself. Were the output led to that of the law instead, the law's loop
         # would have a slower actuator until then, and might never settle.
-        beyond = jnp.where(z.transfer > 0, z.output - within, z.beyond)
-        beyond = jnp.where(jnp.isfinite(beyond), beyond - jnp.clip(beyond, -most, most), 0.0)
-        output = jnp.where(beyond == 0, within, within + beyond)
+        beyond = jnp.where(z.transfer > 0, z.output - limited, z.beyond)
+        beyond = jnp.where(jnp.isfinite(beyond), beyond - jnp.clip(beyond, -largest_change, largest_change), 0.0)
+        output = jnp.where(beyond == 0, limited, limited + beyond)
         # Who holds or stops a vehicle that nothing is wrong with gets no jump either.
-        safe = jnp.where(z.reason == code_of(OPERATOR), towards(self.safe_output), self.safe_output)
+        safe = jnp.where(z.reason == code_of(OPERATOR), slewed(self.safe_output), self.safe_output)
         leaves = controls & jnp.isfinite(command).all()
         output = jnp.where(leaves, output, safe)
         # Whatever the memory holds.
         output = jnp.where(jnp.isfinite(output), jnp.clip(output, self.watch.low, self.watch.high), self.safe_output)
-        return View(passed, given, r, rejected, controls, command, signals, output, beyond)
+        return View(passed, reference, r, rejected, controls, command, signals, output, beyond)
 
     def _by_fallback(self, z: SupervisedState, y: Measurement, r: Target) -> tuple[Inputs, dict[str, Array]]:
         """Command of the fallback; of the signals those that it declares, too, the others are zero."""
         assert self.fallback is not None
-        command, given = self.fallback.command(z.fallback, y, r)
+        command, fallback_signals = self.fallback.command(z.fallback, y, r)
         _, declared = jax.eval_shape(self.law.command, z.law, y, r)
-        alike = lambda name, form: name in given and given[name].shape == form.shape
+        alike = lambda name, form: name in fallback_signals and fallback_signals[name].shape == form.shape
         signals = {
-            name: given[name] if alike(name, form) else jnp.zeros(form.shape, form.dtype)
+            name: fallback_signals[name] if alike(name, form) else jnp.zeros(form.shape, form.dtype)
             for name, form in declared.items()
         }
         return command, signals
@@ -353,12 +354,12 @@ class Supervised(AbstractController):
         """The reference, or the last valid one at rest; and the number of entries that cannot be used."""
         lengths = ~jnp.asarray(np.array(self.model.coordinates.angles))
         speed = jnp.where(lengths, self.gate.max_speed, self.gate.max_rate)
-        far = jnp.abs(r.position) > jnp.where(lengths, self.gate.max_distance, _TURNS)
-        far = far | (jnp.abs(r.velocity) > speed)
-        far = far | (jnp.abs(r.acceleration) > speed / _SUDDEN)
-        wrong = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + far.sum(dtype=float)
+        implausible = jnp.abs(r.position) > jnp.where(lengths, self.gate.max_distance, _TURNS)
+        implausible = implausible | (jnp.abs(r.velocity) > speed)
+        implausible = implausible | (jnp.abs(r.acceleration) > speed / _SUDDEN)
+        unusable = (~jnp.isfinite(jnp.stack(r))).sum(dtype=float) + implausible.sum(dtype=float)
         held = (before.position, jnp.zeros_like(before.velocity), jnp.zeros_like(before.acceleration))
-        return Target(*(jnp.where(wrong > 0, kept, new) for kept, new in zip(held, r, strict=True))), wrong
+        return Target(*(jnp.where(unusable > 0, valid, new) for valid, new in zip(held, r, strict=True))), unusable
 
     def _advanced(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> tuple[PyTree, PyTree]:
         """States of law and fallback one step later; only the one that controls advances."""
@@ -369,7 +370,7 @@ class Supervised(AbstractController):
         by_fallback = lambda: (z.law, fallback.advance(z.fallback, y, r, u, step))
         return jax.lax.cond((z.fallback_controls > 0), by_fallback, by_law)
 
-    def _continued(self, z: SupervisedState, view: View, laws: tuple, again, broken) -> tuple[PyTree, PyTree]:
+    def _continued(self, z: SupervisedState, view: View, laws: tuple, begins_again, broken) -> tuple[PyTree, PyTree]:
         """States of law and fallback: begun again from the present measurement, advanced, or held."""
         y, r = view.passed.measurement, view.r
 
@@ -379,33 +380,33 @@ class Supervised(AbstractController):
             return self.law.restarted(self._knowledge(z), y, r), self.fallback.restarted(self._knowledge(z), y, r)
 
         held = lambda: (z.law, z.fallback)
-        goes_on = view.controls & ~broken & ~again
-        return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(again, begun, held))
+        goes_on = view.controls & ~broken & ~begins_again
+        return jax.lax.cond(goes_on, lambda: laws, lambda: jax.lax.cond(begins_again, begun, held))
 
     def _knowledge(self, z: SupervisedState) -> PyTree:
         """What law and fallback know and must not lose: of the one that controls, where both know the same things."""
-        known = _readable(self.law.knowledge(z.law))
+        of_law = _readable(self.law.knowledge(z.law))
         if self.fallback is None:
-            return known
-        own = _readable(self.fallback.knowledge(z.fallback))
-        if jax.tree.structure(own) != jax.tree.structure(known):
-            return known
-        return jax.tree.map(lambda a, b: jnp.where((z.fallback_controls > 0), a, b), own, known)
+            return of_law
+        of_fallback = _readable(self.fallback.knowledge(z.fallback))
+        if jax.tree.structure(of_fallback) != jax.tree.structure(of_law):
+            return of_law
+        return jax.tree.map(lambda a, b: jnp.where((z.fallback_controls > 0), a, b), of_fallback, of_law)
 
     def _allowance(self, z: SupervisedState, view: View, elapsed: Scalar) -> AllowanceState:
         """Allowed tracking error; where nobody controls, it is the present one."""
         coordinates = self.model.coordinates
-        here = self.tracking.start(coordinates, view.passed.measurement, view.r)
+        present = self.tracking.start(coordinates, view.passed.measurement, view.r)
         targets = z.place.pursued, view.r
         later = self.tracking.after(z.allowance, coordinates, view.passed.measurement, targets, elapsed)
-        return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, here, strict=True)))
+        return AllowanceState(*(jnp.where(view.controls, a, b) for a, b in zip(later, present, strict=True)))
 
     def _variation(self, z: SupervisedState, view: View, u: Inputs, step: Scalar) -> Scalar:
         """Average variation of the input, ranges from limit to limit per second."""
-        now = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
+        variation = (jnp.abs(u - z.output) / (self.watch.high - self.watch.low)).mean() / step
         share = jnp.minimum(step / _AVERAGED, 1.0)
         settled = (z.transfer == 0) & (view.beyond == 0).all()
-        return jnp.where(view.controls & settled, z.variation + share * (now - z.variation), 0.0)
+        return jnp.where(view.controls & settled, z.variation + share * (variation - z.variation), 0.0)
 
     def _jumped(self, conditions: Conditions) -> Bool[Array, ""]:
         """Whether readings that have jumped ask for SAFE, and a place has to be held for that."""
@@ -423,14 +424,14 @@ class Supervised(AbstractController):
             return z.fallback_controls > 0
         failed = jnp.stack([conditions.level[NUMBER[name]] for name in ("restarts_exhausted", "chattering")]).max() > 0
         fails = (z.fallback_controls > 0) | (failed & _controls(z.state))
-        asked = lambda request: z.request == int(request)
-        return (fails | asked(Request.FALLBACK)) & ~asked(Request.LAW)
+        requested = lambda request: z.request == int(request)
+        return (fails | requested(Request.FALLBACK)) & ~requested(Request.LAW)
 
-    def _next(self, z: SupervisedState, view: View, asked, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
+    def _next(self, z: SupervisedState, view: View, condition_state, reason) -> tuple[Int[Array, ""], Int[Array, ""]]:
         """State and reason of the next step, from what the conditions and the operator ask for."""
         code = lambda state: jnp.asarray(int(state))
         usable = (view.passed.not_finite == 0) & (view.passed.implausible <= 1)
-        state = asked
+        state = condition_state
         unknown = (z.state < int(State.INIT)) | (z.state > int(State.STOPPED))
         state = jnp.where(unknown, code(State.INIT), state)
         state = jnp.where(z.state == int(State.INIT), jnp.where(usable, code(State.READY), code(State.INIT)), state)
@@ -445,13 +446,13 @@ class Supervised(AbstractController):
     def _rate(self, z: SupervisedState, view: View, u: Inputs) -> Array:
         """Rate of the velocity by the model and the law's estimate of the uncertainty, m/s^2 and rad/s^2."""
         y = view.passed.measurement
-        known = self.law.known_acceleration(z.law, y, u)
-        acceleration = known
+        modelled = self.law.known_acceleration(z.law, y, u)
+        acceleration = modelled
         if "estimate" in view.signals:
             # One that has diverged would make a jump of every reading.
-            most = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
-            most = jnp.minimum(most, self.watch.max_estimate)
-            acceleration = known + jnp.clip(view.signals["estimate"], -most, most)
+            largest = _BELIEVED * jnp.minimum(self.gate.jump_velocity, self.gate.jump_rate) / self.sampling_time
+            largest = jnp.minimum(largest, self.watch.max_estimate)
+            acceleration = modelled + jnp.clip(view.signals["estimate"], -largest, largest)
         return rate_of_velocity(y, self.model.coordinates, acceleration)
 
 
@@ -491,6 +492,6 @@ def state_in(tree: PyTree) -> SupervisedState | None:
 
 def transfer(controller: AbstractController) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Limits of the input of a supervised controller, and its largest change in a step of a transfer."""
-    found: Any = controller if isinstance(controller, Supervised) else getattr(controller, "law", controller)
-    low, high = np.asarray(found.watch.low), np.asarray(found.watch.high)
-    return low, high, np.asarray(found.slew * (high - low) * found.sampling_time)
+    supervised: Any = controller if isinstance(controller, Supervised) else getattr(controller, "law", controller)
+    low, high = np.asarray(supervised.watch.low), np.asarray(supervised.watch.high)
+    return low, high, np.asarray(supervised.slew * (high - low) * supervised.sampling_time)

@@ -95,8 +95,8 @@ def supervisor(
     count = low.shape[0]
     if np.shape(safe_output) not in ((), (count,)):
         raise BadInput("safe_output", f"be one number or {count}, one per actuator", safe_output)
-    beyond = lambda safe, low, high: ((safe >= low) & (safe <= high)).all()
-    if not checks.assumed(beyond, safe_output, low, high):
+    within_limits = lambda safe, low, high: ((safe >= low) & (safe <= high)).all()
+    if not checks.assumed(within_limits, safe_output, low, high):
         limits = f"{float(low.min()):g} to {float(high.max()):g} {plant.input_unit}"
         raise BadInput("safe_output", f"be within the limits of the input, {limits}", safe_output)
     vehicle = start.body is not None
@@ -118,14 +118,14 @@ def supervisor(
         fallback = None if fallback is None else fault_tolerant(fallback, sampling_time, (low, high))
     authority = authority_of(law.model, plant)
     estimate = largest_estimate(authority) if max_estimate is None else max_estimate
-    least, largest = jnp.maximum(low, -BEYOND), jnp.minimum(high, BEYOND)
+    lowest, highest = jnp.maximum(low, -BEYOND), jnp.minimum(high, BEYOND)
     return Supervised(
         law=law,
         fallback=fallback,
         gate=gate,
-        report=ReportedInput(authority, largest - least),  # pyright: ignore[reportArgumentType] - arrays are Params
+        report=ReportedInput(authority, highest - lowest),  # pyright: ignore[reportArgumentType] - arrays are Params
         tracking=TrackingAllowance(max_position_error, max_angle_error, _DECAY),
-        watch=ConditionValues(least, largest, estimate, max_variation, restarts),
+        watch=ConditionValues(lowest, highest, estimate, max_variation, restarts),
         model=law.model,
         sampling_time=sampling_time,
         safe_output=jnp.broadcast_to(jnp.asarray(safe_output, dtype=float), (count,)),
@@ -140,5 +140,5 @@ def largest_estimate(authority: Outputs) -> Outputs:
 
     It is ten times the acceleration that the actuators can give, and 500 where they have no limit.
     """
-    known = jnp.isfinite(authority) & (authority > 0)
-    return jnp.where(known, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)
+    limited = jnp.isfinite(authority) & (authority > 0)
+    return jnp.where(limited, jnp.maximum(_SHARE * authority, _LEAST), _UNLIMITED)

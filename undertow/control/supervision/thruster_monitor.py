@@ -284,37 +284,39 @@ class ThrusterMonitor(eqx.Module):
             ((1 + self.learning / since) * self.threshold) ** 2, jnp.asarray(self.margin), self.least * self.largest
         )
         awake = past.quiet <= 0
-        found, explained = one_thruster(onsets, missing, used, bounds)
+        suspect, explained = one_thruster(onsets, missing, used, bounds)
         at_once = jnp.sqrt(explained) / self.threshold
-        behind = forces[0]
+        filtered_forces = forces[0]
         slow = (residual - past.background) / self.unit
-        seen_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
+        weighed_slow = weighed(scaled, past.slow_covariance + jnp.eye(len(slow)), slow)
         diagonal = jnp.eye(len(used)) > 0
-        ratio = jnp.where(
-            diagonal, missing_effect(seen_slow, behind - past.slow_forces), missing_effect(wide.weighed, wide.changes)
-        )
+        ratio_of_single = missing_effect(weighed_slow, filtered_forces - past.slow_forces)
+        ratio_of_pair = missing_effect(wide.weighed, wide.changes)
+        ratio = jnp.where(diagonal, ratio_of_single, ratio_of_pair)
         likelihood, likely, likely_pair = self._accumulated(past, ratio, used, elapsed)
-        strained = jnp.where(jnp.abs(behind) > _STRAINED * self.largest, likely_pair, 0.0)
-        suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(found, likely), differs) * used, 0.0)
+        strained = jnp.where(jnp.abs(filtered_forces) > _STRAINED * self.largest, likely_pair, 0.0)
+        suspicious = jnp.where(awake, jnp.maximum(jnp.maximum(suspect, likely), differs) * used, 0.0)
         suspected = jnp.where(suspicious > 0, past.suspected + elapsed, jnp.maximum(past.suspected - elapsed, 0.0))
         alarm = (suspected > self.persistence) & (suspected >= suspected.max()) & (used > 0)
-        both = two_thrusters(wide, behind, used, bounds)
-        both = jnp.where(awake, jnp.where(both.max() > 0, both, strained), 0.0)
-        in_pair = jnp.where(both > 0, past.in_pair + elapsed, 0.0)
-        both_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (both > 0)).sum() > 1)
-        alarm = jnp.where(alarm.any(), alarm, both_alarm)
+        pair = two_thrusters(wide, filtered_forces, used, bounds)
+        pair = jnp.where(awake, jnp.where(pair.max() > 0, pair, strained), 0.0)
+        in_pair = jnp.where(pair > 0, past.in_pair + elapsed, 0.0)
+        pair_alarm = (in_pair > self.persistence) & (((in_pair > self.persistence) & (pair > 0)).sum() > 1)
+        alarm = jnp.where(alarm.any(), alarm, pair_alarm)
         longest = jnp.maximum(gradual[0].suspected, gradual[1].suspected)
         gradual_alarm = (longest > self.gradual_persistence) & (longest >= longest.max())
         alarm = jnp.where(alarm.any(), alarm, gradual_alarm & (used > 0) & awake)
         raised = alarm.any()
         forgotten = -jnp.expm1(-elapsed / self.background_time)
         steady = jnp.maximum(elapsed / self.memory, 1 / (past.examinations + _FIRST))
-        weight = steady * jnp.minimum(1.0, _CLIP * len(slow) / jnp.where(seen_slow.total > 0, seen_slow.total, 1.0))
+        weight = steady * jnp.minimum(
+            1.0, _CLIP * len(slow) / jnp.where(weighed_slow.total > 0, weighed_slow.total, 1.0)
+        )
         return ThrusterMonitorState(
             onsets=cleared(onsets, raised),
             wide_covariance=covariance_of_wide,
             background=past.background + forgotten * (residual - past.background),
-            slow_forces=past.slow_forces + forgotten * (behind - past.slow_forces),
+            slow_forces=past.slow_forces + forgotten * (filtered_forces - past.slow_forces),
             slow_covariance=past.slow_covariance * (1 - steady) + weight * slow[:, None] * slow[None, :],
             likelihood=likelihood,
             suspected=jnp.where(raised, 0.0, suspected),
@@ -381,8 +383,8 @@ class ThrusterMonitor(eqx.Module):
         summed = jnp.maximum(past.likelihood * (1 - elapsed / self.fading) + ratio, 0.0)
         in_use = jnp.where((used > 0) & (past.quiet <= 0), 1.0, 0.0)
         summed = summed * in_use[:, None] * in_use[None, :]
-        own = jnp.eye(len(used))
-        single, pair = (summed * own).max(1), summed * jnp.triu(jnp.ones_like(own), 1)
+        identity = jnp.eye(len(used))
+        single, pair = (summed * identity).max(1), summed * jnp.triu(jnp.ones_like(identity), 1)
         best, best_pair = single.max(), pair.max()
         is_best, is_best_pair = single >= best, (pair >= best_pair) & (best_pair > 0)
         second = jnp.where(is_best, 0.0, single).max()

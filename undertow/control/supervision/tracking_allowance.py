@@ -53,10 +53,10 @@ class TrackingAllowance(eqx.Module):
         before, r = targets
         jump = coordinates.difference(r.position, before.position) - dt * before.velocity
         decayed = (
-            jnp.maximum(0.0, kept - dt * limit / self.seconds)
-            for kept, limit in zip(state, (self.max_position_error, self.max_angle_error), strict=True)
+            jnp.maximum(0.0, allowance - dt * limit / self.seconds)
+            for allowance, limit in zip(state, (self.max_position_error, self.max_angle_error), strict=True)
         )
-        jumped = (kept + size for kept, size in zip(decayed, _sizes(coordinates, jump), strict=True))
+        jumped = (allowance + size for allowance, size in zip(decayed, _sizes(coordinates, jump), strict=True))
         return AllowanceState(*map(jnp.minimum, jumped, self.start(coordinates, y, r)))
 
     def ratios(
@@ -70,4 +70,4 @@ class TrackingAllowance(eqx.Module):
 def _sizes(coordinates: AbstractCoordinates, difference: Array) -> tuple[Scalar, Scalar]:
     """Lengths of the parts of a difference that are lengths and angles."""
     turns = np.array(coordinates.angles)
-    return tuple(length(difference * jnp.asarray(which, dtype=float)) for which in (~turns, turns))  # pyright: ignore[reportReturnType] - two of them
+    return tuple(length(difference * jnp.asarray(mask, dtype=float)) for mask in (~turns, turns))  # pyright: ignore[reportReturnType] - two of them

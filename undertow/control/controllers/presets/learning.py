@@ -101,8 +101,8 @@ def _identification(law: RobustRCAF, axes: int, probing, learnt: Knowledge | Non
         checks.per_axis("probing", probing, axes)
     angles = np.asarray(law.model.coordinates.angles)
     amplitude = np.where(angles, _PROBING, 0.0) if probing is None else np.broadcast_to(probing, (axes,))
-    known = None if learnt is None else learnt.inertia
-    if known is None and not checks.traced(amplitude) and not np.any(amplitude):
+    expected = None if learnt is None else learnt.inertia
+    if expected is None and not checks.traced(amplitude) and not np.any(amplitude):
         return None
     middle = jnp.sqrt(jnp.sqrt(law.feedback[..., 0]) * law.estimator.bandwidth)
-    return InertiaIdentification(amplitude=amplitude, frequency=middle * np.linspace(*_SPREAD, axes), expected=known)
+    return InertiaIdentification(amplitude=amplitude, frequency=middle * np.linspace(*_SPREAD, axes), expected=expected)

@@ -76,27 +76,27 @@ class Estimator(eqx.Module):
     def gains(self, dt: Float[Array, ""]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
         """Correction of the rates (1) and of d_hat (1/s) per modelling error."""
         decay = jnp.exp(-self.damping * self.bandwidth * dt)
-        both = 2 * decay * _cosine_of_root((self.bandwidth * dt) ** 2 * (1 - self.damping**2))  # sum of the poles
-        return 2 - both, (1 + decay**2 - both) / dt
+        pole_sum = 2 * decay * _cosine_of_root((self.bandwidth * dt) ** 2 * (1 - self.damping**2))  # sum of the poles
+        return 2 - pole_sum, (1 + decay**2 - pole_sum) / dt
 
     def advance(
-        self, state: EstimatorState, seen: UncertaintyEstimate, known: PerAxis, tracking: PerAxis, dt
+        self, state: EstimatorState, observed: UncertaintyEstimate, modelled: PerAxis, tracking: PerAxis, dt
     ) -> EstimatorState:
         """State one sampling time later.
 
         Args:
             state: now.
-            seen: `estimate` of now.
-            known: F + G u of the applied input, m/s^2 and rad/s^2.
+            observed: `estimate` of now.
+            modelled: F + G u of the applied input, m/s^2 and rad/s^2.
             tracking: mu s, the share of the filtered tracking error, m/s and rad/s; zero for a pure observer.
             dt: sampling time, s.
         """
         of_rates, of_estimate = self.gains(dt)
-        moved = of_estimate * (seen.error + tracking)
-        weights = state.weights - (moved / (seen.basis**2).sum(-1))[:, None] * seen.basis
-        leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, moved.shape) * dt)[:, None]
-        weights = weights - leaked * _unseen(weights, seen.basis)
-        rates = state.rates + dt * (known + seen.uncertainty) - of_rates * seen.error
+        correction = of_estimate * (observed.error + tracking)
+        weights = state.weights - (correction / (observed.basis**2).sum(-1))[:, None] * observed.basis
+        leaked = -jnp.expm1(-jnp.broadcast_to(self.leakage, correction.shape) * dt)[:, None]
+        weights = weights - leaked * _unseen(weights, observed.basis)
+        rates = state.rates + dt * (modelled + observed.uncertainty) - of_rates * observed.error
         return EstimatorState(rates, self._in_box(weights))
 
     def lowered(self, state: EstimatorState, amount: PerAxis) -> EstimatorState:
@@ -113,10 +113,10 @@ class Estimator(eqx.Module):
 
 def _unseen(weights: Float[Array, "n rules"], basis: Float[Array, "n rules"]) -> Float[Array, "n rules"]:
     """The part of the weights that is orthogonal to the basis and to (1, ..., 1)."""
-    apart, lean = (one - one.mean(-1, keepdims=True) for one in (weights, basis))
-    size = (lean**2).sum(-1, keepdims=True)
-    along = (apart * lean).sum(-1, keepdims=True) / jnp.where(size > _EVEN, size, 1.0)
-    return apart - along * lean
+    centred, direction = (rows - rows.mean(-1, keepdims=True) for rows in (weights, basis))
+    size = (direction**2).sum(-1, keepdims=True)
+    along = (centred * direction).sum(-1, keepdims=True) / jnp.where(size > _EVEN, size, 1.0)
+    return centred - along * direction
 
 
 def _cosine_of_root(x: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -144,9 +144,9 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
         bound: theta_max, m/s^2 and rad/s^2; without a finite one the sets are unchanged.
     """
     # Operation by operation, and not compiled, so that one value and many traced ones are rounded alike.
-    given = (bandwidth, damping, bound, _slope(fuzzy))
-    library: Any = jnp if checks.traced(*given) else np
-    bandwidth, damping, bound, slope = (library.asarray(value, dtype=float) for value in given)
+    settings = (bandwidth, damping, bound, _slope(fuzzy))
+    library: Any = jnp if checks.traced(*settings) else np
+    bandwidth, damping, bound, slope = (library.asarray(value, dtype=float) for value in settings)
     with np.errstate(divide="ignore", invalid="ignore"):  # of values that the estimator refuses
         reach = bound * (slope / (_ADDED * 2 * damping * bandwidth))
     factor = library.maximum(_LEAST, library.where(library.isfinite(reach), reach, _LEAST)).max()

@@ -36,37 +36,37 @@ def none(axes: int) -> Evidence:
     return Evidence(jnp.zeros(()), zero, zero, zero)
 
 
-def gathered(before: Evidence, alone: PerAxis, explained: PerAxis, span, judging_time) -> Evidence:
+def gathered(past: Evidence, alone: PerAxis, explained: PerAxis, span, judging_time) -> Evidence:
     """Evidence with that of one more step.
 
     Args:
-        before: until now.
+        past: until now.
         alone: eps_0, m/s and rad/s.
         explained: eps_m, m/s and rad/s.
         span: of the step, s; 0 for a step that does not count.
         judging_time: over which evidence is forgotten, s.
     """
-    remains = 1 - span / judging_time
-    new = Evidence(jnp.ones(()), alone**2, alone * explained, explained**2)
-    return Evidence(*(remains * old + span * one for old, one in zip(before, new, strict=True)))
+    forgetting = 1 - span / judging_time
+    added = Evidence(jnp.ones(()), alone**2, alone * explained, explained**2)
+    return Evidence(*(forgetting * old + span * new for old, new in zip(past, added, strict=True)))
 
 
-def best_share(found: Evidence) -> tuple[PerAxis, PerAxis]:
+def best_share(evidence: Evidence) -> tuple[PerAxis, PerAxis]:
     """The share of the memory that leaves the least modelling error, and twice its standard error."""
-    known = found.explained > _NOTHING
-    size = jnp.where(known, found.explained, 1.0)
-    left = found.alone * found.explained - found.shared**2
-    spread = 2 * safe_sqrt(left) * jnp.sqrt(_CORRELATED / jnp.maximum(found.time, _CORRELATED)) / size
-    return jnp.where(known, found.shared / size, 1.0), jnp.where(known, spread, 1.0)
+    judged = evidence.explained > _NOTHING
+    size = jnp.where(judged, evidence.explained, 1.0)
+    residual = evidence.alone * evidence.explained - evidence.shared**2
+    spread = 2 * safe_sqrt(residual) * jnp.sqrt(_CORRELATED / jnp.maximum(evidence.time, _CORRELATED)) / size
+    return jnp.where(judged, evidence.shared / size, 1.0), jnp.where(judged, spread, 1.0)
 
 
-def trust(found: Evidence) -> PerAxis:
+def trust(evidence: Evidence) -> PerAxis:
     """Share of the memory that is used, 0 to 1: 1 unless less of it is better beyond the standard error."""
-    share, spread = best_share(found)
+    share, spread = best_share(evidence)
     return jnp.clip(share + spread, 0.0, 1.0)
 
 
-def wrong(found: Evidence) -> Float[Array, ""]:
+def wrong(evidence: Evidence) -> Float[Array, ""]:
     """How wrong the memory is, 0 to 1: by how far the best share of any axis differs from 1 beyond its error."""
-    share, spread = best_share(found)
+    share, spread = best_share(evidence)
     return jnp.clip(jnp.abs(share - 1) - spread, 0.0, 1.0).max()

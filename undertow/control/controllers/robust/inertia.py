@@ -93,16 +93,16 @@ class InertiaIdentification(eqx.Module):
 
     def init(self, axes: int) -> InertiaState:
         """State before the first step."""
-        axis, phasor, now = jnp.zeros(axes), jnp.zeros((2, axes)), jnp.zeros(())
-        return InertiaState(axis, axis, axis, phasor, phasor, now, phasor, phasor, axis, axis, axis)
+        axis, phasor, zero = jnp.zeros(axes), jnp.zeros((2, axes)), jnp.zeros(())
+        return InertiaState(axis, axis, axis, phasor, phasor, zero, phasor, phasor, axis, axis, axis)
 
     def ratio(self, state: InertiaState) -> PerAxis:
         """h, shrunk towards what is expected by its standard error."""
         real, _ = self._transfer(state)
         prior = self.plausible**2
         expected = 1.0 if self.expected is None else self.expected
-        found = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
-        return jnp.clip(jnp.where(self.amplitude > 0, found, expected), 1 / _HEAVIEST, _HEAVIEST)
+        shrunk = expected + (real - expected) * prior / (prior + self.error(state) ** 2)
+        return jnp.clip(jnp.where(self.amplitude > 0, shrunk, expected), 1 / _HEAVIEST, _HEAVIEST)
 
     def used(self, state: InertiaState) -> PerAxis:
         """h by which corrections are scaled, from 1."""
@@ -114,8 +114,8 @@ class InertiaIdentification(eqx.Module):
         size = (state.response**2).sum(0) * self.frequency**2 + _NOTHING
         unseen = (self.window / jnp.maximum(state.counted, self.window / _UNKNOWN)) ** 4
         impossible = (real - jnp.clip(real, 1 / _HEAVIEST, _HEAVIEST)) ** 2
-        found = jnp.sqrt(self.window * state.noise / (2 * size) + unseen + impossible)
-        return jnp.where(self.amplitude > 0, jnp.minimum(found, _UNKNOWN), _UNKNOWN)
+        deviation = jnp.sqrt(self.window * state.noise / (2 * size) + unseen + impossible)
+        return jnp.where(self.amplitude > 0, jnp.minimum(deviation, _UNKNOWN), _UNKNOWN)
 
     def motion(self, state: InertiaState) -> tuple[PerAxis, PerAxis, PerAxis]:
         """Displacement (m, rad), rate and acceleration of the target besides those of the reference."""
@@ -140,24 +140,24 @@ class InertiaIdentification(eqx.Module):
         # At the end of a window, its weight in what is found.
         real, imaginary = self._transfer(state)
         motion = self.frequency[None, :] * _turned(response)
-        left = ((applied - real[None, :] * motion - imaginary[None, :] * _turned(motion)) ** 2).sum(0) / self.window
+        residual = ((applied - real[None, :] * motion - imaginary[None, :] * _turned(motion)) ** 2).sum(0) / self.window
         size = state.window_size + span * self._size(state)
         usual = state.noise / jnp.maximum(state.counted, _NOTHING)
-        most = self.window * _SUDDEN**2 * usual + (size / 2) ** 2 / self.window
+        plausible_residual = self.window * _SUDDEN**2 * usual + (size / 2) ** 2 / self.window
         ended = state.since + span >= self.window
-        weight = jnp.where(ended, most / (most + left + _NOTHING**2), 0.0)
-        kept, running = 1 - span / self.horizon, jnp.where(ended, 0.0, 1.0)
+        weight = jnp.where(ended, plausible_residual / (plausible_residual + residual + _NOTHING**2), 0.0)
+        forgetting, running = 1 - span / self.horizon, jnp.where(ended, 0.0, 1.0)
         return InertiaState(
             angle=jnp.mod(state.angle + self.frequency * dt, 2 * jnp.pi),
-            time=kept * state.time + span * share**2,
-            response=kept * state.response + (share * weight)[None, :] * response,
-            applied=kept * state.applied + (share * weight)[None, :] * applied,
-            counted=kept * state.counted + share**2 * weight * self.window,
+            time=forgetting * state.time + span * share**2,
+            response=forgetting * state.response + (share * weight)[None, :] * response,
+            applied=forgetting * state.applied + (share * weight)[None, :] * applied,
+            counted=forgetting * state.counted + share**2 * weight * self.window,
             since=running * (state.since + span),
             window_response=running * response,
             window_applied=running * applied,
             window_size=running * size,
-            noise=kept * state.noise + share**2 * weight * left,
+            noise=forgetting * state.noise + share**2 * weight * residual,
             square=state.square + dt / self.window * (square - state.square),
         )
 

@@ -57,15 +57,15 @@ def load_knowledge(path) -> Knowledge:
         with Path(path).open("rb") as file, np.load(file) as held:
             _check_sizes(held.zip)
             raw = {name: held[name] for name in _SIGNALS if name in held or name in _ALWAYS}
-            found = _real(raw)
+            arrays = _real(raw)
     except _DAMAGED as error:
         raise BadInput("knowledge", _MUST, str(path)) from error
-    weights, variance, inertia = found["weights"], found["variance"], found.get("inertia")
+    weights, variance, inertia = arrays["weights"], arrays["variance"], arrays.get("inertia")
     good = weights.ndim == 2 and variance.shape == weights.shape[:1]
     if not good or (inertia is not None and inertia.shape != weights.shape[1:]):
-        got = ", ".join(f"{name} of shape {value.shape}" for name, value in found.items())
+        got = ", ".join(f"{name} of shape {value.shape}" for name, value in arrays.items())
         raise BadInput("knowledge", _MUST, f"{path} with {got}")
-    for value in found.values():
+    for value in arrays.values():
         checks.finite("knowledge", value)
     if (variance < 0).any() or (variance > 1 + 1e-9).any():
         raise BadInput(
@@ -73,11 +73,11 @@ def load_knowledge(path) -> Knowledge:
         )
     if inertia is not None and (inertia <= 0).any():
         raise BadInput("knowledge", "have inertias above 0", str(path))
-    return Knowledge(**{name: jnp.asarray(value) for name, value in found.items()})
+    return Knowledge(**{name: jnp.asarray(value) for name, value in arrays.items()})
 
 
 def _check_sizes(archive: zipfile.ZipFile) -> None:
-    if sum(one.file_size for one in archive.infolist()) > 8 * _LARGEST:
+    if sum(member.file_size for member in archive.infolist()) > 8 * _LARGEST:
         raise ValueError("larger than any memory")
 
 
@@ -101,15 +101,15 @@ def regressor_names(axes: Sequence[str], rules: int, regressor: str, body: bool)
     """
     names = ["1", *(f"acceleration of {axis}" for axis in axes)]
     if regressor != "linear":
-        places = [place for place in np.linspace(-1, 1, rules) if place]
-        names += [f"rule of {axis} at {place:+.3g} of its range" for axis in axes for place in places]
+        centres = [centre for centre in np.linspace(-1, 1, rules) if centre]
+        names += [f"rule of {axis} at {centre:+.3g} of its range" for axis in axes for centre in centres]
     if regressor != "rules":
         names += [*axes, *(f"{axis} |{axis}|" for axis in axes)]
     if body:
         u, turning = axes[:3], axes[3:]
         names += [f"gravity along {axis}" for axis in u]
         pairs = [(u, u, 1), (turning, u, 1), (turning, u, 2)]
-        names += [f"{one[i]} {other[(i + shift) % 3]}" for one, other, shift in pairs for i in range(3)]
+        names += [f"{left[i]} {right[(i + shift) % 3]}" for left, right, shift in pairs for i in range(3)]
     return names
 
 
@@ -134,7 +134,7 @@ def strongest(weights, variance, names: Sequence[str], axes: Sequence[str], coun
     """
     order = np.argsort(-np.abs(np.asarray(weights)), axis=0)[:count]
     return [
-        Learnt(axis, names[int(k)], float(weights[k, place]), float(variance[k]))
-        for place, axis in enumerate(axes)
-        for k in order[:, place]
+        Learnt(axis, names[int(k)], float(weights[k, column]), float(variance[k]))
+        for column, axis in enumerate(axes)
+        for k in order[:, column]
     ]

@@ -108,10 +108,8 @@ class Memory(eqx.Module):
         checks.length("speeds", self.speeds, axes, "axes")
         if self.inertia is not None:
             self.inertia.check_fit(axes)
-        shapes, count = (
-            tuple(None if one is None else one.shape for one in (self.start, self.variance)),
-            self.size(axes, body),
-        )
+        count = self.size(axes, body)
+        shapes = tuple(None if array is None else array.shape for array in (self.start, self.variance))
         if shapes not in ((None, None), ((count, axes), (count,))):
             must = f"have {count} regressors for {axes} axes"
             raise BadInput("knowledge", must, shapes[0], hint="Take the rules and the regressor it was learnt with")
@@ -132,17 +130,17 @@ class Memory(eqx.Module):
         shapes = 0 if self.regressor == "rules" else 2
         return 1 + axes * (rules + shapes) + axes + (3 + 9 if body else 0)
 
-    def regressors(self, y: Measurement, velocity: PerAxis, off: TrackingError, body: bool) -> Regressor:
+    def regressors(self, y: Measurement, velocity: PerAxis, tracking_error: TrackingError, body: bool) -> Regressor:
         """phi at the reference.
 
         Args:
             y: measurement; of it only the attitude is used, turned by the error to that of the reference.
             velocity: of the plant, in the coordinates of the law, m/s and rad/s.
-            off: errors from the reference and its acceleration.
+            tracking_error: errors from the reference and its acceleration.
             body: whether the plant is a body, with an attitude and products of velocities.
         """
-        share = (velocity + off.rate) / self.speeds
-        parts = [jnp.ones(1), off.acceleration]
+        share = (velocity + tracking_error.rate) / self.speeds
+        parts = [jnp.ones(1), tracking_error.acceleration]
         if self.regressor != "linear":
             still = self.fuzzy.basis(jnp.zeros((1, 1)))
             rules = self.fuzzy.basis(share[:, None]) - still
@@ -155,7 +153,7 @@ class Memory(eqx.Module):
             u, turning = share[:3], share[3:]
             around = jnp.stack([u[1], u[2], u[0]])
             further = jnp.stack([u[2], u[0], u[1]])
-            parts += [down + cross(down, off.error[3:]) - jnp.asarray([0.0, 0.0, 1.0])]
+            parts += [down + cross(down, tracking_error.error[3:]) - jnp.asarray([0.0, 0.0, 1.0])]
             parts += [u * around, turning * around, turning * further]
         return jnp.concatenate(parts)
 
@@ -187,34 +185,34 @@ class Memory(eqx.Module):
         return self.recalled(state, phi) + (1 - self.inertia_ratio(state)) * correction
 
     def advance(
-        self, state: MemoryState, phi: Regressor, seen: Observed, gains, free, dt
+        self, state: MemoryState, phi: Regressor, observed: Observed, gains, free, dt
     ) -> tuple[MemoryState, PerAxis]:
         """State one sampling time later, and what the observer loses of its estimate, m/s^2 and rad/s^2.
 
         Args:
             state: now.
             phi: regressor now.
-            seen: what this step tells.
+            observed: what this step tells.
             gains: of the observer, per sampling time and 1/s.
             free: 1, or 0 while limits bind and nothing is learnt.
             dt: sampling time, s.
         """
         of_rates, of_estimate = gains
         used, span, h = evidence.trust(state.evidence), free * dt, self.inertia_ratio(state)
-        innovation = h * seen.rest - (1 - used) * matvec(state.weights.T, state.lagged)
-        towards = matvec(state.covariance, state.lagged)
-        size = dt * (state.lagged * towards).sum()
-        forgets = dt / self.horizon
-        share = jnp.where(size > forgets, 1 - forgets / jnp.where(size > forgets, size, 1.0), 0.0)
-        weights = state.weights + span / (1 + size) * towards[:, None] * innovation[None, :]
-        shrunk = share * span / (1 + share * size) * towards[:, None] * towards[None, :]
+        innovation = h * observed.rest - (1 - used) * matvec(state.weights.T, state.lagged)
+        direction = matvec(state.covariance, state.lagged)
+        size = dt * (state.lagged * direction).sum()
+        forgetting = dt / self.horizon
+        share = jnp.where(size > forgetting, 1 - forgetting / jnp.where(size > forgetting, size, 1.0), 0.0)
+        weights = state.weights + span / (1 + size) * direction[:, None] * innovation[None, :]
+        shrunk = share * span / (1 + share * size) * direction[:, None] * direction[None, :]
         reopened = evidence.wrong(state.evidence) * span / self.judging_time
         unknown = self.learning_rate * jnp.eye(phi.shape[0])
         explained = matvec(state.weights.T, state.ahead)
-        alone, inertia = h * seen.error + used * explained, None
+        alone, inertia = h * observed.error + used * explained, None
         if self.inertia is not None and state.inertia is not None:
-            expected = seen.nominal + self.recalled(state, phi)
-            inertia = self.inertia.advance(state.inertia, seen.off, seen.rate, expected, free, dt)
+            expected = observed.nominal + self.recalled(state, phi)
+            inertia = self.inertia.advance(state.inertia, observed.off, observed.rate, expected, free, dt)
         after = MemoryState(
             weights=jnp.clip(weights, -self.bound, self.bound),
             covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),
@@ -224,7 +222,7 @@ class Memory(eqx.Module):
             taken=state.taken,
             inertia=inertia,
         )
-        gained = self.value(after, phi, seen.correction) - self.value(state, phi, seen.correction)
+        gained = self.value(after, phi, observed.correction) - self.value(state, phi, observed.correction)
         lost = gained / self.inertia_ratio(after)
         return after._replace(taken=state.taken + lost), lost
 

@@ -96,9 +96,9 @@ class RobustRCAF(AbstractController):
             checks.not_negative(name, getattr(self, name))
         for name in ("layer", "actuator_rate", "direction"):
             checks.positive(name, getattr(self, name))
-        own = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
+        gains = {name: getattr(self, name) for name in ("tracking_share", "robust_gain", "layer")}
         estimators = {name: getattr(self.estimator, name) for name in ("bandwidth", "damping", "bound", "leakage")}
-        check_gains(self.feedback, self.weight, own | estimators, len(self.model.coordinates.angles))
+        check_gains(self.feedback, self.weight, gains | estimators, len(self.model.coordinates.angles))
         if self.memory is not None:
             self.memory.check_fit(len(self.model.coordinates.angles), bool(self.model.coordinates.axes))
 
@@ -144,21 +144,25 @@ class RobustRCAF(AbstractController):
     def advance(self, z: RobustState, y: Measurement, r: Target, u_applied, dt) -> RobustState:
         plan, actuators, effect = self._plan(z, y, r), self.model.actuators, self.model.dynamics.gain(y)
         # While limits bind, the reference waits, and the tracking error is not caused by d.
-        going = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
-        share = attained(effect, plan.forces, going)
-        learnt = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
-        known, remembered, lost = self._known(plan.actuators, y, u_applied), None, None
+        applied = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
+        share = attained(effect, plan.forces, applied)
+        tracking_term = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
+        modelled = self._known(plan.actuators, y, u_applied)
+        remembered, lost = None, None
         if self.memory is not None and z.memory is not None and plan.recalled is not None:
-            off, rest = plan.off, plan.seen.uncertainty - plan.recalled.value
-            correction, beside = plan.recalled.correction, known - off.acceleration
-            observed = Observed(rest, plan.seen.error, off.error, correction, -off.rate, beside)
-            gains = tuple(jnp.mean(one) for one in self.estimator.gains(dt))
+            tracking_error, correction = plan.off, plan.recalled.correction
+            unexplained = plan.seen.uncertainty - plan.recalled.value
+            nominal = modelled - tracking_error.acceleration
+            observed = Observed(
+                unexplained, plan.seen.error, tracking_error.error, correction, -tracking_error.rate, nominal
+            )
+            gains = tuple(jnp.mean(gain) for gain in self.estimator.gains(dt))
             free = jnp.where(share < _WHOLE, 0.0, 1.0)
             remembered, lost = self.memory.advance(z.memory, plan.recalled.phi, observed, gains, free, dt)
             # What differs from the desired acceleration acts on the inertia that was learnt.
-            expected = known + plan.seen.uncertainty
-            known = known + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
-        estimator = self.estimator.advance(z.estimator, plan.seen, known, learnt, dt)
+            expected = modelled + plan.seen.uncertainty
+            modelled = modelled + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
+        estimator = self.estimator.advance(z.estimator, plan.seen, modelled, tracking_term, dt)
         if lost is not None:
             estimator = self.estimator.lowered(estimator, lost)
         return RobustState(
@@ -169,18 +173,18 @@ class RobustRCAF(AbstractController):
             memory=remembered,
         )
 
-    def _room(self, y: Measurement, off: Tracking) -> Room:
+    def _room(self, y: Measurement, tracking_error: Tracking) -> Room:
         """Authority of the actuators for each output, and the part of the error that exceeds it."""
         dynamics, coordinates, actuators = self.model
         effect = dynamics.gain(y)
         force = largest_forces(actuators, effect.shape[1])
         reach = _FAR * matvec(jnp.abs(effect), force) / self.feedback[..., 0]
-        away = jnp.abs(off.error) > reach
+        away = jnp.abs(tracking_error.error) > reach
         outward = lambda motion: coordinates.output_velocity(y, motion)
         return Room(
             most=matvec(jnp.abs(jax.vmap(outward, 1, 1)(effect)), force),
-            excess=outward(off.error - jnp.clip(off.error, -reach, reach)),
-            pace=outward(jnp.where(away, off.rate, 0.0)),
+            excess=outward(tracking_error.error - jnp.clip(tracking_error.error, -reach, reach)),
+            pace=outward(jnp.where(away, tracking_error.rate, 0.0)),
         )
 
     def known_acceleration(self, z: RobustState, y: Measurement, u_applied) -> PerAxis:
@@ -196,25 +200,26 @@ class RobustRCAF(AbstractController):
         return companion_lyapunov(self.feedback, self.weight)
 
     def _known(self, actuators: Any, y: Measurement, u_applied) -> PerAxis:
-        dynamics, given = self.model.dynamics, self.model.actuators.force(actuators, u_applied)
-        return dynamics.drift(y) + matvec(dynamics.gain(y), given)
+        dynamics, forces = self.model.dynamics, self.model.actuators.force(actuators, u_applied)
+        return dynamics.drift(y) + matvec(dynamics.gain(y), forces)
 
     def _plan(self, z: RobustState, y: Measurement, r: Target) -> RobustDecisions:
         dynamics, coordinates, actuators = self.model
         reported = actuators.update_from_report(z.actuators, y.actuator)
         target = r if self.filter is None else self.filter.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
-        off, recalled = tracking(coordinates, self.lyapunov(), y, target), None
-        u_r = self.robust_gain * jnp.tanh(off.filtered / self.layer)
+        tracking_error = tracking(coordinates, self.lyapunov(), y, target)
+        recalled = None
+        u_r = self.robust_gain * jnp.tanh(tracking_error.filtered / self.layer)
         velocity = coordinates.velocity(y)
-        seen = self.estimator.estimate(z.estimator, velocity)
-        desired = off.acceleration + off.feedback(self.feedback) + u_r
+        estimate = self.estimator.estimate(z.estimator, velocity)
+        desired = tracking_error.acceleration + tracking_error.feedback(self.feedback) + u_r
         if self.memory is not None and z.memory is not None:
-            at = TrackingError(off.error, off.rate, off.acceleration)
+            at = TrackingError(tracking_error.error, tracking_error.rate, tracking_error.acceleration)
             phi = self.memory.regressors(y, velocity, at, bool(coordinates.axes))
             desired = desired + self.memory.probing(z.memory, self.feedback)
-            correction = desired - off.acceleration - seen.uncertainty
+            correction = desired - tracking_error.acceleration - estimate.uncertainty
             recalled = Recalled(phi, correction, self.memory.value(z.memory, phi, correction))
-            seen = seen._replace(uncertainty=seen.uncertainty + recalled.value)
-        compensated = seen.uncertainty + self.model.drift_at_target_velocity(y, off.rate)
+            estimate = estimate._replace(uncertainty=estimate.uncertainty + recalled.value)
+        compensated = estimate.uncertainty + self.model.drift_at_target_velocity(y, tracking_error.rate)
         forces = dynamics.invert(y, desired - compensated)
-        return RobustDecisions(reported, seen, off, u_r, desired, forces, recalled)
+        return RobustDecisions(reported, estimate, tracking_error, u_r, desired, forces, recalled)
