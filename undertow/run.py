@@ -227,17 +227,19 @@ def _with_faults(
         return dataclasses.replace(loop, faults=faults)
     if not isinstance(faults, list | tuple) or not all(isinstance(entry, Mapping) for entry in faults):
         raise BadInput("faults", "be a list of mappings", faults)
-    made = {place: entry["mode"] for place, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)}
-    named = {place: {"mode": type(mode).__name__} for place, mode in made.items()}
+    mode_objects = {
+        index: entry["mode"] for index, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)
+    }
+    named = {index: {"mode": type(mode).__name__} for index, mode in mode_objects.items()}
     entries = []
-    for place, entry in enumerate(faults):
-        with within(f"faults[{place}]"):
+    for index, entry in enumerate(faults):
+        with within(f"faults[{index}]"):
             try:
-                entries.append(Fault.model_validate({**entry, **named.get(place, {})}))
+                entries.append(Fault.model_validate({**entry, **named.get(index, {})}))
             except ValidationError as errors:
                 raise complaint(errors, from_data({}), Fault) from None
     with within("faults"):
-        return faulted(loop, entries, sampling_time=dt, made=made)[0]
+        return faulted(loop, entries, sampling_time=dt, made=mode_objects)[0]
 
 
 def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:
@@ -253,8 +255,8 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)
-    for one in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
-        warnings.warn(one.sentence, stacklevel=3)
+    for advice in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
+        warnings.warn(advice.sentence, stacklevel=3)
     outcome, left_to_xla = run_loop(closed_loop, settings, start, seed)
     criterion = criterion_of(None, meanings(closed_loop))
     metrics_settings = MetricsSettings(window.of_run(settings.duration), settings.dt, criterion=criterion)

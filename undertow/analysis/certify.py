@@ -52,7 +52,7 @@ def certify(
         rate = np.concatenate([[np.nan], np.diff(function.value) / np.diff(run["time"].values)])
         summary = {
             "function": function.meaning,
-            "hypotheses": [_summed(one, time, steady) for one in hypotheses],
+            "hypotheses": [_summed(hypothesis, time, steady) for hypothesis in hypotheses],
             **_course(function.value[: len(time)], time, steady),
             **numbers,
         }
@@ -72,12 +72,12 @@ def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
     }
 
 
-def _summed(one: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
-    known = {"name": one.name, "sentence": one.sentence}
-    if one.held is None:
-        return known | {"whole": None, "steady": None, "first_failure": None, "unknown": one.unknown}
-    broken = time[~one.held]
-    return known | window.shares(one.held, time) | {"first_failure": float(broken[0]) if broken.size else None}
+def _summed(hypothesis: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
+    summary = {"name": hypothesis.name, "sentence": hypothesis.sentence}
+    if hypothesis.held is None:
+        return summary | {"whole": None, "steady": None, "first_failure": None, "unknown": hypothesis.unknown}
+    broken = time[~hypothesis.held]
+    return summary | window.shares(hypothesis.held, time) | {"first_failure": float(broken[0]) if broken.size else None}
 
 
 def _course(value: np.ndarray, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:

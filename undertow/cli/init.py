@@ -79,8 +79,8 @@ def _law(controller: str | None, folder: Path) -> str | None:
         raise BadInput("--controller", "be FILE.py:FUNCTION", controller, hint=hint)
     catalogue.find("controllers", controller, Path(), "--controller")
     file, _, function = controller.rpartition(":")
-    there = _from_folder(file, folder)
-    return _quoted(f"{there if there.startswith('..') else f'./{there}'}:{function}")
+    relative_path = _from_folder(file, folder)
+    return _quoted(f"{relative_path if relative_path.startswith('..') else f'./{relative_path}'}:{function}")
 
 
 def _from_folder(file: str, folder: Path) -> str:
@@ -118,16 +118,16 @@ def _check_free(folder: Path, names: Mapping[str, str]) -> None:
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
             raise BadInput("PATH", "be a folder, or a file that ends in .yaml", f"{part}, another file")
-    taken = [str(folder / name) for name in names if (folder / name).exists()]
-    if taken:
+    existing = [str(folder / name) for name in names if (folder / name).exists()]
+    if existing:
         hint = "Nothing was written. Name another folder or scenario, for example `undertow init my_study`"
-        raise BadInput("PATH", "be a place without these files", f"one that has {', '.join(taken)}", hint=hint)
+        raise BadInput("PATH", "be a place without these files", f"one that has {', '.join(existing)}", hint=hint)
 
 
 def _write(folder: Path, contents: Mapping[str, str]) -> None:
     """All files, or none of them."""
     written: list[Path] = []
-    made = [part for part in (folder, *folder.parents) if not part.exists()]
+    new_folders = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in contents.items():
@@ -136,7 +136,7 @@ def _write(folder: Path, contents: Mapping[str, str]) -> None:
     except BaseException:
         for path in written:
             path.unlink(missing_ok=True)
-        for part in made:
+        for part in new_folders:
             with contextlib.suppress(OSError):
                 part.rmdir()
         raise

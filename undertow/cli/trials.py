@@ -71,7 +71,7 @@ def trials_folder(
             hint = "Add --resume to continue it, or --overwrite to replace it"
             marker = STORE if (folder / STORE).exists() else before
             results_folder.check_folder(folder, written, marker, overwrite, hint)
-        elif not any((folder / one).exists() for one in (STORE, before)):
+        elif not any((folder / entry).exists() for entry in (STORE, before)):
             hint = "Leave --resume out to start one"
             raise BadInput("--resume", "find a campaign to continue", f"none in {folder}", hint=hint)
         yield folder
@@ -154,8 +154,8 @@ def _live(console: Console, resumed: bool) -> Iterator[Watch]:
             nonlocal first
             if first is None and resumed:
                 again = "" if tally.done == tally.trials else "; chunks that were not finished run again"
-                kept = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
-                console.print(kept, highlight=False)
+                message = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
+                console.print(message, highlight=False)
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
             invalid = f", {tally.invalid} invalid" if tally.invalid else ""

@@ -35,12 +35,12 @@ def step_advice(plant: HybridVehicle, loop: ClosedLoopSettings) -> tuple[Advice,
     longest = _LIMITS[loop.method] / rate if rate else np.inf
     if step <= longest:
         return ()
-    says = (
+    message = (
         f"the {name} a time constant of {1e3 / rate:.3g} ms, for which integration steps above {1e3 * longest:.3g} ms "
         f"are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically"
     )
-    other = ", or another fidelity level" if name.startswith("thrusters") else ""
-    return (advice("loop.dt", says, f"Use {_remedy(loop, longest)}{other}"),)
+    alternative = ", or another fidelity level" if name.startswith("thrusters") else ""
+    return (advice("loop.dt", message, f"Use {_remedy(loop, longest)}{alternative}"),)
 
 
 def _hull_decay(body: Body) -> float:
@@ -58,11 +58,11 @@ def _remedy(loop: ClosedLoopSettings, longest: float) -> str:
 
 def fastest_decay(thruster: AbstractThruster) -> float:
     """Fastest decay of a thruster at rest, 1/s; 0 for one without a state."""
-    rest, tree = ravel_pytree(thruster.initial_state(1))
-    if not rest.size:
+    state, tree = ravel_pytree(thruster.initial_state(1))
+    if not state.size:
         return 0.0
     rates = lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0]
-    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(rest)))).max())
+    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(state)))).max())
 
 
 def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome) -> str:
@@ -116,11 +116,11 @@ def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
 
 def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:
     """Fastest decay rate at each point, without points where the fastest mode grows."""
-    slopes, found = jax.jit(jax.jacfwd(rates)), []
+    slopes, rates_of_decay = jax.jit(jax.jacfwd(rates)), []
     for point in points:
         matrix = np.asarray(slopes(*map(jnp.asarray, point)))
         if np.isfinite(matrix).all():
             poles = np.linalg.eigvals(matrix)
             fastest = poles[np.abs(poles).argmax()]
-            found += [float(abs(fastest))] if fastest.real < 0 else []
-    return found
+            rates_of_decay += [float(abs(fastest))] if fastest.real < 0 else []
+    return rates_of_decay

@@ -50,7 +50,7 @@ def largest_lean(
     roll, pitch, yaw = angles.T
     rotation = _turns(2, yaw) @ _turns(1, pitch) @ _turns(0, roll)
     leans = [_lean_about(plant.body, axis, free, rotation, through) for axis in _AXES if free[axis, axis] > _UNACTUATED]
-    return max(leans, key=lambda one: one.angle, default=None)
+    return max(leans, key=lambda lean: lean.angle, default=None)
 
 
 def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
@@ -73,8 +73,8 @@ def _lean_about(body: Body, axis: int, free: np.ndarray, rotation: np.ndarray, t
 @eqx.filter_jit
 def body_force(body: Body, nu: Float[ArrayLike, "k 6"], down: Float[ArrayLike, "k 3"]) -> Float[jax.Array, "k 6"]:
     """C(nu) nu + D(nu) + g at body velocities through the water and directions of gravity, N and N m."""
-    one = lambda velocity, gravity: body.coriolis(velocity) + body.damping(velocity) + body.restoring(gravity)
-    return jax.vmap(one)(nu, down)
+    force = lambda velocity, gravity: body.coriolis(velocity) + body.damping(velocity) + body.restoring(gravity)
+    return jax.vmap(force)(nu, down)
 
 
 def _at_rest(angles: np.ndarray, moment: np.ndarray) -> float:

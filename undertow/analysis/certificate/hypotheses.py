@@ -48,9 +48,9 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
 def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """The two amplitudes: omega is what no constant theta* explains, at best half the range of d."""
     omega = np.abs(minimax_weight(run) - run["uncertainty"].values)
-    whole = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - ROUNDING)
+    unsaturated = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - ROUNDING)
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
-    yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
+    yield Hypothesis("robust_gain", sentence, unsaturated & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
     if law.modification is not None or law.identification_input != "applied":
         sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"

@@ -106,8 +106,8 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
 
     outputs, loads, flow = jax.vmap(along)(times)
 
-    def look(measuring, now):
-        t, truth = now
+    def look(measuring, instant):
+        t, truth = instant
         y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
         wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
         return measuring, jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects

@@ -89,8 +89,8 @@ class Parts(NamedTuple):
         unloaded = self.loop.plant.no_load()
         if self.flow is None:
             return unloaded._replace(acceleration=unloaded.acceleration + load)
-        rest = unloaded.acceleration + load - self.flow.pushes
-        return _moved(unloaded, self.flow.velocity)._replace(acceleration=rest)
+        remaining = unloaded.acceleration + load - self.flow.pushes
+        return _moved(unloaded, self.flow.velocity)._replace(acceleration=remaining)
 
     def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
         """States of plant and law of a point."""
@@ -115,12 +115,12 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
-    x, z, found = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
+    x, z, flow_at_rest = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
     flat_x, plant_state = ravel_pytree(x)
     flat_z, law_state = ravel_pytree(z)
     axes, inputs = position.shape[0], loop.plant.inputs()
     sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
-    parts = Parts(loop, target, plant_state, law_state, sizes, found)
+    parts = Parts(loop, target, plant_state, law_state, sizes, flow_at_rest)
     return parts, {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
 
 
@@ -153,13 +153,13 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
 
 @eqx.filter_jit
 def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
-    whole, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
+    stacked, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
 
     def both(vector):
         values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
         return values, values
 
-    slopes, values = jax.jacfwd(both, has_aux=True)(whole)
+    slopes, values = jax.jacfwd(both, has_aux=True)(stacked)
     return values, slopes
 
 

@@ -89,9 +89,9 @@ def box_minimum(diagonal: Vector, factor: Float[Array, "k n"], linear: Vector, l
 
 @box_minimum.defjvp
 def _derivative(primals, tangents):
-    *given, low, high = primals
+    *problem, low, high = primals
     diagonal_dot, factor_dot, linear_dot, low_dot, high_dot = tangents
-    programme, x = _Programme(*given), box_minimum(*primals)
+    programme, x = _Programme(*problem), box_minimum(*primals)
     free = (x > low) & (x < high)
     held_dot = jnp.where(free, 0.0, jnp.where(x >= high, high_dot, low_dot))
     factor = programme.factor

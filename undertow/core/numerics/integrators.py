@@ -41,7 +41,7 @@ def rk4_compact(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     A `while_loop`, which both compilers keep as a loop (a scan of four rounds the batch compiler would write out). It
     has no reverse derivative, which is why `rk4` remains.
     """
-    when = jnp.stack([jnp.asarray(each, dtype=float) for each in _stage_times(t, dt)])
+    when = jnp.stack([jnp.asarray(stage_time, dtype=float) for stage_time in _stage_times(t, dt)])
     reach, weight = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0])
 
     def stage(carry):

@@ -41,8 +41,8 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     check_declared(controller, signals, "command")
     sizes = {"axis": n, "actuator": inputs}
     for name, signal in controller.signals().items():
-        found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
-        due = tuple(sizes.get(dimension, found.get(dimension, 1)) for dimension in signal.dimensions)
+        own_sizes = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
+        due = tuple(sizes.get(dimension, own_sizes.get(dimension, 1)) for dimension in signal.dimensions)
         yield from shaped(f"command, signal {name}", signals[name], due)  # pyright: ignore[reportArgumentType] - every size is known here
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
     wrong = list(alike("advance", after, z, STATE, types=True))

@@ -79,19 +79,19 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
         if isinstance(part, kind):
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 try:
-                    found = tuple(use(part, around))
+                    findings = tuple(use(part, around))
                 except RAISED as complaint:
-                    found = (_failed(part, complaint),)
-            return (*found, *_printed(part, printed.getvalue()))
+                    findings = (_failed(part, complaint),)
+            return (*findings, *_printed(part, printed.getvalue()))
     return ()
 
 
 def _printed(part: Any, text: str) -> Iterator[Finding]:
     """Advice where a part prints what it computes: it does so once, when it is compiled, and without numbers."""
     print(text, end="")
-    if shown := _TRACED.search(text):
-        says = f"`{type(part).__name__}` prints `{shown[0]}`, once, while it is compiled, and never again"
-        yield Finding("advice", "print", type(part).__name__, says, 'Use `jax.debug.print("{}", value)`')
+    if match := _TRACED.search(text):
+        message = f"`{type(part).__name__}` prints `{match[0]}`, once, while it is compiled, and never again"
+        yield Finding("advice", "print", type(part).__name__, message, 'Use `jax.debug.print("{}", value)`')
 
 
 def _failed(part: Any, complaint: BaseException) -> Finding:
@@ -220,8 +220,8 @@ def _plant_fault(fault: AbstractPlantFault, around: Surroundings) -> Iterator[Fi
 
 def _computation_fault(fault: AbstractComputationFault, around: Surroundings) -> Iterator[Finding]:
     yield from _roles(fault, ("computation",))
-    now = Instant(jnp.asarray(True), jnp.asarray(0), jnp.asarray(float(fault.severity[2])))
-    yield from is_a("execution", fault.execution(now, jnp.asarray(0.01)), Execution)
+    instant = Instant(jnp.asarray(True), jnp.asarray(0), jnp.asarray(float(fault.severity[2])))
+    yield from is_a("execution", fault.execution(instant, jnp.asarray(0.01)), Execution)
 
 
 def _roles(fault: AbstractFault, allowed: tuple[str, ...]) -> Iterator[Finding]:

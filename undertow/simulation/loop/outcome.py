@@ -49,10 +49,10 @@ class Outcome(NamedTuple):
 
     def sentence(self) -> str:
         """How the run ended, in a sentence."""
-        status, said = Status(int(self.status)), ""
+        status, detail = Status(int(self.status)), ""
         if status is Status.COMMAND_NOT_FINITE:
-            said = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
-        return status.sentence + said
+            detail = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
+        return status.sentence + detail
 
 
 def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:

@@ -76,8 +76,13 @@ def undamped(facts: Facts) -> Iterator[Finding]:
 
 def _is_of_sphere(facts: Facts) -> bool:
     diagonal = np.diag(facts.added_mass)
-    off = np.any(facts.added_mass - np.diag(diagonal))
-    return not off and bool(np.ptp(diagonal[:3]) <= 1e-6 * diagonal[0]) and diagonal[0] > 0 and not np.any(diagonal[3:])
+    coupled = np.any(facts.added_mass - np.diag(diagonal))
+    return (
+        not coupled
+        and bool(np.ptp(diagonal[:3]) <= 1e-6 * diagonal[0])
+        and diagonal[0] > 0
+        and not np.any(diagonal[3:])
+    )
 
 
 def _sphere(facts: Facts) -> Iterator[Finding]:
