@@ -191,10 +191,10 @@ def simulate(
         disturbance = SumOfDisturbances(tuple(disturbance))
     acting: Any = none() if disturbance is None else disturbance
     navigation = perfect() if navigation is None else navigation
-    named = isinstance(controller, str | Mapping)
+    described_controller = isinstance(controller, str | Mapping)
     for name, part, contract in (
         ("plant", plant, AbstractPlant),
-        ("controller", controller, str | Mapping if named else AbstractController),
+        ("controller", controller, str | Mapping if described_controller else AbstractController),
         ("reference", reference, AbstractReference),
         ("disturbance", acting, AbstractDisturbance),
         ("navigation", navigation, AbstractNavigation),
@@ -203,7 +203,7 @@ def simulate(
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
     checks.choice("precision", precision, ("float64", "float32"))
     with runtime.in_precision(precision):
-        law = _named_law(controller, plant, navigation, dt) if named else controller
+        law = _named_law(controller, plant, navigation, dt) if described_controller else controller
         closed_loop = ClosedLoop(plant, law, reference, acting, navigation)
         closed_loop = in_present_precision(_with_faults(closed_loop, faults, dt))
         return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
@@ -230,12 +230,12 @@ def _with_faults(
     mode_objects = {
         index: entry["mode"] for index, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)
     }
-    named = {index: {"mode": type(mode).__name__} for index, mode in mode_objects.items()}
+    mode_names = {index: {"mode": type(mode).__name__} for index, mode in mode_objects.items()}
     entries = []
     for index, entry in enumerate(faults):
         with within(f"faults[{index}]"):
             try:
-                entries.append(Fault.model_validate({**entry, **named.get(index, {})}))
+                entries.append(Fault.model_validate({**entry, **mode_names.get(index, {})}))
             except ValidationError as errors:
                 raise complaint(errors, from_data({}), Fault) from None
     with within("faults"):

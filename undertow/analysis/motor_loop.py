@@ -83,6 +83,7 @@ def stable_gains(matrix: Callable[[float], np.ndarray], largest: float) -> tuple
 
 def _closed(g: Gains, actuator: np.ndarray, drive: np.ndarray, push: np.ndarray, drifted: float) -> np.ndarray:
     """Law around an actuator m' = actuator m + drive a_c, a = push m; d_hat = z - drifted eps."""
+    # Rows and columns are e, e_dot, eps, z and m. `demanded` gives a_c from them, `delivered` the acceleration a.
     states = 4 + len(actuator)
     demanded = np.zeros(states)
     demanded[:4] = g.stiffness, g.damping, drifted, -1.0

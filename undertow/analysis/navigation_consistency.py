@@ -43,7 +43,8 @@ def navigation_consistency(
 
 def _assumed(kalman: Kalman, sensor: AbstractSensor) -> dict[str, list[float]]:
     """Standard deviations that the filter assumes: of the noise of each entry, and of the correlated errors."""
-    scale, sampling = float(np.asarray(kalman.noise_scale)), sensor.sampling
+    scale = float(np.asarray(kalman.noise_scale))
+    sampling = sensor.sampling
     plain = lambda values, factor=1.0: (factor * np.ravel(np.asarray(values, dtype=float))).tolist()
     deviations = {"noise": plain(sampling.noise, scale), "correlated": [], "correlation_time": []}
     errors = sampling.errors

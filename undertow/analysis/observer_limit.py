@@ -71,7 +71,8 @@ def loop_poles(law: LinearLaw, bandwidth: float, order: int = 3) -> Float[np.nda
         -law.pole * eps + u + d_hat,
         -(law.frequency**2) * (eps - m1 * x_hat - m2 * v_hat),
     ]
-    matrix, states = np.stack(rows), [i for i in range(7) if order == 3 or i != 4]
+    matrix = np.stack(rows)
+    states = [i for i in range(7) if order == 3 or i != 4]
     return np.asarray(np.linalg.eigvals(matrix[np.ix_(states, states)]), dtype=complex)
 
 

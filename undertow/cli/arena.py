@@ -73,7 +73,9 @@ class _Settings(NamedTuple):
 
 def arena(command: ArenaCommand) -> int:
     """Run laws through the tasks, those that are missing in the folder, and write the leader board; the exit code."""
-    entries, trials, budget = command.controllers or [], command.trials, command.tune
+    entries = command.controllers or []
+    trials = command.trials
+    budget = command.tune
     tasks, vehicles, robustness = command.tasks, command.vehicles, command.robustness
     check_pdf(command.pdf)
     checks.positive("--trials", trials)

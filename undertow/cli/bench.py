@@ -34,7 +34,8 @@ _WORKLOADS = {
 
 def bench(command: BenchCommand) -> int:
     """Measure workloads W1 and W2, or how long users wait, and print tables or JSON."""
-    console, work = wide_console(), waiting_times if command.users else measure
+    console = wide_console()
+    work = waiting_times if command.users else measure
     if command.as_json:
         figures = interruptible(lambda: work(lambda what, share: None))
         typer.echo(json.dumps({key: _short(value) for key, value in figures.items()}, indent=1))
@@ -77,12 +78,12 @@ def _waiting_table(figures: dict[str, Any]) -> Table:
 def _table(words: str, figures: dict[str, Any], prefix: str) -> Table:
     """One workload, with ratios to plain NumPy where that was measured."""
     steps = f"{figures[f'{prefix}steps']} steps, SIMD width {figures['simd_width']}, {figures['threads']} threads"
-    compared = f"{prefix}numpy_ns" in figures
-    columns = map(numbers, ("ns", "speed-up over NumPy") if compared else ("ns",))
+    has_numpy = f"{prefix}numpy_ns" in figures
+    columns = map(numbers, ("ns", "speed-up over NumPy") if has_numpy else ("ns",))
     table = titled(f"{words}: nanoseconds per step and run ({steps})", "execution", *columns)
     for key, row in _ROWS.items():
         if (value := figures.get(f"{prefix}{key}")) is not None:
-            ratio = (f"{figures[f'{prefix}numpy_ns'] / value:.3g}",) if compared else ()
+            ratio = (f"{figures[f'{prefix}numpy_ns'] / value:.3g}",) if has_numpy else ()
             table.add_row(row, f"{value:.4g}", *ratio)
     return table
 

@@ -56,8 +56,9 @@ def compare(command: CompareCommand) -> int:
     again += ["--trials", str(trials)] if trials is not None else []
     again += ["--replay"] if replay else []
     again += ["--tune", str(budget)] if budget is not None else []
-    name, written = f"{paths[0].stem}-comparison", (*_WRITTEN, FOLDER)
-    with trials_folder(command.out, name, written, resume, command.overwrite, FOLDER) as folder:
+    name = f"{paths[0].stem}-comparison"
+    file_names = (*_WRITTEN, FOLDER)
+    with trials_folder(command.out, name, file_names, resume, command.overwrite, FOLDER) as folder:
         console = wide_console()
         if not resume:
             results_folder.remove(folder / FOLDER)
@@ -111,8 +112,9 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
             write_whole(folder / name, comparison.table(style))
         tuned = {} if ready.budgets is None else {"budgets": ready.budgets.data()}
         write_whole(folder / "comparison.json", to_json(findings.data() | tuned, indent=1) + "\n")
-        written = {name: one._asdict() for name, one in times.items()}  # apart: they differ from run to run
-        write_whole(folder / _TIMES, to_json(written, indent=1) + "\n")
+        # In a file of their own: they differ from run to run.
+        step_time_data = {name: step_time._asdict() for name, step_time in times.items()}
+        write_whole(folder / _TIMES, to_json(step_time_data, indent=1) + "\n")
         page, failures = write_comparison(
             comparison, results, ready.subject, folder, pdf, replays, times, ready.budgets
         )

@@ -39,7 +39,8 @@ def falsify_scenario(command: FalsifyCommand) -> int:
         raise BadInput("--budget", "be at least 1 run", budget)
     if not 0 <= seed < 2**32:
         raise BadInput("--seed", "be between 0 and 2^32 - 1", seed)
-    console, first = wide_console(), Path("runs") / f"{scenario.stem}-falsified"
+    console = wide_console()
+    first = Path("runs") / f"{scenario.stem}-falsified"
     text = read(scenario, allow_code=command.allow_code)
     out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
@@ -54,8 +55,8 @@ def falsify_scenario(command: FalsifyCommand) -> int:
         (draft.path / "falsify.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         if falsification.violation is not None:
             sentence = f"Counter-example of {scenario.name}: {_violated(falsification)}."
-            written = trial_text(falsification.single_runs[-1].built, sentence)
-            (draft.path / "counterexample.yaml").write_text(written, encoding="utf-8")
+            scenario_text = trial_text(falsification.single_runs[-1].built, sentence)
+            (draft.path / "counterexample.yaml").write_text(scenario_text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
         checkpoint.unlink()
         plots = {"search": lambda: search_figure(data)}

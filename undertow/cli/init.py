@@ -95,16 +95,16 @@ def _quoted(text: str) -> str:
 def _scenario(name: str, vehicle: str, thruster: str, controller: str | None) -> str:
     """The template with the chosen parts in place of its own."""
     text = _template("scenario.yaml")
-    chosen = {"undertow check scenario.yaml": f"undertow check {name}"}
-    chosen["undertow simulate scenario.yaml"] = f"undertow simulate {name}"
-    chosen[f"vehicle: {_DEFAULT}"] = f"vehicle: {vehicle}"
-    chosen[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {thruster}"
+    replacements = {"undertow check scenario.yaml": f"undertow check {name}"}
+    replacements["undertow simulate scenario.yaml"] = f"undertow simulate {name}"
+    replacements[f"vehicle: {_DEFAULT}"] = f"vehicle: {vehicle}"
+    replacements[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {thruster}"
     if controller is not None:
         line = next(line for line in text.splitlines() if line.startswith("  kind: pid"))
-        chosen[line] = f"  kind: {controller}"
+        replacements[line] = f"  kind: {controller}"
         if controller == f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}":
-            chosen[line] += "\n  slope: 2                         # 1/s, an option of the function"
-    for old, new in chosen.items():
+            replacements[line] += "\n  slope: 2                         # 1/s, an option of the function"
+    for old, new in replacements.items():
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     return text

@@ -159,7 +159,8 @@ def _check_place(folder: Path) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    got, hint = f"{folder}, where nothing can be written ({error.strerror})", "Choose another folder"
+    got = f"{folder}, where nothing can be written ({error.strerror})"
+    hint = "Choose another folder"
     return BadInput("--out", "be a folder that can be made and written", got, hint=hint)
 
 

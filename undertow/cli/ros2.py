@@ -46,7 +46,8 @@ def ros2(command: Ros2Command) -> int:
     names = Topics().remapped(command.remap or [])
     frames = Frames(tuple(command.world_frame or ()) or Frames().world, command.body_frame)
     reporter = Reporter(report)
-    domain, localhost = _domain(command.domain), command.localhost or _environment_says_localhost()
+    domain = _domain(command.domain)
+    localhost = command.localhost or _environment_says_localhost()
     bag = None if command.bag is None else BagWriter(command.bag, command.storage)
     reporter.say(f"compiling the {command.role}")
     compiled = _compiled_controller if command.role == "controller" else _compiled_vehicle
@@ -97,7 +98,8 @@ def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: A
     if command.rate is not None:
         checks.positive("--rate", command.rate, "Hz")
     period = None if command.rate is None else 1 / command.rate
-    pace, duration = command.pace or "real-time", command.duration
+    pace = command.pace or "real-time"
+    duration = command.duration
     settings = VehicleSettings(pace, duration, command.max_age, topics=names, frames=frames)
 
     def made() -> Vehicle:

@@ -120,12 +120,14 @@ def comparison(predicted: PredictedMetrics, result: ScenarioResult) -> str:
         return f"No prediction: {predicted.why_not}"
     assert result.steady is not None  # or there were no prediction
     zero = _NOTHING * max(predicted.metrics.values())
-    compared = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.measured > zero]
-    departing = [metric for metric in compared if metric.name not in _PEAKS and metric.departure > _DEPARTS]
+    metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.measured > zero]
+    departing = [metric for metric in metrics if metric.name not in _PEAKS and metric.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
-    named = ", ".join(f"{metric.name} {_by(metric.departure)}" for metric in departing)
-    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(result, result.steady)}"
+    departures = ", ".join(f"{metric.name} {_by(metric.departure)}" for metric in departing)
+    return (
+        f"The run departs from the linear prediction by more than 10 %: {departures}{_because(result, result.steady)}"
+    )
 
 
 def _by(departure: float) -> str:
@@ -165,6 +167,6 @@ def _because(result: ScenarioResult, steady: Mapping[str, Any]) -> str:
 def _print_prediction(predicted: PredictedMetrics, result: ScenarioResult, console: Console) -> None:
     if predicted.metrics and result.steady:
         meanings = result.facts.meanings
-        compared = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.name in meanings]
-        console.print(terminal_table(prediction_rows(compared, result.built.window(), meanings)))
+        metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.name in meanings]
+        console.print(terminal_table(prediction_rows(metrics, result.built.window(), meanings)))
     console.print(f"{comparison(predicted, result)}.", highlight=False, soft_wrap=True)

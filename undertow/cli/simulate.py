@@ -102,7 +102,8 @@ def _print_results(result: ScenarioResult, folder: Path, console: Console) -> No
 def _ending_code(result: ScenarioResult) -> int:
     if result.status is Status.OK:
         return DONE
-    ended, duration = float(result.outcome.ended), result.built.scenario.loop.duration
+    ended = float(result.outcome.ended)
+    duration = result.built.scenario.loop.duration
     ending = f"ended as `{result.status.word}` at {ended:.4g} s of {duration:g} s"
     complain(f"the run {ending}. {result.facts.sentence}")
     return RUN_FAILED

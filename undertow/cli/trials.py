@@ -147,7 +147,7 @@ def _clear(folder: Path, names: Sequence[str]) -> None:
 @contextlib.contextmanager
 def _live(console: Console, resumed: bool) -> Iterator[Watch]:
     """Show the number of finished trials, their rate and the remaining time; first, where resumed, what is kept."""
-    begun, first = time.perf_counter(), None
+    start_time, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
         def watch(tally: Tally) -> None:
@@ -157,7 +157,7 @@ def _live(console: Console, resumed: bool) -> Iterator[Watch]:
                 message = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
                 console.print(message, highlight=False)
             first = tally.done if first is None else first
-            rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
+            rate = (tally.done - first) / max(time.perf_counter() - start_time, 1e-9)
             invalid = f", {tally.invalid} invalid" if tally.invalid else ""
             waiting = "compiling" if tally.done < tally.trials else "all trials are done"
             text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting

@@ -35,7 +35,8 @@ def tune_scenario(command: TuneCommand) -> int:
     check_pdf(command.pdf)
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
-    console, first = wide_console(), Path("runs") / f"{command.scenario.stem}-tuned"
+    console = wide_console()
+    first = Path("runs") / f"{command.scenario.stem}-tuned"
     text = read(command.scenario, allow_code=command.allow_code)
     out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (

@@ -110,12 +110,12 @@ class CompositeCoordinates(AbstractCoordinates):
 def _side_by_side(parts: tuple[AbstractCoordinates, ...]) -> CompositeCoordinates:
     """Coordinates of all; names of axes have the number of the subsystem, and there are none where one has none."""
     first, *other_flags = (part.tolerated_status for part in parts)
-    named = [f"{name}_{i + 1}" for i, part in enumerate(parts) for name in part.axes]
+    axis_names = [f"{name}_{i + 1}" for i, part in enumerate(parts) for name in part.axes]
     return CompositeCoordinates(
         parts=parts,
         angles=tuple(angle for part in parts for angle in part.angles),
         tolerated_status=tuple(flag for flag in first if all(flag in flags for flags in other_flags)),
-        axes=tuple(named) if all(part.axes for part in parts) else (),
+        axes=tuple(axis_names) if all(part.axes for part in parts) else (),
     )
 
 

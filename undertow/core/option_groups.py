@@ -35,8 +35,8 @@ def flat_options(*without: str) -> Callable[[Callable[..., Part]], Callable[...,
         @functools.wraps(function)
         def flat(*arguments: Any, **keywords: Any) -> Part:
             for name, group in groups.items():
-                chosen = {option: keywords.pop(option) for option in options[name] if option in keywords}
-                keywords[name] = dataclasses.replace(keywords.get(name, group), **chosen)
+                group_options = {option: keywords.pop(option) for option in options[name] if option in keywords}
+                keywords[name] = dataclasses.replace(keywords.get(name, group), **group_options)
             return function(*arguments, **keywords)
 
         hints = get_type_hints(function, include_extras=True)

@@ -95,7 +95,8 @@ def remove_damaged(folder: Path, limit: float = _LONGEST_CHECK) -> None:
     Raises:
         OSError: nothing can be read or written there.
     """
-    recorded, end = _noted(folder / _CHECKSUMS), time.monotonic() + limit
+    recorded = _noted(folder / _CHECKSUMS)
+    end = time.monotonic() + limit
     entries = [entry.path for entry in os.scandir(folder) if entry.name.endswith(_ENTRY)]
     random.shuffle(entries)
     checksums = dict(recorded)

@@ -58,14 +58,14 @@ def check_command(controller: Any, answer: Any, inputs: int) -> None:
         BadInput: it did not.
     """
     method = f"{type(controller).__name__}.command"
-    says = not_two(method, answer, PAIR)
-    if not says and jnp.shape(answer[0]) != (inputs,):
+    message = not_two(method, answer, PAIR)
+    if not message and jnp.shape(answer[0]) != (inputs,):
         due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
-        says = f"`{method}` {due}, but returns {form(answer[0])}"
-    if not says and not isinstance(answer[1], Mapping):
-        says = f"`{method}` must return its signals as a mapping, {{}} for none, but returns {form(answer[1])}"
-    if says:
-        raise BadInput("", "", says, where=place_of(controller, "command"))
+        message = f"`{method}` {due}, but returns {form(answer[0])}"
+    if not message and not isinstance(answer[1], Mapping):
+        message = f"`{method}` must return its signals as a mapping, {{}} for none, but returns {form(answer[1])}"
+    if message:
+        raise BadInput("", "", message, where=place_of(controller, "command"))
 
 
 def check_state(controller: Any, after: Any, before: Any) -> None:
@@ -75,8 +75,8 @@ def check_state(controller: Any, after: Any, before: Any) -> None:
         BadInput: it did not.
     """
     if got := difference(after, before, types=True):
-        says = f"`{type(controller).__name__}.advance` must {STATE}, but is {got}"
-        raise BadInput("", "", says, where=place_of(controller, "advance"))
+        message = f"`{type(controller).__name__}.advance` must {STATE}, but is {got}"
+        raise BadInput("", "", message, where=place_of(controller, "advance"))
 
 
 def _kind(value: Any) -> str:

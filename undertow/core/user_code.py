@@ -65,8 +65,8 @@ def fault_of(error: BaseException) -> UserCodeFailure:
 
 def python_says(error: BaseException) -> str:
     """Cause and remedy in one line."""
-    says, hint = fault_of(error)
-    return f"{says}. {hint}" if hint else says
+    message, hint = fault_of(error)
+    return f"{message}. {hint}" if hint else message
 
 
 def said_by(error: BaseException) -> str:

@@ -279,7 +279,9 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved["success"] = criterion
     if not scenario.requirements:
         return built
-    resolved["requirements"] = {name: one.model_dump(exclude_none=True) for name, one in scenario.requirements.items()}
+    resolved["requirements"] = {
+        name: requirement.model_dump(exclude_none=True) for name, requirement in scenario.requirements.items()
+    }
     with within("requirements"):
         return built._replace(requirements=_required(built))
 

@@ -61,15 +61,18 @@ def describe(name: str) -> tuple[Description, ...]:
     prefix, _, short = name.rpartition("/")
     kinds = [kind for kind in catalogue.KINDS if prefix in ("", kind)]
     parts_by_kind = {kind: catalogue.names(kind) for kind in kinds}
-    named = [(kind, catalogue.presets(kind).get(short, short)) for kind in kinds]
-    named = [(kind, part) for kind, part in named if part in parts_by_kind[kind]]
+    matches = [(kind, catalogue.presets(kind).get(short, short)) for kind in kinds]
+    matches = [(kind, part) for kind, part in matches if part in parts_by_kind[kind]]
     descriptions = tuple(
-        description for kind, part in named for description in _presets(kind, part, parts_by_kind[kind][part], short)
+        description for kind, part in matches for description in _presets(kind, part, parts_by_kind[kind][part], short)
     )
     if not descriptions:
-        every = {name for kind in kinds for name in (*parts_by_kind[kind], *catalogue.presets(kind))}
+        part_names = {name for kind in kinds for name in (*parts_by_kind[kind], *catalogue.presets(kind))}
         raise BadInput(
-            "NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "campaign", "metrics", "signals"})
+            "NAME",
+            "be a part",
+            name,
+            hint=did_you_mean(short, {*part_names, "scenario", "campaign", "metrics", "signals"}),
         )
     return descriptions
 
@@ -100,8 +103,8 @@ def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, 
         if short not in (name, preset):
             continue
         description = _describe(kind, name, function, {"kind": name, "preset": preset})
-        chosen = Option("preset", preset, f"one of {', '.join(presets)}.")
-        descriptions.append(description._replace(options=(chosen, *description.options)))
+        preset_option = Option("preset", preset, f"one of {', '.join(presets)}.")
+        descriptions.append(description._replace(options=(preset_option, *description.options)))
     return tuple(descriptions)
 
 

@@ -28,11 +28,11 @@ def check_allowed(data: Mapping[str, Any], result: Path, recorded: str | None, w
     Raises:
         BadInput: there is such code, and the user has not allowed it.
     """
-    named = dict(_named(data))
-    if allowed or not named:
+    code_names = dict(_named(data))
+    if allowed or not code_names:
         return
     changed_files = changed(recorded, data, result.parent)
-    files = [_described(key, name, result.parent, changed_files) for key, name in named.items()]
+    files = [_described(key, name, result.parent, changed_files) for key, name in code_names.items()]
     hint = f"{'. '.join(files)}. Read it; to run it, add --allow-code (in Python: allow_code=True)"
     raise BadInput(what, "not name Python code", f"{result}, a file of {_owner(result)}", hint=hint)
 

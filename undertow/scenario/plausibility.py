@@ -177,7 +177,8 @@ def _unfinished(reference: AbstractReference, desired: ReferenceSamples):
     late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
     if not np.isfinite(late.position).all():
         return
-    goal, size = late.position[-1], 1e-9 * np.ptp(late.position, axis=0).max()
+    goal = late.position[-1]
+    size = 1e-9 * np.ptp(late.position, axis=0).max()
     arrived = np.abs(late.position - goal).max(axis=1) <= size
     if arrived.all() or not arrived[-2:].all() or late.velocity[-2:].any() or size == 0:
         return
@@ -190,7 +191,8 @@ def _unfinished(reference: AbstractReference, desired: ReferenceSamples):
 
 def _above(loop: ClosedLoop, desired: ReferenceSamples):
     """Positions above the surface, or above the start where a depth was meant."""
-    down, start = desired.position[:, 2], float(desired.start[2])
+    down = desired.position[:, 2]
+    start = float(desired.start[2])
     highest = float(down.min())
     depths = stated_depths(loop.disturbance)
     if depths:
@@ -254,7 +256,8 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples)
         yield advice("disturbance", message, "1 knot is 0.514 m/s")
         return
     speed = float(np.hypot.reduce(desired.velocity[:, :3], axis=1).max())
-    duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
+    duration = float(desired.time[-1])
+    way = desired.position[:, :3] - desired.start[:3]
     far, step = _size(way[-1]), _size(way[0])
     if speed > _SPARE * (top + drift):
         yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")

@@ -402,9 +402,11 @@ def _also(first: Any, other_errors: Sequence[Any], text: Text) -> str:
         error for error in other_errors if error["type"] != "missing" or _path_of(error)[:-1] not in misspelt
     ]
     lines = {_name_of(error): text.lines.get(_path_of(error)) for error in other_errors}
-    named = [f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)]
-    more = f" and {len(named) - _LISTED} more" if len(named) > _LISTED else ""
-    return f"Also wrong: {', '.join(named[:_LISTED])}{more}" if named else ""
+    named_keys = [
+        f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)
+    ]
+    more = f" and {len(named_keys) - _LISTED} more" if len(named_keys) > _LISTED else ""
+    return f"Also wrong: {', '.join(named_keys[:_LISTED])}{more}" if named_keys else ""
 
 
 def _must(error: Any) -> str:

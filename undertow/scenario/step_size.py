@@ -75,7 +75,8 @@ def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Out
     if not failed or loop.method not in _LIMITS:
         return ""
     rate = max(_decays(closed_loop, loop, outcome), default=0.0)
-    step, longest = loop.dt / loop.substeps, _LIMITS[loop.method] / rate if rate else np.inf
+    step = loop.dt / loop.substeps
+    longest = _LIMITS[loop.method] / rate if rate else np.inf
     if loop.kind == "continuous":
         step = loop.dt
     if step <= longest:
@@ -93,7 +94,7 @@ def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome)
     plant, samples = closed_loop.plant, outcome.signals
     ordinary = np.abs(np.asarray(samples["velocity"])).max(axis=1) <= _ordinary(closed_loop, outcome)
     rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
+    sampled_rows = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
     first = plant.initial_state(samples["position"][0], samples["velocity"][0])
     if loop.kind == "continuous":
         realization = closed_loop.realize(jax.random.PRNGKey(0))
@@ -103,8 +104,10 @@ def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome)
     _, tree = ravel_pytree(first)
     still = plant.no_load()
     rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
-    states = [ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in chosen]
-    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, chosen, strict=True)])
+    states = [
+        ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in sampled_rows
+    ]
+    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, sampled_rows, strict=True)])
 
 
 def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:

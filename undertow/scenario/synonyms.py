@@ -70,7 +70,8 @@ def hint_for(path: tuple[str | int, ...], file: str) -> str:
         path: of the unknown key.
         file: `scenario`, `campaign` or `vehicle file`.
     """
-    word, beside = str(path[-1]).lower().replace("-", "_"), path[:-1]
+    word = str(path[-1]).lower().replace("-", "_")
+    beside = path[:-1]
     for key, words in WORDS.get(file, {}).items():
         *section, name = key.split(".")
         if word not in words.split():

@@ -24,7 +24,8 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
     """The mistake behind an error of the parser in a text."""
     problem = " ".join((error.problem or "malformed").split())
     problem_line, context_line = _line(error.problem_mark), _line(error.context_mark)
-    line, lines = problem_line or context_line, text.splitlines()
+    line = problem_line or context_line
+    lines = text.splitlines()
     if r"character '\t'" in problem:
         return Mistake("it has a tab", line, "Indent with spaces")
     if "character" in problem and "cannot start any token" in problem:

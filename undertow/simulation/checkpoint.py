@@ -112,11 +112,13 @@ class Checkpoint:
                 raise BadInput("--resume", "repeat the same steps as before", f"a run with other steps from {what} on")
             self._asked += 1
             return entry["answer"]
-        begun = self.elapsed
-        if not must and begun + self._longest.get(what, 0.0) > self._budget:
+        elapsed_before = self.elapsed
+        if not must and elapsed_before + self._longest.get(what, 0.0) > self._budget:
             raise OutOfTime
         answer = compute()
-        self._longest[what] = self.elapsed - begun if what in self._longest else 0.0  # the first one is compiled
+        self._longest[what] = (
+            self.elapsed - elapsed_before if what in self._longest else 0.0
+        )  # the first one is compiled
         line = {"what": what, "at": arguments, "answer": answer, "elapsed": self.elapsed}
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")

@@ -175,8 +175,8 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
         return pickle.dumps((None, function(*arguments)))
     except Exception as error:
         try:
-            written = pickle.dumps((error, None))
-            pickle.loads(written)
+            pickled = pickle.dumps((error, None))
+            pickle.loads(pickled)
         except Exception:  # one that cannot be pickled is passed on as text
-            written = pickle.dumps((RuntimeError("".join(traceback.format_exception(error))), None))
-        return written
+            pickled = pickle.dumps((RuntimeError("".join(traceback.format_exception(error))), None))
+        return pickled

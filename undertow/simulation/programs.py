@@ -148,7 +148,8 @@ class ProgramCache:
         count = len(group.places)
         # For one run a program of width one is faster than one of width eight.
         width = min(simd_width(64), 1 << (count - 1).bit_length()) if group.narrow else 0
-        first, options = group.first, {"xla_width": self._xla_width, "gpu": self._gpu}
+        first = group.first
+        options = {"xla_width": self._xla_width, "gpu": self._gpu}
         return BatchRunner(first.run, first.plan, constant, backend=first.backend, runs=count, width=width, **options)
 
     def _expected_constants(self, batch: RunBatch) -> list[Any]:

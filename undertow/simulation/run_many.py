@@ -89,9 +89,11 @@ def run_group(
     with runtime.in_precision(group.first.precision), runtime.on_processor():
         runner = (ProgramCache() if programs is None else programs).runner(group)
         for steps in dict.fromkeys(group.steps[rows].tolist()):
-            chosen = rows[group.steps[rows] == steps]
-            outcome = runner.run(group.numbers_of_runs(chosen), steps)
-            results.append(BatchResult(group.places[chosen], group.first, outcome, runner.backend, runner.left_to_xla))
+            rows_of_length = rows[group.steps[rows] == steps]
+            outcome = runner.run(group.numbers_of_runs(rows_of_length), steps)
+            results.append(
+                BatchResult(group.places[rows_of_length], group.first, outcome, runner.backend, runner.left_to_xla)
+            )
     return results
 
 

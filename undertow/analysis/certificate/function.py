@@ -38,7 +38,8 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
 def of_set_point(law: RCAF, run: xr.Dataset) -> np.ndarray:
     """V_f of Eq. (46), one column per axis, along a run towards a set-point, with `minimax_weight`: (time, axis)."""
     error = np.stack([run["error"].values, -run["velocity"].values], axis=-1)
-    p, eps = np.asarray(law.lyapunov()), run["modelling_error"].values
+    p = np.asarray(law.lyapunov())
+    eps = run["modelling_error"].values
     departure = run["weights"].values - minimax_weight(run)[..., None]
     tracking = 0.5 * np.einsum("...i,...ij,...j", error, p, error)
     composite, adaptation = np.asarray(law.composite), np.asarray(law.adaptation)
@@ -66,7 +67,8 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
     """
     matrix = gramian(law.estimator, dt, run.sizes["axis"])
     d_til = run["estimate"].values - run["uncertainty"].values
-    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.basis_norm_squared())
+    eps = run["modelling_error"].values
+    rho = float(law.estimator.fuzzy.basis_norm_squared())
     per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
     share = np.broadcast_to(law.tracking_share, eps.shape[1:])
     if not (share > 0).all():

@@ -76,7 +76,9 @@ def disturbance_profile(
 
 @eqx.filter_jit
 def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
-    realization, plant, zero = loop.realize(key), loop.plant, jnp.zeros(())
+    realization = loop.realize(key)
+    plant = loop.plant
+    zero = jnp.zeros(())
     dynamics, coordinates, actuators = loop.controller.model
     held = actuators.quasi_static()
     forces = held.force(held.init(), u)
@@ -92,7 +94,8 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     at_rest = unknown(zero, plant.initial_state(y_rest.position, still), plant.no_load())
     scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
 
-    times, resting = jnp.arange(steps, dtype=float) * dt, plant.pose(x_rest)
+    times = jnp.arange(steps, dtype=float) * dt
+    resting = plant.pose(x_rest)
 
     def along(t):
         r = loop.reference.at(t)

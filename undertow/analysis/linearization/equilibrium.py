@@ -197,8 +197,8 @@ def _reach(model: Model, y: Measurement):
 def _settled_input(model: Model, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
     dynamics, coordinates, drive = model
-    pushed = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
-    forces = dynamics.invert(y, -dynamics.drift(y) - pushed)
+    load_acceleration = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
+    forces = dynamics.invert(y, -dynamics.drift(y) - load_acceleration)
     rate, step = jnp.asarray(20.0), jnp.asarray(5e-3)
     settle = lambda _, state: drive.advance(state, drive.command(state, forces, rate), step)
     return drive.command(jax.lax.fori_loop(0, _SETTLING, settle, drive.init()), forces, rate)

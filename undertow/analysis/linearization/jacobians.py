@@ -145,9 +145,9 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
 
     Dead zones and resolutions have no slope.
     """
-    named = lambda realization: getattr(realization[-1], "name", "") in parameters
+    is_listed = lambda key_path: getattr(key_path[-1], "name", "") in parameters
     return jax.tree_util.tree_map_with_path(
-        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, part
+        lambda key_path, leaf: jnp.zeros_like(leaf) if is_listed(key_path) else leaf, part
     )
 
 
@@ -166,7 +166,9 @@ def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
 def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array]:
     """What follows from states, input, load and noise."""
     (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
-    x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
+    x = parts.plant_state(flat_x)
+    z = parts.law_state(flat_z)
+    r = parts.target
     pushed = parts.pushed(load)
     truth, axes = plant.output(zero, x), load.shape[0]
     y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])

@@ -44,7 +44,8 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     """
     slopes, acting = at.local.slopes, at.acting
     state_matrix = slopes["plant"]["plant"][np.ix_(acting, acting)]
-    push, load = gain * slopes["plant"]["u"][acting], slopes["plant"]["load"][acting]
+    push = gain * slopes["plant"]["u"][acting]
+    load = slopes["plant"]["load"][acting]
     inputs, count = push.shape[1], len(state_matrix)
     if lag:
         state_matrix = np.block([[state_matrix, push], [np.zeros((inputs, count)), -np.eye(inputs) / lag]])
@@ -70,6 +71,8 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     entries["input"][x] = early + late
     matrix[z] = of_state("law") + slopes["law"]["u"] @ u
     entries["noise"][z] = slopes["law"]["noise"] + slopes["law"]["u"] @ u_noise
+    # A shift register holds the inputs that still wait. Within a step the older of two acts until the remainder of the
+    # delay has passed (`early`), the newer one after it (`late`).
     slots = [slice(n + law + i * inputs, n + law + (i + 1) * inputs) for i in range(buffered)]  # newest first
     for share, steps in ((late, buffered - 1), (early, buffered)):
         if steps <= 0:

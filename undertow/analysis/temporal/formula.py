@@ -275,8 +275,8 @@ class Value:
         """Shape (time,)."""
         signal = numbers.asarray(signals[self.signal], dtype=float)
         if self.reduction:
-            chosen = signal if self.entries is None else signal[:, np.array(self.entries)]
-            values = REDUCTIONS[self.reduction](numbers, chosen)
+            selected = signal if self.entries is None else signal[:, np.array(self.entries)]
+            values = REDUCTIONS[self.reduction](numbers, selected)
         else:
             values = signal if self.entries is None else signal[:, self.entries[0]]
         values = numbers.abs(values) if self.absolute else values

@@ -243,17 +243,17 @@ class _Reader:
                 raise BadInput("", f"use `{name}` by itself, because it is a number", f"`{name}` with more")
             return Value("error", entries, "norm")
         names = self._names.signals[name].names
-        chosen = None if entry is None else self._place(name, names, entry)
+        indices = None if entry is None else self._place(name, names, entry)
         if function in REDUCTIONS:
-            if chosen is not None or not names:
+            if indices is not None or not names:
                 raise BadInput("", f"use `{function}` for a signal with several entries", f"`{name}`")
             return Value(name, None, function)
-        if names and chosen is None:
+        if names and indices is None:
             if len(names) > 1:
                 hint = f"Its entries are {', '.join(names)}: write `{name}[{names[0]}]`, or `norm({name})`"
                 raise BadInput("", "compare a number", f"`{name}`, which has {len(names)} entries", hint=hint)
-            chosen = (0,)
-        return Value(name, chosen, absolute=function == "abs")
+            indices = (0,)
+        return Value(name, indices, absolute=function == "abs")
 
     def _place(self, name: str, names: Sequence[str], entry: str) -> tuple[int]:
         if entry in names:

@@ -164,7 +164,8 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
         function = catalogue.find("", thing, what=thing)
         make = lambda *leading_arguments: factory.call(function, options, leading_arguments, Path())[0]
         _check_model_comes_first(function, options)
-        part, name = make(*_leading(function)), thing.rpartition(":")[2]
+        part = make(*_leading(function))
+        name = thing.rpartition(":")[2]
         if not factory.is_part(part):
             raise _no_part(name, part, "controllers" if factory.takes_model(function) else "")
         return name, part, make
@@ -176,11 +177,11 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
                 kind, {"kind": short, **options}, Path(), leading_arguments
             )[0]
             return short, make(*_leading(names[full_name])), make
-    every = {name for kind, names in names_by_kind.items() for name in (*names, *catalogue.presets(kind))}
+    part_names = {name for kind, names in names_by_kind.items() for name in (*names, *catalogue.presets(kind))}
     must = "be a .yaml file, or the name of a part"
     if Path(thing).exists() or Path(thing).suffix:
         raise no_file(Path(thing), "", must)
-    hint = nearest_file(Path(thing)) or nearest(short, every) or "`undertow list` shows the names of all parts"
+    hint = nearest_file(Path(thing)) or nearest(short, part_names) or "`undertow list` shows the names of all parts"
     raise BadInput(thing, must, "not", hint=hint)
 
 

@@ -42,8 +42,8 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     sizes = {"axis": n, "actuator": inputs}
     for name, signal in controller.signals().items():
         own_sizes = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
-        due = tuple(sizes.get(dimension, own_sizes.get(dimension, 1)) for dimension in signal.dimensions)
-        yield from shaped(f"command, signal {name}", signals[name], due)  # pyright: ignore[reportArgumentType] - every size is known here
+        expected_shape = tuple(sizes.get(dimension, own_sizes.get(dimension, 1)) for dimension in signal.dimensions)
+        yield from shaped(f"command, signal {name}", signals[name], expected_shape)  # pyright: ignore[reportArgumentType] - every size is known here
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
     wrong = list(alike("advance", after, z, STATE, types=True))
     yield from wrong or shaped(

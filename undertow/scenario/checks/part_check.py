@@ -98,10 +98,10 @@ def _failed(part: Any, complaint: BaseException) -> Finding:
     """Finding for an exception in a part or in its use."""
     if isinstance(complaint, BadInput):  # worded already, with its place
         return Finding("error", "contract", "", str(complaint))
-    says, hint = fault_of(complaint)
-    if says.startswith("cannot"):
-        return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)
-    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {says}", hint)
+    message, hint = fault_of(complaint)
+    if message.startswith("cannot"):
+        return Finding("error", "contract", "", message[:1].upper() + message[1:], hint)
+    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {message}", hint)
 
 
 def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:

@@ -85,7 +85,9 @@ def _settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, 
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
     """Rows (what, value, unit)."""
-    supply, limit, unit = float(thruster.supply), _full_voltage(thruster), thruster.input_unit
+    supply = float(thruster.supply)
+    limit = _full_voltage(thruster)
+    unit = thruster.input_unit
     rows = [
         (
             "supply, dead zone" if unit == "V" else "largest command, dead zone",

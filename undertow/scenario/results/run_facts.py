@@ -124,7 +124,9 @@ def facts_from(attributes: Mapping[str, Any]) -> RunFacts:
         BadInput: the scenario is not as it was written.
     """
     read = lambda name: json.loads(attributes[name]) if name in attributes else None
-    metrics, success, transitions = read("metrics") or {}, read("success"), read("transitions")
+    metrics = read("metrics") or {}
+    success = read("success")
+    transitions = read("transitions")
     status, text = _status(attributes["status"]), attributes.get("scenario")
     return RunFacts(
         status=status,

@@ -216,7 +216,8 @@ def lost_thrusters(series: xr.Dataset) -> list[tuple[str, float]] | None:
     """
     if "lost_thrusters" not in series:
         return None
-    names, time = series["actuator"].attrs["names"].split(", "), series["time"].values
+    names = series["actuator"].attrs["names"].split(", ")
+    time = series["time"].values
     lost = zip(names, series["lost_thrusters"].values.T, strict=True)
     losses = [(name, float(time[signal.argmax()])) for name, signal in lost if signal.any()]
     return sorted(losses, key=lambda loss: loss[1])

@@ -252,7 +252,8 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
 
 def _failed(realization: Realization, faults: PyTree, t: Time, x: PyTree, applied: Inputs) -> tuple[Inputs, PyTree]:
     """Input that acts on the plant, and the state of the faults."""
-    loop, most = realization.loop, jnp.full(applied.shape, _LARGE)
+    loop = realization.loop
+    most = jnp.full(applied.shape, _LARGE)
     limits = loop.plant.admissible(x, -most), loop.plant.admissible(x, most)
     assert loop.faults is not None
     return loop.faults.input(realization.faults_realization, faults, t, applied, limits)

@@ -150,11 +150,11 @@ def begin(realization: Realization, start: tuple[Outputs, Outputs]) -> PyTree:
 
 def step(realization: Realization, dt: Any, carry, k):
     """A fixed step of plant and controller together."""
-    state, nothing, ending = carry
+    state, accumulated, ending = carry
     t, controller = instant(k, dt), cast(AbstractContinuousController, realization.loop.controller)
     x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
     state, ending = freeze_on_failure(realization.loop, state, (x, controller.project(z)), ending, t, dt)
-    return state, nothing, ending
+    return state, accumulated, ending
 
 
 def explained(loop: ClosedLoop, key: PRNGKeyArray, outcome: Outcome, dt: float) -> Outcome:

@@ -61,7 +61,9 @@ def freeze_on_failure(
         t, dt: s.
         command: of the control step, where a command that is not finite ends the run.
     """
-    code, time, wrong = status_of(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
+    code = status_of(loop, *new[:2])
+    time = t + dt
+    wrong = jnp.zeros((), dtype=int)
     if command is not None:
         wrong = wrong_input(command)
         code = jnp.where(wrong > 0, int(Status.COMMAND_NOT_FINITE), code)

@@ -119,10 +119,16 @@ def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence
         raise Unsupported(unavailable())
     from simdjit import Loop
 
-    begun = lambda prepared, carry, k: begin(prepared)
-    cache, nothing = cache_folder() / "native", np.zeros(())
+    record_start = lambda prepared, carry, k: begin(prepared)
+    cache, no_output = cache_folder() / "native", np.zeros(())
     loop = Loop(
-        prepare, lambda prepared: nothing, lambda prepared, carry, k: carry, begun, numbers, constant, cache=cache
+        prepare,
+        lambda prepared: no_output,
+        lambda prepared, carry, k: carry,
+        record_start,
+        numbers,
+        constant,
+        cache=cache,
     )
     return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
 
@@ -168,7 +174,8 @@ class SimdBatchRunner:
         self._plan = plan
         # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
         compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW
-        integrate, dt = (COMPACT_METHODS if compact else METHODS)[plan.method], plan.dt
+        integrate = (COMPACT_METHODS if compact else METHODS)[plan.method]
+        dt = plan.dt
 
         def realize(numbers):
             loop, accumulators, at, key = eqx.combine(numbers, static)
@@ -233,9 +240,9 @@ def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
         return loop.realize(key).disturbance_realization
 
     constant = [decides_structure(leaf) for leaf in jax.tree.leaves(numbers)]
-    unchanged, nothing = lambda prepared, carry, k: carry, lambda prepared, carry, k: jnp.zeros(())
+    unchanged, no_output = lambda prepared, carry, k: carry, lambda prepared, carry, k: jnp.zeros(())
     program = Loop(
-        realize, lambda prepared: prepared, unchanged, nothing, numbers, constant, 1, None, cache_folder() / "native"
+        realize, lambda prepared: prepared, unchanged, no_output, numbers, constant, 1, None, cache_folder() / "native"
     )
     carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
     return jax.tree.map(lambda leaf: leaf[0], carry)

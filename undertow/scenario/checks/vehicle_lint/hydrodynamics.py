@@ -87,7 +87,8 @@ def _is_of_sphere(facts: Facts) -> bool:
 
 def _sphere(facts: Facts) -> Iterator[Finding]:
     """Equal added mass along all axes and none in rotation is that of a sphere: then size and mass must fit one."""
-    mass, half = facts.added_mass[0, 0], _SPHERE * facts.displaced_mass
+    mass = facts.added_mass[0, 0]
+    half = _SPHERE * facts.displaced_mass
     if abs(mass / half - 1) > 0.05:
         got = f"{mass:.4g} kg, where half the displaced mass is {half:.4g} kg"
         radius = np.cbrt(2 * mass / FRESH_WATER / (4 / 3 * np.pi))

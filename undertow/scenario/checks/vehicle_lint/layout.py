@@ -55,7 +55,8 @@ def arms(facts: Facts) -> Iterator[Finding]:
         axis = int(np.argmax(beyond))
         if beyond[axis] > 0.6:
             side = ("length", "width", "height")[axis]
-            key, at = f"thrusters[{j}].position", abs(position[axis] - facts.r_g[axis])
+            key = f"thrusters[{j}].position"
+            at = abs(position[axis] - facts.r_g[axis])
             got = f"{at:.3g} m from the centre of gravity, of a hull with a {side} of {facts.size[axis]:.3g} m"
             level = error if beyond[axis] > 5 else advice
             yield level("arm", key, "be on the hull", got, "Is it that of another vehicle, or in another unit?")

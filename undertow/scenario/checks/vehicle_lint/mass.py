@@ -58,10 +58,13 @@ def gyration(facts: Facts) -> Iterator[Finding]:
     """The radius of gyration must fit the hull. Finds grams, centimetres and other vehicles' inertia."""
     radii = facts.radii_of_gyration
     if facts.size is None:
-        limits, usual, basis = np.full(3, facts.scale), _USUAL_OF_SCALE, "Thruster arms and volume make the vehicle"
+        limits = np.full(3, facts.scale)
+        usual = _USUAL_OF_SCALE
+        basis = "Thruster arms and volume make the vehicle"
     else:
         limits = _corner_radii(facts.size)
-        usual, basis = _USUAL, "All its mass in the corners of the hull would give"
+        usual = _USUAL
+        basis = "All its mass in the corners of the hull would give"
     ratios = radii / limits
     i = int(np.argmax(np.maximum(ratios / usual[1], usual[0] / np.maximum(ratios, 1e-12))))
     smallest, largest = np.array(usual) * limits[i]
@@ -91,7 +94,8 @@ def axes(facts: Facts) -> Iterator[Finding]:
     """
     if facts.size is None or any(gyration(facts)):
         return
-    moments, box = np.diag(facts.inertia), _corner_radii(facts.size) ** 2
+    moments = np.diag(facts.inertia)
+    box = _corner_radii(facts.size) ** 2
     pairs = [(box[i] / box[j], i, j) for i in range(3) for j in range(3) if 0 < moments[j] < moments[i]]
     ratio, i, j = min(pairs, default=(1.0, 0, 0))
     if ratio < _CLEARLY_SMALLER:

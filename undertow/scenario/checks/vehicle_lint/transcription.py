@@ -44,7 +44,8 @@ def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
     if np.all(np.abs(ratio - np.sqrt(2)) < 0.05 * np.sqrt(2)):
         return "The arm was not multiplied by sin 45 degrees."
     if np.all(np.isfinite(ratio)) and np.ptp(ratio) < 0.02 * ratio.max():
-        size, excess = max(ratio[0], 1 / ratio[0]), "long" if ratio[0] > 1 else "short"
+        size = max(ratio[0], 1 / ratio[0])
+        excess = "long" if ratio[0] > 1 else "short"
         return f"The matrix's arms are {size:.3g} times too {excess} for the poses: another vehicle's, or another unit."
     return "Is it the matrix of another layout, order or frame?"
 
