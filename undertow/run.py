@@ -134,8 +134,10 @@ class Run:
         for name, metric in facts.meanings.items():
             if name not in facts.whole:
                 continue
-            late, value = (_shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole))
-            lines.append(f"  {name:<20}{late:>12}{value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
+            steady_value, whole_value = (
+                _shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole)
+            )
+            lines.append(f"  {name:<20}{steady_value:>12}{whole_value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
         if facts.success is not None:
             lines.append(f"  {facts.success.sentence(facts.meanings)}")
         return "\n".join(lines)
@@ -250,8 +252,8 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
     except ValidationError as errors:
-        wrong = complaint(errors, nowhere)
-        raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
+        bad_input = complaint(errors, nowhere)
+        raise BadInput("loop" if bad_input.name == "kind" else bad_input.name, bad_input.must, bad_input.got) from None
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)

@@ -60,14 +60,14 @@ def certify(
 
 
 def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
-    described = {
+    signal_data = {
         "lyapunov": (f"Lyapunov function: {function.meaning}", function.value, _UNITS),
         "lyapunov_estimation": ("its part that eps and the weights make", function.estimation, _UNITS),
         "lyapunov_rate": ("its mean rate since the record before", rate, "m^2/s^3, rad^2/s^3"),
     }
     return {
         name: series(("time",), values, meaning, units)
-        for name, (meaning, values, units) in described.items()
+        for name, (meaning, values, units) in signal_data.items()
         if values is not None
     }
 
@@ -76,8 +76,9 @@ def _summed(hypothesis: Hypothesis, time: np.ndarray, window: SteadyWindow) -> d
     summary = {"name": hypothesis.name, "sentence": hypothesis.sentence}
     if hypothesis.held is None:
         return summary | {"whole": None, "steady": None, "first_failure": None, "unknown": hypothesis.unknown}
-    broken = time[~hypothesis.held]
-    return summary | window.shares(hypothesis.held, time) | {"first_failure": float(broken[0]) if broken.size else None}
+    failure_times = time[~hypothesis.held]
+    first_failure = float(failure_times[0]) if failure_times.size else None
+    return summary | window.shares(hypothesis.held, time) | {"first_failure": first_failure}
 
 
 def _course(value: np.ndarray, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:

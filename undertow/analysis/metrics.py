@@ -104,11 +104,10 @@ _ALL = "tracking"
 
 def output_groups(units: Sequence[str]) -> dict[str, tuple[str, list[int]]]:
     """Outputs that share a unit: name -> unit and places. Metres and radians never make one number."""
-    groups = {
-        name: (unit, [i for i, output_unit in enumerate(units) if output_unit == unit])
-        for unit, name in _GROUPS.items()
-        if unit in units
-    }
+    groups = {}
+    for unit, name in _GROUPS.items():
+        if unit in units:
+            groups[name] = (unit, [i for i, output_unit in enumerate(units) if output_unit == unit])
     one_kind = not groups and len(set(units)) == 1
     return {_ALL: (units[0], list(range(len(units))))} if one_kind else groups
 
@@ -300,9 +299,8 @@ def results_of_batch(gathered: Gathered, states: Sequence[Any]) -> dict[str, np.
             metrics_of_runs = [
                 accumulator.metric.values(jax.tree.map(lambda leaf, i=i: leaf[i], host)) for i in range(count)
             ]
-            metrics |= {
-                name: np.array([float(run[name]) for run in metrics_of_runs]) for name in accumulator.metric.metrics()
-            }
+            for name in accumulator.metric.metrics():
+                metrics[name] = np.array([float(run[name]) for run in metrics_of_runs])
     return metrics
 
 

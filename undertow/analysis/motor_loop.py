@@ -75,9 +75,9 @@ def stable_gains(matrix: Callable[[float], np.ndarray], largest: float) -> tuple
     Returns:
         None if there is none: drifted weights cannot hold such a loop.
     """
-    still, slope = matrix(0.0), matrix(1.0) - matrix(0.0)
+    offset, slope = matrix(0.0), matrix(1.0) - matrix(0.0)
     values = np.arange(largest + 1)
-    stable = values[np.linalg.eigvals(still + values[:, None, None] * slope).real.max(1) < 0]
+    stable = values[np.linalg.eigvals(offset + values[:, None, None] * slope).real.max(1) < 0]
     return (float(stable[0]), float(stable[-1])) if stable.size else None
 
 

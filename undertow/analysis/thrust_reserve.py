@@ -135,8 +135,8 @@ def _demands(model: Model, reference: AbstractReference, times, water):
         ground = coordinates.measurement(target.position, target.velocity)
         flow = jnp.zeros_like(target.velocity)
         flow = flow.at[:3].set(water) if flow.shape[0] == 6 else flow
-        through = coordinates.measurement(target.position, target.velocity - flow)
-        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
+        relative_measurement = coordinates.measurement(target.position, target.velocity - flow)
+        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(relative_measurement)
         return required, dynamics.gain(ground)
 
     return jax.vmap(demand)(times)

@@ -88,17 +88,19 @@ def arena(command: ArenaCommand) -> int:
     console = wide_console()
     with output_folder(command.out or Path("runs") / "arena", Path()) as folder:
         _check_place(folder)
-        again = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
-        again += ["--tune", str(budget)] if budget is not None else []
-        again += ["--robustness"] if robustness else []
+        resume_command = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
+        resume_command += ["--tune", str(budget)] if budget is not None else []
+        resume_command += ["--robustness"] if robustness else []
         for option, value in (("--tasks", tasks), ("--vehicles", vehicles)):
-            again += [option, value] if value is not None else []
+            resume_command += [option, value] if value is not None else []
         try:
             for number, law in enumerate(candidates, 1):
                 console.rule(f"{law.name} ({number} of {len(candidates)})", align="left")
                 _run(console, law, folder_of(folder, law.name), settings)
         except (KeyboardInterrupt, OSError):
-            typer.echo(f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *again])}", err=True)
+            typer.echo(
+                f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *resume_command])}", err=True
+            )
             raise
         return _conclude(console, folder, command.pdf)
 

@@ -138,19 +138,20 @@ def _spread(quantiles: dict | None, unit: str) -> str:
 
 def sentences(summary_data: dict) -> list[str]:
     """The numbers of trials by status, and the verdict on each requirement."""
-    ended = ", ".join(f"{word} {number}" for word, number in summary_data["status"].items())
-    text = [f"{summary_data['done']} trials: {ended}."]
+    endings_text = ", ".join(f"{word} {number}" for word, number in summary_data["status"].items())
+    text = [f"{summary_data['done']} trials: {endings_text}."]
     text += [sentence for sentence in (summary_data["nominal_model"], by_xla(summary_data)) if sentence]
     for invalid in summary_data["invalid"]:
         text.append(f"Invalid trials ({invalid['trials']} with this error): {invalid['why']}.")
     for combination in summary_data["combinations"]:
-        of = "".join(f", {key} {value}" for key, value in combination["values"].items())
+        values_text = "".join(f", {key} {value}" for key, value in combination["values"].items())
         for requirement in combination["requirements"]:
             low, high = (100 * bound for bound in requirement["interval"])
             formula, name = requirement["formula"], requirement["metric"]
             bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
             text.append(
-                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
-                f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."
+                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{values_text}: "
+                f"{requirement['verdict']}; kept by {100 * requirement['kept']:.1f} % "
+                f"(95 % interval {low:.1f} to {high:.1f} %)."
             )
     return text

@@ -52,28 +52,30 @@ def compare(command: CompareCommand) -> int:
     if trials is not None:
         checks.positive("--trials", trials)
     controllers = None if entries is None else [word for word in map(str.strip, entries.split(",")) if word]
-    again = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
-    again += ["--trials", str(trials)] if trials is not None else []
-    again += ["--replay"] if replay else []
-    again += ["--tune", str(budget)] if budget is not None else []
+    resume_command = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
+    resume_command += ["--trials", str(trials)] if trials is not None else []
+    resume_command += ["--replay"] if replay else []
+    resume_command += ["--tune", str(budget)] if budget is not None else []
     name = f"{paths[0].stem}-comparison"
     file_names = (*_WRITTEN, FOLDER)
     with trials_folder(command.out, name, file_names, resume, command.overwrite, FOLDER) as folder:
         console = wide_console()
         if not resume:
             results_folder.remove(folder / FOLDER)
-        with _tuning(console, folder, budget, again) as tuner:
+        with _tuning(console, folder, budget, resume_command) as tuner:
             prepare = lambda: prepare_comparison(paths, controllers, trials, command.allow_code, tuner)
             ready = built_with_advice(console, prepare)
         if replay:
             check_replay(ready.built)
-        with resumable(folder, again):
+        with resumable(folder, resume_command):
             run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count)
             return _conclude(console, ready, folder, command.pdf, replay)
 
 
 @contextlib.contextmanager
-def _tuning(console: Console, folder: Path, budget: int | None, again: Sequence[str]) -> Iterator[Tuner | None]:
+def _tuning(
+    console: Console, folder: Path, budget: int | None, resume_command: Sequence[str]
+) -> Iterator[Tuner | None]:
     """What tunes the controllers, with its progress; None without a budget. Stopped, it says how to continue."""
     if budget is None:
         yield None
@@ -83,7 +85,7 @@ def _tuning(console: Console, folder: Path, budget: int | None, again: Sequence[
         yield lambda candidates, scenario: equal_budgets(candidates, scenario, budget, store, say)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) and store.is_dir() and any(store.iterdir()):
-            line = shlex.join(["undertow", *again, "--out", str(folder), "--resume"])
+            line = shlex.join(["undertow", *resume_command, "--out", str(folder), "--resume"])
             typer.echo(f"Stopped while tuning; what was evaluated is kept. To continue: {line}", err=True)
         elif not (folder / STORE).exists():
             _remove_empty(store, folder)

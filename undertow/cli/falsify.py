@@ -109,18 +109,18 @@ def _table(falsification: Falsified) -> Table:
 def _sentences(falsification: Falsified, folder: Path) -> list[str]:
     runs, objective = falsification.objective.runs, falsification.objective
     remarks = [sentence for sentence in (falsification.nominal_model(),) if sentence]
-    how = "by differentiation" if falsification.differentiated else "by differences"
-    ended = "the search converged" if falsification.finished else "the budget is used up"
+    gradient_method = "by differentiation" if falsification.differentiated else "by differences"
+    ending = "the search converged" if falsification.finished else "the budget is used up"
     if falsification.violation is None:
         least = min(objective.robustnesses)
         none = f"No violation in {runs} runs within the bounds; least robustness {least:.4g}. This proves nothing"
-        return [f"{none}: {ended}, gradients {how}.", *remarks, f"Results: {folder}"]
+        return [f"{none}: {ending}, gradients {gradient_method}.", *remarks, f"Results: {folder}"]
     departure = f"{falsification.violation.size:.4g} of the bounds (norm)"
-    alone = "repeats" if falsification.repeated() else "does not repeat"
+    repetition = "repeats" if falsification.repeated() else "does not repeat"
     return [
         f"The counter-example {_violated(falsification)}. Its departure is {departure}. "
-        f"{runs} runs: {ended}, gradients {how}.",
+        f"{runs} runs: {ending}, gradients {gradient_method}.",
         *remarks,
-        f"A single run {alone} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
+        f"A single run {repetition} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
         f"Results: {folder}",
     ]

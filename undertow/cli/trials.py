@@ -98,8 +98,8 @@ def resumable(folder: Path, command: Sequence[str]) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, OSError):
         if (folder / STORE).is_dir():
-            again = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
-            typer.echo(f"Stopped{_kept(folder)}. To continue: {again}", err=True)
+            resume_command = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
+            typer.echo(f"Stopped{_kept(folder)}. To continue: {resume_command}", err=True)
         raise
 
 
@@ -153,8 +153,8 @@ def _live(console: Console, resumed: bool) -> Iterator[Watch]:
         def watch(tally: Tally) -> None:
             nonlocal first
             if first is None and resumed:
-                again = "" if tally.done == tally.trials else "; chunks that were not finished run again"
-                message = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
+                remark = "" if tally.done == tally.trials else "; chunks that were not finished run again"
+                message = f"continuing: {tally.done} of {tally.trials} trials kept{remark}"
                 console.print(message, highlight=False)
             first = tally.done if first is None else first
             rate = (tally.done - first) / max(time.perf_counter() - start_time, 1e-9)

@@ -32,8 +32,8 @@ def parts_of(model: Model) -> tuple[Parts, tuple[int, ...]]:
     """Models of the subsystems of a model, and their numbers of inputs; the model itself where it is of one."""
     if isinstance(model.dynamics, CompositeDynamics):
         return model.dynamics.parts, model.dynamics.inputs
-    still = jnp.zeros(len(model.coordinates.angles))
-    return (model,), (model.dynamics.gain(model.coordinates.measurement(still, still)).shape[1],)
+    zeros = jnp.zeros(len(model.coordinates.angles))
+    return (model,), (model.dynamics.gain(model.coordinates.measurement(zeros, zeros)).shape[1],)
 
 
 def split(values: Float[Array, " k"], sizes: tuple[int, ...]) -> tuple[Array, ...]:
@@ -55,7 +55,8 @@ def split_measurement(coordinates: tuple[AbstractCoordinates, ...], y: Measureme
 def split_target(coordinates: tuple[AbstractCoordinates, ...], r: Target) -> tuple[Target, ...]:
     """Reference of each subsystem."""
     sizes = tuple(len(part.angles) for part in coordinates)
-    return tuple(Target(*parts) for parts in zip(*(split(row, sizes) for row in r), strict=True))
+    rows_of_parts = [split(row, sizes) for row in r]
+    return tuple(Target(*rows) for rows in zip(*rows_of_parts, strict=True))
 
 
 class CompositeCoordinates(AbstractCoordinates):

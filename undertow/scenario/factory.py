@@ -263,10 +263,10 @@ def contract_like(thing: Any, kind: str = "") -> tuple[str, list[str]]:
     """
     contracts = [_CONTRACTS[kind]] if kind else _CONTRACTS.values()
     kinds = [candidate for contract in contracts for candidate in typing.get_args(contract) or (contract,)]
-    shared = {
-        candidate: [name for name in getattr(candidate, "__abstractmethods__", ()) if hasattr(thing, name)]
-        for candidate in kinds
-    }
+    shared = {}
+    for candidate in kinds:
+        methods = getattr(candidate, "__abstractmethods__", ())
+        shared[candidate] = [name for name in methods if hasattr(thing, name)]
     nearest = max(kinds, key=lambda candidate: len(shared[candidate]))
     return (nearest.__name__ if kind or shared[nearest] else ""), sorted(shared[nearest])
 
@@ -333,9 +333,9 @@ def _law_of_each(
     described_laws, before = [], 0
     for part in parts_of(leading_arguments[0])[0]:
         after = before + len(part.coordinates.angles)
-        alone = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
+        part_context = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
         with within(_LAW):
-            described_laws.append(make("controllers", description, folder, (part,), alone))
+            described_laws.append(make("controllers", description, folder, (part,), part_context))
         before = after
     # What differs between the subsystems follows from the rest of the scenario each time that it is built.
     law_options = {"kind": description} if isinstance(description, str) else description

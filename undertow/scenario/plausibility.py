@@ -114,10 +114,10 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
         return _size(flow)
     rotation = Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
     shares = np.linspace(0.0, 1.0, _SHARES)
-    through = np.concatenate([-rotation.T @ flow, np.zeros(3)])
+    relative_velocity = np.concatenate([-rotation.T @ flow, np.zeros(3)])
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
     down = np.broadcast_to(rotation[2], (_SHARES, 3))
-    needed = np.asarray(body_force(plant.body, np.outer(shares, through), down)) @ acting_directions(plant).T
+    needed = np.asarray(body_force(plant.body, np.outer(shares, relative_velocity), down)) @ acting_directions(plant).T
     speed = 0.0
     for share, force in zip(shares, needed, strict=True):
         residual = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
@@ -174,17 +174,18 @@ def _angles(loop: ClosedLoop, desired: ReferenceSamples):
 def _unfinished(reference: AbstractReference, desired: ReferenceSamples):
     """A reference that comes to rest after the end of the run."""
     duration = float(desired.time[-1])
-    late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
-    if not np.isfinite(late.position).all():
+    late_samples = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
+    if not np.isfinite(late_samples.position).all():
         return
-    goal = late.position[-1]
-    size = 1e-9 * np.ptp(late.position, axis=0).max()
-    arrived = np.abs(late.position - goal).max(axis=1) <= size
-    if arrived.all() or not arrived[-2:].all() or late.velocity[-2:].any() or size == 0:
+    goal = late_samples.position[-1]
+    size = 1e-9 * np.ptp(late_samples.position, axis=0).max()
+    arrived = np.abs(late_samples.position - goal).max(axis=1) <= size
+    if arrived.all() or not arrived[-2:].all() or late_samples.velocity[-2:].any() or size == 0:
         return
     last = int(np.flatnonzero(~arrived)[-1])
-    between = _sampled(reference, np.linspace(late.time[last], late.time[last + 1], _SAMPLES), desired.start)
-    ends = between.time[np.abs(between.position - goal).max(axis=1) <= size][0]
+    times = np.linspace(late_samples.time[last], late_samples.time[last + 1], _SAMPLES)
+    samples_between = _sampled(reference, times, desired.start)
+    ends = samples_between.time[np.abs(samples_between.position - goal).max(axis=1) <= size][0]
     message = f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s"
     yield advice("loop.duration", message, f"Give `loop.duration` at least {ends:.3g} s, unless a part is enough")
 
@@ -241,38 +242,39 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples)
         current.mean for current in _members(loop, GaussMarkovCurrent)
     ]
     flow = np.sum([np.asarray(velocity, dtype=float) for velocity in flows], axis=0) if flows else np.zeros(3)
-    drift = _size(flow)
+    current_speed = _size(flow)
     most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
-    if drift > _SPARE * top:
-        message = f"the current is {drift:.3g} m/s, but {most}: it drifts away"
+    if current_speed > _SPARE * top:
+        message = f"the current is {current_speed:.3g} m/s, but {most}: it drifts away"
         yield advice("disturbance", message, "1 knot is 0.514 m/s")
         return
-    held = held_speed(plant, desired.position[-1], flow) if _size(desired.velocity[-1, :3]) < _AT_REST else drift
-    if held < drift:
+    ends_at_rest = _size(desired.velocity[-1, :3]) < _AT_REST
+    held = held_speed(plant, desired.position[-1], flow) if ends_at_rest else current_speed
+    if held < current_speed:
         message = (
-            f"the current is {drift:.3g} m/s, but at the attitude of `reference` the thrusters hold the vehicle "
-            f"against at most {held:.3g} m/s of it: it drifts away"
+            f"the current is {current_speed:.3g} m/s, but at the attitude of `reference` the thrusters hold the "
+            f"vehicle against at most {held:.3g} m/s of it: it drifts away"
         )
         yield advice("disturbance", message, "1 knot is 0.514 m/s")
         return
     speed = float(np.hypot.reduce(desired.velocity[:, :3], axis=1).max())
     duration = float(desired.time[-1])
-    way = desired.position[:, :3] - desired.start[:3]
-    far, step = _size(way[-1]), _size(way[0])
-    if speed > _SPARE * (top + drift):
+    displacements = desired.position[:, :3] - desired.start[:3]
+    final_distance, initial_distance = _size(displacements[-1]), _size(displacements[0])
+    if speed > _SPARE * (top + current_speed):
         yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")
-    elif far > _SPARE * (top + drift) * duration:
-        message = f"`reference` is {far:.4g} m from the start at the end of the run, but {most}"
-        hint = f"That takes {far / top:.3g} s: give `loop.duration` more than {duration:g} s"
+    elif final_distance > _SPARE * (top + current_speed) * duration:
+        message = f"`reference` is {final_distance:.4g} m from the start at the end of the run, but {most}"
+        hint = f"That takes {final_distance / top:.3g} s: give `loop.duration` more than {duration:g} s"
         yield advice("reference", message, hint)
-    elif step > _FAR * top:
-        message = f"`reference` begins {step:.4g} m from the vehicle, but {most}"
+    elif initial_distance > _FAR * top:
+        message = f"`reference` begins {initial_distance:.4g} m from the vehicle, but {most}"
         hint = "Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
-        at_limits = f"the thrusters are at their limits for {step / top:.3g} s or more"
+        at_limits = f"the thrusters are at their limits for {initial_distance / top:.3g} s or more"
         yield advice("reference", f"{message}: {at_limits}", hint)
     else:
         yield from _begins_elsewhere(desired)
-        yield from _too_demanding(loop, plant, duration, flow, (speed + drift) / top)
+        yield from _too_demanding(loop, plant, duration, flow, (speed + current_speed) / top)
         yield from _leans(plant, desired, flow)
 
 
@@ -291,16 +293,17 @@ def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow
 
 def _leans(plant: HybridVehicle, desired: ReferenceSamples, flow: np.ndarray):
     """A vehicle that the water turns over about an axis that its thrusters cannot turn it about."""
-    through = desired.velocity[:, :3] - flow
-    if not through.any():
+    relative_velocity = desired.velocity[:, :3] - flow
+    if not relative_velocity.any():
         return
-    lean = largest_lean(plant, desired.position[:, 3:], through)
+    lean = largest_lean(plant, desired.position[:, 3:], relative_velocity)
     if lean is None or lean.angle <= _LEANS:
         return
     angle = f"by {np.degrees(lean.angle):.0f} degrees" if np.isfinite(lean.angle) else "until it turns over"
     message = (
         f"the thrusters cannot {lean.axis} the vehicle, and its weight and buoyancy right it too little: at "
-        f"{desired.time[lean.row]:.3g} s, at {_size(through[lean.row]):.2g} m/s through the water, it leans {angle}"
+        f"{desired.time[lean.row]:.3g} s, at {_size(relative_velocity[lean.row]):.2g} m/s through the water, it leans "
+        f"{angle}"
     )
     yield advice("reference", message, "Make it slower, or lower the centre of gravity")
 

@@ -60,10 +60,9 @@ def checksum(dataset: xr.Dataset) -> str:
     """
     attributes = {"": {key: value for key, value in dataset.attrs.items() if key != "checksum"}}
     attributes |= {str(name): dict(variable.attrs) for name, variable in dataset.variables.items()}
-    words = {
-        name: {key: _plain(value) for key, value in attributes_of_one.items()}
-        for name, attributes_of_one in attributes.items()
-    }
+    words = {}
+    for name, attributes_of_one in attributes.items():
+        words[name] = {key: _plain(value) for key, value in attributes_of_one.items()}
     return text_hash(json.dumps([claims(dataset), words], sort_keys=True))
 
 

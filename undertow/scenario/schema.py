@@ -330,7 +330,8 @@ def kind_of(data: Mapping[str, Any]) -> str:
     """What a file is by its keys: `campaign`, `vehicle file` or `scenario`; "" where it has no key of any."""
     if "scenario" in data:
         return "campaign"
-    vehicle, scenario = (sum(key in model_keys for key in data) for model_keys in (VEHICLE_KEYS, Scenario.model_fields))
+    vehicle = sum(key in VEHICLE_KEYS for key in data)
+    scenario = sum(key in Scenario.model_fields for key in data)
     return "vehicle file" if vehicle > scenario else "scenario" if scenario else ""
 
 

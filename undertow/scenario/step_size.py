@@ -102,8 +102,8 @@ def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome)
         rates = lambda state: ravel_pytree(flow(jnp.zeros(()), tree(state), realization))[0]
         return _fastest(rates, [(flat,)])
     _, tree = ravel_pytree(first)
-    still = plant.no_load()
-    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
+    no_load = plant.no_load()
+    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, no_load))[0]
     states = [
         ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in sampled_rows
     ]

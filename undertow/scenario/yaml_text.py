@@ -90,13 +90,13 @@ class _Composer:
 
     def document(self) -> _Node:
         """The first document, which must be the only one."""
-        nothing, documents = _Node(None, {}, 1, 0), []
+        empty, documents = _Node(None, {}, 1, 0), []
         for event in self._events:
             if isinstance(event, DocumentStartEvent):
                 if documents:
                     raise Malformed("be one YAML document", "several", event.start_mark.line + 1)
                 documents.append(self._node(next(self._events), 0))
-        return documents[0] if documents else nothing
+        return documents[0] if documents else empty
 
     def _parsed(self, text: str) -> Iterator[Any]:
         try:

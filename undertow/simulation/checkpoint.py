@@ -116,9 +116,8 @@ class Checkpoint:
         if not must and elapsed_before + self._longest.get(what, 0.0) > self._budget:
             raise OutOfTime
         answer = compute()
-        self._longest[what] = (
-            self.elapsed - elapsed_before if what in self._longest else 0.0
-        )  # the first one is compiled
+        # The first evaluation of a kind is compiled, and says nothing of how long the next one takes.
+        self._longest[what] = self.elapsed - elapsed_before if what in self._longest else 0.0
         line = {"what": what, "at": arguments, "answer": answer, "elapsed": self.elapsed}
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")

@@ -45,14 +45,14 @@ def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: 
     """Number and result of each piece of work as it is completed, by threads of this process."""
     with _taking_turns(), ThreadPoolExecutor(threads) as pool:
         waiting = enumerate(work)
-        going = {pool.submit(function, *arguments): i for i, arguments in itertools.islice(waiting, _AHEAD * threads)}
+        futures = {pool.submit(function, *arguments): i for i, arguments in itertools.islice(waiting, _AHEAD * threads)}
         try:
-            while going:
-                done, _ = wait(going, return_when=FIRST_COMPLETED)
+            while futures:
+                done, _ = wait(futures, return_when=FIRST_COMPLETED)
                 for future in done:
-                    number = going.pop(future)
+                    number = futures.pop(future)
                     for i, arguments in itertools.islice(waiting, 1):
-                        going[pool.submit(function, *arguments)] = i
+                        futures[pool.submit(function, *arguments)] = i
                     yield number, future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -92,9 +92,9 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
             number, result = numbers.pop(future), future.result()
             future.release()
             for i, arguments in itertools.islice(waiting, 1):
-                further = start(arguments)
-                numbers[further] = i
-                done.add(further)
+                next_future = start(arguments)
+                numbers[next_future] = i
+                done.add(next_future)
             yield number, result
     except (FutureCancelledError, CommClosedError, TimeoutError) as error:
         raise OSError(f"the connection to the Dask cluster is lost ({error})") from error

@@ -62,15 +62,15 @@ def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
     rho = (np.asarray(fuzzy.basis(as_array(eps.reshape(-1, 1)))) ** 2).sum(-1).reshape(eps.shape)
-    still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
-    yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
+    basis_is_constant = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
+    yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", basis_is_constant)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records is not recorded")
 
 
 def _constant(d: np.ndarray) -> np.ndarray:
     """Whether d is at each record what it was at the one before."""
-    still = (np.abs(np.diff(d, axis=0)) <= ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
-    return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
+    unchanged = (np.abs(np.diff(d, axis=0)) <= ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
+    return np.concatenate([unchanged[:1], unchanged]) if len(unchanged) else np.ones(len(d), bool)
 
 
 def _full_rank(model: Model, run: xr.Dataset) -> np.ndarray | None:

@@ -89,10 +89,11 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
 
     y_rest = plant.output(zero, x_rest)
-    still = jnp.zeros_like(y_rest.position)
+    zero_outputs = jnp.zeros_like(y_rest.position)
     # With actuators as they are along the reference, where they begin to turn: their thrust is no part of the load.
-    at_rest = unknown(zero, plant.initial_state(y_rest.position, still), plant.no_load())
-    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
+    at_rest = unknown(zero, plant.initial_state(y_rest.position, zero_outputs), plant.no_load())
+    # From accelerations of the outputs to those along the axes of the law, at rest.
+    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(zero_outputs)
 
     times = jnp.arange(steps, dtype=float) * dt
     resting = plant.pose(x_rest)
@@ -112,8 +113,9 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     def look(measuring, instant):
         t, truth = instant
         y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
-        wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
-        return measuring, jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
+        position_error = coordinates.difference(y.position, truth.position)
+        errors = jnp.concatenate([position_error, y.velocity - truth.velocity])
+        return measuring, jnp.where(jnp.isfinite(errors), errors, 0.0)  # the law is given what it expects
 
     start = loop.reference.at(zero)
     measuring = loop.navigation.init(

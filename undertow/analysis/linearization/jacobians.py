@@ -76,13 +76,10 @@ class Parts(NamedTuple):
         values, slopes = _evaluated(self, tuple(map(as_array, point)), as_array(dt))
         ends = np.cumsum([0, *self.sizes])
         columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
-        return Local(
-            {name: np.asarray(value) for name, value in values.items()},
-            {
-                name: {by: np.asarray(slope)[:, column] for by, column in columns.items()}
-                for name, slope in slopes.items()
-            },
-        )
+        slopes_by_input = {}
+        for name, slope in slopes.items():
+            slopes_by_input[name] = {by: np.asarray(slope)[:, column] for by, column in columns.items()}
+        return Local({name: np.asarray(value) for name, value in values.items()}, slopes_by_input)
 
     def pushed(self, load: Array) -> Load:
         """A load as an acceleration of the outputs (m/s^2, rad/s^2), as far as the water does not cause it."""

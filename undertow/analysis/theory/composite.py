@@ -48,10 +48,10 @@ def _layers(law: RCAF, dt: float) -> tuple[float, float]:
 def _certificate(law: RCAF, run: xr.Dataset, lived: xr.Dataset, window: SteadyWindow) -> RunCertificate:
     """U9: on average 1/2 E^T Q E ends below the residual, while all hypotheses hold."""
     bound = np.broadcast_to(law.weights_bound, run.sizes["axis"])
-    late = lived["lyapunov_decay"].values[window.inside(lived["time"].values)]
+    steady_decay = lived["lyapunov_decay"].values[window.inside(lived["time"].values)]
     numbers = {
         "residual": lyapunov_residual(law, run.sizes["axis"]),
-        "decay": float(late.mean()) if late.size else None,
+        "decay": float(steady_decay.mean()) if steady_decay.size else None,
         "weights_bound": bound.tolist(),
     }
     conditions = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_paper(law, lived)]

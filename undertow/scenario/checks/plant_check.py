@@ -17,10 +17,10 @@ _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
 def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
     """Findings from every method near the origin, each result against another way to the same number."""
-    wrong = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
-    wrong = wrong or list(_forms_of_model(plant))
-    if wrong:
-        yield from wrong
+    findings = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
+    findings = findings or list(_forms_of_model(plant))
+    if findings:
+        yield from findings
         return
     results = jax.jit(partial(_numbers, plant))(_trial(plant))
     yield from agree("output", results["velocity"], results["position_rate"], "the rate of its position")

@@ -27,7 +27,7 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
     jax.eval_shape(thruster.thrust, state, volts)
     per_thruster, scalar = (_COUNT,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
-    wrong = [
+    findings = [
         *alike("dynamics", thruster.dynamics(state, volts), state, "have the form of the state"),
         *shaped("thrust", thruster.thrust(state, volts), per_thruster),
         *shaped("current", thruster.current(state, volts), per_thruster),
@@ -39,9 +39,11 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
     ]
     for name, values in (("powers", powers), ("report", report)):
         if isinstance(values, Powers | PropellerReport):
-            wrong += [finding for value in values if value is not None for finding in shaped(name, value, per_thruster)]
-    if wrong:
-        yield from wrong
+            findings += [
+                finding for value in values if value is not None for finding in shaped(name, value, per_thruster)
+            ]
+    if findings:
+        yield from findings
         return
     full, gain = _full_voltage(thruster), float(np.min(thruster.voltage_gain()))
     forward, reverse = _settled_thrust(thruster, full)

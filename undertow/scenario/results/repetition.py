@@ -25,13 +25,13 @@ def shortened(dataset: xr.Dataset, names: Collection[str]) -> xr.Dataset:
         names: of series; those that the run has not are ignored.
     """
     left_out = sorted(str(name) for name in dataset.data_vars if name not in names)
-    short = dataset.drop_vars(left_out).copy()
-    for variable in short.variables.values():
+    reduced = dataset.drop_vars(left_out).copy()
+    for variable in reduced.variables.values():
         if variable.dtype.kind in "fi":
             variable.encoding = {"zlib": True, "shuffle": True, "complevel": 4}
-    short.attrs[_LEFT_OUT] = ", ".join(left_out)
-    short.attrs["checksum"] = checksum(short)
-    return short
+    reduced.attrs[_LEFT_OUT] = ", ".join(left_out)
+    reduced.attrs["checksum"] = checksum(reduced)
+    return reduced
 
 
 class Repetition(NamedTuple):
@@ -45,10 +45,10 @@ class Repetition(NamedTuple):
 def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it used and whose checksum, if any, is correct."""
     with opened_result(path) as earlier:
-        before, held = dict(earlier.attrs), claims(earlier)
+        before, earlier_claims = dict(earlier.attrs), claims(earlier)
     repeated_claims, left_out = claims(repeated), set(before.get(_LEFT_OUT, "").split(", "))
-    differing = [name for name, claim in held.items() if repeated_claims.get(name) != claim]
-    added = sorted(set(repeated_claims) - set(held) - left_out)
+    differing = [name for name, claim in earlier_claims.items() if repeated_claims.get(name) != claim]
+    added = sorted(set(repeated_claims) - set(earlier_claims) - left_out)
     if _LEFT_OUT in before and not differing and not added and before["content_hash"] != repeated.attrs["content_hash"]:
         differing = ["series that it has left out"]
     code = _code(path, before)

@@ -36,8 +36,8 @@ def run_scenario(source: Text | Mapping[str, Any] | Built) -> ScenarioResult:
 @in_its_precision
 def _run(built: Built) -> ScenarioResult:
     scenario, gathered = built.scenario, gathered_of(built)
-    ended = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
-    return finished(built, *ended, gathered)
+    outcome_and_reason = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
+    return finished(built, *outcome_and_reason, gathered)
 
 
 def gathered_of(built: Built) -> Gathered:

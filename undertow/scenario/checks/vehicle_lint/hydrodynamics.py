@@ -68,9 +68,9 @@ def dissipation(facts: Facts) -> Iterator[Finding]:
 
 def undamped(facts: Facts) -> Iterator[Finding]:
     """Every motion is damped."""
-    free = (np.diag(facts.linear_damping) == 0) & (np.diag(facts.quadratic_damping) == 0)
-    if np.any(free):
-        got = f"zero, like the linear one, in {_names(free)}"
+    undamped_axes = (np.diag(facts.linear_damping) == 0) & (np.diag(facts.quadratic_damping) == 0)
+    if np.any(undamped_axes):
+        got = f"zero, like the linear one, in {_names(undamped_axes)}"
         yield advice("undamped", "quadratic_damping", "slow every motion", got)
 
 
