@@ -2,14 +2,12 @@
 
 Prints JSON: for each program its operations per step, and of both compilers seconds to compile and nanoseconds per step
 and run of a batch on one core, estimated (simdjit/estimate.py) and measured. Programs: workloads W1 and W2, thrusters
-and fuzzy sets as in compiler_scale.py, and elementary functions of long arrays.
+and fuzzy sets as in compiler_scale.py. Those of elementary functions of long arrays: simdjit/benchmarks/estimates.py.
 """
 
 import json
 import os
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,34 +18,12 @@ process_setup.prepare()
 import compiler_scale  # on one core
 import jax
 import jax.numpy as jnp
-import numpy as np
+from estimates import RUNS, STEPS, figures, timed
 
-from simdjit import Loop, estimate
+from simdjit import estimate
 from undertow.core import runtime
 from undertow.simulation.loop.vmap_batch import XlaBatchRunner
 from undertow.studies.speed import workload
-
-RUNS, STEPS = 64, 200
-
-
-def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """Result and seconds of the processor, which other processes do not change."""
-    begun = time.process_time()
-    return work(), time.process_time() - begun
-
-
-def figures(
-    program: Any, operations: int, traced: Any, compiling: tuple[float, float], runs: tuple[Callable, Callable]
-):
-    each = 1e9 / (STEPS * RUNS)
-    steps = [min(timed(run)[1] for _ in range(3)) * each for run in runs]
-    costs = estimate.compiled_here(operations), estimate.compiled_by_xla(traced)
-    names = ("simdjit", "xla")
-    found: dict[str, Any] = {"operations": program.operations}
-    for name, cost, seconds, step in zip(names, costs, compiling, steps, strict=True):
-        pairs = {"compile_s": (cost.compiling, seconds), "step_ns": (cost.step, step)}
-        found[name] = {key: {"estimated": round(a, 2), "measured": round(b, 2)} for key, (a, b) in pairs.items()}
-    return found
 
 
 def of_scenario(data: dict[str, Any]) -> dict[str, Any]:
@@ -69,26 +45,12 @@ def of_scenario(data: dict[str, Any]) -> dict[str, Any]:
         )
 
 
-def of_functions(size: int) -> dict[str, Any]:
-    """Figures of a sine and an exponential of each entry of an array."""
-    step = lambda n, carry, k: jnp.sin(carry * n) + 0.1 * jnp.exp(-carry * carry) * n
-    example = np.linspace(0.1, 1, size)
-    given = np.broadcast_to(example, (RUNS, size)).copy()
-    program, compiling = timed(lambda: Loop(lambda n: n, lambda n: n * 1.0, step, lambda n, c, k: c[0], example))
-    repeated = jax.jit(jax.vmap(lambda n: jax.lax.fori_loop(0, STEPS, lambda k, c: step(n, c, k), n)))
-    compiled, waited = timed(lambda: repeated.lower(given).compile())
-    traced = jax.make_jaxpr(lambda n, c: step(n, c, 0))(example, example)
-    runs = lambda: program.run(given, STEPS), lambda: jax.block_until_ready(compiled(given))
-    return figures(program, program.operations, traced, (compiling, waited), runs)
-
-
 def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         os.environ["UNDERTOW_CACHE"] = os.environ["SIMDJIT_CACHE"] = name
         found = {"W1": of_scenario(workload.W1), "W2": of_scenario(workload.W2)}
         found |= {f"{n} thrusters": of_scenario(compiler_scale.scenario_with_thrusters(n, Path(name))) for n in (8, 32)}
         found |= {f"{n} sets": of_scenario(compiler_scale.scenario_with_sets(n)) for n in (20, 100)}
-        found |= {f"functions of {n}": of_functions(n) for n in (100, 300, 1000)}
     print(json.dumps(found, indent=1))
 
 

@@ -1,52 +1,40 @@
-"""How the batch compiler scales: python benchmarks/compiler_scale.py [thrusters|sets|products]
+"""How the batch compiler scales: python benchmarks/compiler_scale.py [thrusters|sets]
 
 thrusters: BlueROV2 Heavy's body with 8, 16 and 32 T200 under preset `robust` at 100 Hz.
 sets: workload W1 with 5 to 100 fuzzy sets on each axis.
-products: a step X <- A X + B of square matrices with 8 to 48 rows, as a filter of so many states needs it.
 
 Prints JSON: operations per step, seconds to compile, and nanoseconds per step and run in a batch of 64, by simdjit and
 by XLA (`jax.vmap` of the same batch). All are processor time on one core, on which other processes have little effect.
+The same figures of products of matrices: simdjit/benchmarks/against_xla.py.
 """
 
 import argparse
 import json
 import math
 import os
+import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from undertow.core import process_setup
 
 process_setup.prepare()
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, list(os.sched_getaffinity(0))[:1])
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "simdjit/benchmarks"))
 
 import jax
 import jax.numpy as jnp
-import numpy as np
+from against_xla import REPETITIONS, RUNS, STEPS, figures, shortest  # on one core
 
-from simdjit import Loop, Unsupported
+from simdjit import Unsupported
 from undertow.core import runtime
 from undertow.scenario.reading import parse
 from undertow.simulation.loop.vmap_batch import XlaBatchRunner
 from undertow.studies.speed import workload
 
-VEHICLE = Path(__file__).parents[1] / "examples" / "my_rov.yaml"  # BlueROV2 Heavy
-RUNS, STEPS, REPETITIONS = 64, 400, 5
-
-
-def shortest(work: Callable[[], Any]) -> float:
-    """Seconds, of some repetitions after a first one."""
-    work()
-    times = []
-    for _ in range(REPETITIONS):
-        begun = time.process_time()
-        work()
-        times.append(time.process_time() - begun)
-    return min(times)
+VEHICLE = ROOT / "examples" / "my_rov.yaml"  # BlueROV2 Heavy
 
 
 def ring(count: int) -> list[dict[str, Any]]:
@@ -103,33 +91,9 @@ def of_scenario(data: dict[str, Any]) -> dict[str, float | str]:
     return figures(program.operations, compiling, by_simdjit * each, waited, by_xla * each)
 
 
-def of_product(size: int, folder: Path) -> dict[str, float]:
-    """Figures of a product of matrices."""
-    chance = np.random.default_rng(0)
-    given = chance.normal(size=(RUNS, size, size)) / size, chance.normal(size=(RUNS, size, size))
-    step = lambda numbers, carry, k: numbers[0] @ carry + numbers[1]
-    begun = time.process_time()
-    example = tuple(each[0] for each in given)
-    program = Loop(lambda n: n, lambda n: n[1] * 1.0, step, lambda n, c, k: c[0, 0], example, cache=folder)
-    compiling = time.process_time() - begun
-    by_simdjit = shortest(lambda: program.run(given, STEPS))
-    repeated = jax.jit(jax.vmap(lambda *n: jax.lax.fori_loop(0, STEPS, lambda k, c: step(n, c, k), n[1])))
-    begun = time.process_time()
-    by_xla = shortest(lambda: jax.block_until_ready(repeated(*given)))
-    waited = time.process_time() - begun - REPETITIONS * by_xla
-    each = 1e9 / (STEPS * RUNS)
-    return figures(program.operations, compiling, by_simdjit * each, waited, by_xla * each)
-
-
-def figures(operations: int, compiling: float, by_simdjit: float, xla_compiling: float, by_xla: float):
-    found = {"operations": operations, "simdjit_compile_s": compiling, "simdjit_ns": by_simdjit}
-    found |= {"xla_compile_and_first_run_s": xla_compiling, "xla_ns": by_xla}
-    return {key: float(f"{value:.4g}") for key, value in found.items()}
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    kinds = ("thrusters", "sets", "products")
+    kinds = ("thrusters", "sets")
     parser.add_argument("what", nargs="*", choices=[*kinds, []], default=[])
     asked = parser.parse_args().what or kinds
     with tempfile.TemporaryDirectory() as name:
@@ -139,8 +103,6 @@ def main() -> None:
             found["thrusters"] = {n: of_scenario(scenario_with_thrusters(n, folder)) for n in (8, 16, 32)}
         if "sets" in asked:
             found["sets"] = {n: of_scenario(scenario_with_sets(n)) for n in (5, 20, 50, 100)}
-        if "products" in asked:
-            found["products"] = {n: of_product(n, folder) for n in (8, 12, 15, 16, 24, 32, 48)}
     print(json.dumps(found, indent=1))
 
 

@@ -140,7 +140,10 @@ class Copy:
 
     def _failures(self, files: list[str]) -> list[str]:
         """Tests of some files that fail, or of all where none is named; files may have none that is selected."""
-        environment = os.environ | {"UNDERTOW_CACHE": str(self.caches), "PYTHONPATH": str(self.project)}
+        environment = os.environ | {
+            "UNDERTOW_CACHE": str(self.caches),
+            "PYTHONPATH": f"{self.project}:{self.project}/simdjit",
+        }
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *self.tests.split(), *files]
         try:
             ended = subprocess.run(

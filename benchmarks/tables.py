@@ -77,7 +77,7 @@ def scale() -> list[tuple[str, ...]]:
 def batch() -> list[tuple[str, ...]]:
     """Speed of the batch compiler, and how it scales."""
     speed = result("-m", "undertow", "bench", "--json")
-    scaling = benchmark("compiler_scale.py")
+    scaling = benchmark("compiler_scale.py") | benchmark("../simdjit/benchmarks/against_xla.py")
     numpy = speed["numpy_ns"]
     by_hand = benchmark("yardstick.py", "--json")
     rows: list[tuple[str, ...]] = [("W1, plain NumPy", "", "", f"{thousands(numpy)} ns", "1")]

@@ -22,7 +22,7 @@ import pytest
 EVENTS = {"jaxpr_trace": "tracing", "jaxpr_to_mlir_module": "lowering", "backend_compile": "XLA"}
 COLUMNS = ("total", "tracing", "lowering", "XLA", "LLVM", "processes", "rest")
 LABELS: dict[str, Callable[[str], str]] = {
-    "folder": lambda test: test.split("/")[1],
+    "folder": lambda test: test.removeprefix("tests/").split("/")[0],
     "file": lambda test: test.split("::")[0],
     "test": str,
 }

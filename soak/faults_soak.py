@@ -16,7 +16,7 @@ from soak.verdict import Failure
 from undertow.core import catalogue, runtime
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.physics.faults.injected import InputFault
-from undertow.physics.faults.kinds import Kind, list_kinds
+from undertow.physics.faults.kinds import FaultKind, list_kinds
 from undertow.physics.faults.occurrence import Occurrence
 from undertow.physics.faults.sampling import random_fault
 from undertow.physics.faults.targets import targets_of
@@ -86,7 +86,7 @@ class FaultProgram(NamedTuple):
     """
 
     loop: str
-    kinds: tuple[Kind, ...]
+    kinds: tuple[FaultKind, ...]
     width: int
 
     def scenario(self, faults: Mapping[int, Mapping[str, Any]], seed: int) -> dict[str, Any]:

@@ -75,7 +75,8 @@ plant:
   thruster: {kind: paper_table3, fidelity: electromechanical, supply: 24.0}
 controller: {kind: adrc}
 reference: {kind: waypoints, points: [[0, 0, 0], [1, 1, 0]], speed: 0.2}
-disturbance: {kind: thruster_loss, failing: [1], start: 0.3}
+faults:
+  - {target: thruster 1, mode: fraction, severity: 0, onset: 0.3}
 navigation: {kind: degraded, position_noise: 0.01, velocity_noise: 0.01, delay: 0.02}
 loop: {dt: 0.01, duration: 0.5, record: 0.05, substeps: 2, method: rk4}
 """,

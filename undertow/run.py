@@ -30,7 +30,7 @@ from undertow.logs.log import Log
 from undertow.logs.run_log import log_of_run
 from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.none import none
-from undertow.physics.faults.mode import AbstractFault
+from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
 from undertow.report.run_page import shown, write_run_page
 from undertow.scenario import factory
@@ -232,7 +232,7 @@ def _with_faults(
     mode_objects = {
         index: entry["mode"] for index, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)
     }
-    mode_names = {index: {"mode": type(mode).__name__} for index, mode in mode_objects.items()}
+    mode_names = {index: {"mode": name_of(mode)} for index, mode in mode_objects.items()}
     entries = []
     for index, entry in enumerate(faults):
         with within(f"faults[{index}]"):

@@ -18,8 +18,8 @@ current = ut.disturbances.current([0.3, 0.2, 0.0])  # m/s
 
 runs = {}
 for remaining in (1.0, 0.5, 0.0):
-    loss = ut.disturbances.thruster_loss(failing=(1,), start=10.0, remaining=remaining)  # s
-    runs[remaining] = ut.simulate(plant, law, hold, disturbance=[current, loss], dt=0.01, record=0.05)
+    loss = {"target": "thruster 1", "mode": "fraction", "severity": remaining, "onset": 10.0}  # s
+    runs[remaining] = ut.simulate(plant, law, hold, disturbance=current, faults=[loss], dt=0.01, record=0.05)
 
 # %%
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from batch_compiler.emulated_gpu import EmulatedGpu
+from emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, nvidia
 from undertow.analysis.metrics import Metrics, results

@@ -86,3 +86,24 @@ def test_the_scalars_are_those_of_the_runs(campaign_file, campaign_folder):
 def test_noise_alone_is_no_scalar(campaign_file):
     several = prepare(campaign_file(name="noise"), False).trials
     assert realized_scalars(several, range(8)) == {}
+
+
+def test_random_faults_are_scalars_of_their_entries(campaign_file):
+    """By the place of the entry in the scenario, whatever the order in which the loop has them."""
+    scenario = {
+        "plant": {"kind": "double_integrator", "axes": 2, "limit": 20.0},
+        "controller": {"kind": "pid", "frequency": 2.0},
+        "reference": {"kind": "setpoint", "position": [0.0, 0.0]},
+        "faults": [
+            {"target": "input", "number": "random", "mode": "scale", "severity": 0.5},
+            {"target": "position", "mode": "bias", "severity": 0.1, "onset": [0.5, 1.0]},
+        ],
+        "loop": {"duration": 2.0, "dt": 0.02, "record": 0.1},
+    }
+    several = prepare(campaign_file(scenario=scenario, vary={}, requirements={}, name="faults"), False).trials
+    scalars = realized_scalars(several, range(8))
+    affected = ["faults[0].affected[0] (scale)", "faults[0].affected[1] (scale)"]
+    assert set(scalars) == {*affected, "faults[1].onset (bias)"}
+    np.testing.assert_array_equal(scalars[affected[0]] + scalars[affected[1]], 1.0)
+    onsets = scalars["faults[1].onset (bias)"]
+    assert (onsets >= 0.5).all() and (onsets <= 1.0).all() and len(set(onsets)) == 8

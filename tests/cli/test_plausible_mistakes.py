@@ -104,7 +104,7 @@ ERRORS = {
     "six outputs": (SIMULATE, "s.yaml", "[2, 0, 1, 0, 0, 0.5]", "[2, 0, 1, 0.5]", ["`reference.position`", "s.yaml, line 5", "north, east, down, roll, pitch, yaw"]),
     "three forces for six": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: wrench, value: [1, 0, 0]}", ["`disturbance[0].value`", "s.yaml, line 7", "surge, sway, heave, roll, pitch, yaw"]),
     "milliseconds": (SIMULATE, "s.yaml", "dt: 0.01", "dt: 10", ["`loop.dt`", "is 10 s", "s.yaml, line 10", "10 ms are 0.01"]),
-    "several unknown options": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: thruster_loss, thruster: 1, factor: 0.5}", ["`disturbance[0].thruster`", "s.yaml, line 7", "Also unknown: `factor`"]),
+    "several unknown options": (SIMULATE, "s.yaml", "{kind: current, velocity: [0.3, 0, 0]}", "{kind: payload, thruster: 1, factor: 0.5}", ["`disturbance[0].thruster`", "s.yaml, line 7", "Also unknown: `factor`"]),
     "sensor of another name": (SIMULATE, "s.yaml", "loop:", "navigation: {kind: observer, sensors: [imu, gps]}\nloop:", ["`navigation.sensors[1]`", "s.yaml, line 8", "`position_fix`"]),
     "record no multiple": (SIMULATE, "s.yaml", "record: 0.05", "record: 0.025", ["`loop.record`", "s.yaml, line 11", "0.02 or 0.03 s"]),
     "controller for another plant": (SIMULATE, "s.yaml", CONTROLLER, "controller: {kind: pid, frequency: [1, 2]}", ["`controller.frequency`", "s.yaml, line 4", "6"]),

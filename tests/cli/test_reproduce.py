@@ -6,8 +6,6 @@ import json
 import pytest
 
 from undertow.cli import reproduce as command
-from undertow.paper import reproduce as study
-from undertow.paper.pages import report
 
 
 @pytest.fixture
@@ -24,8 +22,8 @@ def short_study(monkeypatch):
         (folder / "report.html").write_text("page")
         return folder / "report.html"
 
-    monkeypatch.setattr(study, "reproduce", short)
-    monkeypatch.setattr(report, "write", write)
+    monkeypatch.setattr(command, "reproduce_paper", short)
+    monkeypatch.setattr(command, "write", write)
     monkeypatch.setattr(command, "worker_processes", lambda preload: contextlib.nullcontext())
 
 
@@ -57,7 +55,7 @@ def test_a_report_that_cannot_be_written_costs_no_results(undertow, tmp_path, sh
     def fail(found, folder, pdf, pool):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(report, "write", fail)
+    monkeypatch.setattr(command, "write", fail)
     assert undertow("reproduce").code == 4
     assert [path.name for path in tmp_path.iterdir()] == ["reproduction"]
     assert (tmp_path / "reproduction" / "results.json").is_file()

@@ -1,5 +1,8 @@
 """What is said of values that a method returns in another form than its contract has."""
 
+from typing import Any
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,7 +10,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.core.returned import check_command, check_state, difference, form, not_two
 from undertow.core.signals import Signal, check_declared
-from undertow.physics.faults.mode import Altered, altered_by
+from undertow.physics.faults.mode import NO_SEVERITY, AbstractMode, Altered, Moment, altered_by
 
 
 class Law:
@@ -85,11 +88,15 @@ def test_a_state_that_changes_its_form():
         check_state(Law(), {"a": jnp.zeros(1)}, {"a": jnp.ones(2)})
 
 
-class Mode:
+class Mode(AbstractMode):
     """A fault that alters a signal to the answer it was given."""
 
-    def __init__(self, answer):
-        self.answer = answer
+    answer: Any
+    targets = ("quantity",)
+    severity = NO_SEVERITY
+
+    def init(self, value):
+        return jnp.zeros(2)
 
     def apply(self, memory, moment, value):
         return self.answer
@@ -105,11 +112,12 @@ class Mode:
     ],
 )
 def test_answers_that_are_no_altered_signal(answer, says):
-    value = jnp.zeros(3)
+    value, zero = jnp.zeros(3), jnp.zeros(())
+    moment = Moment(zero > 0, 0.0, 0.0, 1.0, jax.random.PRNGKey(0), jnp.asarray(0), value, holds=True)
     right = (Altered(value, True), jnp.zeros(2))
-    assert altered_by(Mode(right), jnp.zeros(2), None, value) is right
+    assert altered_by(Mode(right), jnp.zeros(2), moment, value) is right
     with pytest.raises(BadInput, match=f"^Mode: `apply`.*{says}"):
-        altered_by(Mode(answer), jnp.zeros(2), None, value)
+        altered_by(Mode(answer), jnp.zeros(2), moment, value)
 
 
 class Declaring:

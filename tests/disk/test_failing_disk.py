@@ -73,12 +73,12 @@ IN_PLACE = {
     "undertow/cli/tune.py": "a draft of the results folder",
     "undertow/cli/falsify.py": "a draft of the results folder",
     "undertow/cli/analyze.py": "a draft of the results folder",
-    "undertow/cli/logs.py": "a draft of the results folder",
+    "undertow/cli/log_score.py": "a draft of the results folder",
     "undertow/cli/campaign.py": "a folder that takes another's place",
     "undertow/cli/compare.py": "a folder that takes another's place",
     "undertow/scenario/results/result_files.py": "a draft of the results folder",
     "undertow/logs/unpacking.py": "a temporary folder",
-    "undertow/report/plotting.py": "a draft of the results folder",
+    "undertow/report/plotted.py": "a draft of the results folder",
     "undertow/report/prediction_page.py": "a draft of the results folder",
 }
 

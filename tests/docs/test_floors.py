@@ -1,4 +1,4 @@
-"""The lower bounds of pyproject.toml are the versions of floors.txt, with which `.ci/run` tests."""
+"""The lower bounds of pyproject.toml are the versions of floors.txt, with which `.ci/run` tests; simdjit has the same."""
 
 import re
 import tomllib
@@ -9,7 +9,10 @@ import pytest
 pytestmark = pytest.mark.docs
 
 ROOT = Path(__file__).parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PROJECT, SIMDJIT = (
+    tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for folder in (ROOT, ROOT / "simdjit")
+)
 
 
 def plain(name):
@@ -34,3 +37,10 @@ def test_floor(dependency):
     name, lowest = dependency.split(">=")
     assert numbers(pins("floors.txt")[plain(name)]) == numbers(lowest)
     assert numbers(pins("constraints.txt")[plain(name)]) >= numbers(lowest)
+
+
+def test_the_compiler_has_the_same_bounds_and_licence():
+    """Both are in one wheel here, and simdjit alone in one of its own."""
+    assert set(SIMDJIT["dependencies"]) < set(PROJECT["dependencies"])
+    assert SIMDJIT["requires-python"] == PROJECT["requires-python"]
+    assert (ROOT / "simdjit" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()

@@ -52,10 +52,10 @@ def test_every_bit_is_that_of_the_batch_compiler(tmp_path, precision):
         ODIN,
         HEAVY,
         HEAVY | {"disturbance": RANDOM_CURRENT},
-        HEAVY | {"disturbance": ["random_suite", {"kind": "thruster_loss", "failing": [2], "start": 0.1}]},
+        HEAVY | {"disturbance": ["random_suite", "parameter_error"]},
         HEAVY | {"plant": WITH_BATTERY},
     ],
-    ids=["full motors", "waves", "random current", "loss", "battery"],
+    ids=["full motors", "waves", "random current", "wrong parameters", "battery"],
 )
 def test_vehicles_under_their_loads(tmp_path, scenario, precision):
     meets_its_test(scenario, tmp_path, precision)

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
-from batch_compiler.emulated_gpu import EmulatedGpu
+from emulated_gpu import EmulatedGpu
 from loop.test_simd_examples import example
 
 from simdjit import Driver, nvidia

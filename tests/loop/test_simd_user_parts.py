@@ -40,7 +40,7 @@ def scenario(name, backend):
     }
 
 
-# Each compiles a loop twice; the operations themselves are those of batch_compiler/test_primitives.
+# Each compiles a loop twice; the operations themselves are those of simdjit/tests/test_primitives.
 SLOW = ("network", "table", "ordered", "chosen", "of_bytes", "by_python", "predictive", "spectrum", "kalman")
 
 

@@ -1,4 +1,4 @@
-"""What `tests/conftest.py` switches on does find mistakes, here and in the folders that it names."""
+"""What `conftest.py` switches on does find mistakes, here and in the folders that it names."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -16,7 +16,6 @@ from undertow.physics.disturbances.parameter_error import parameter_error
 from undertow.physics.disturbances.payload import payload
 from undertow.physics.disturbances.sheared_current import sheared_current
 from undertow.physics.disturbances.tether import tether
-from undertow.physics.disturbances.thruster_loss import thruster_loss
 from undertow.physics.disturbances.waves import waves
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.paper_table3 import paper_table3
@@ -161,5 +160,3 @@ def test_jumps_of_several_disturbances_are_those_of_each():
     both = SumOfDisturbances((payload(start=1.0, stop=4.0), payload(start=4.0, stop=6.0), waves(), tether()))
     assert both.jumps(10.0) == (1.0, 4.0, 6.0) and both.jumps(5.0) == (1.0, 4.0) and both.jumps(4.0) == (1.0,)
     assert parameter_error().jumps(10.0) == ()
-    assert thruster_loss(start=0.5).jumps(10.0) == (0.5,)
-    assert thruster_loss(start=0.5).jumps(0.5) == thruster_loss(start=0.0).jumps(10.0) == ()

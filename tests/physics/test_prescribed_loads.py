@@ -9,7 +9,7 @@ import pytest
 
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
-from undertow.physics.disturbances import random_suite, sinusoid, table, thruster_loss, wrench
+from undertow.physics.disturbances import random_suite, sinusoid, table, wrench
 from undertow.physics.disturbances.adding import SumOfDisturbances
 
 TIMES = np.array([-1.0, 0.0, 0.7, 1.5, 2.0, 3.9, 4.0, 5.3, 100.0])
@@ -58,24 +58,6 @@ def test_random_suite_has_its_distributions():
     np.testing.assert_allclose([levels.mean(), levels.std()], [0.0, 1.5], atol=0.04)
 
 
-def test_thrusters_fail_from_their_time_on():
-    """Named ones, always the same; else as many as said, and every one of them in its turn."""
-    chosen, drawn = thruster_loss(0.2, 3.0, failing=(2, 5), thrusters=6), thruster_loss(-1.0, 0.0, 2, thrusters=6)
-    names = np.array([1, 0.2, 1, 1, 0.2, 1])
-
-    @jax.jit
-    def shares(key):
-        at = lambda t: chosen.at(chosen.realize(key), t, SOMEWHERE, CALM).scaling.thrust
-        return at(2.99), at(3.0), jax.lax.map(drawn.realize, jax.random.split(key, 300))
-
-    before, after, draws = map(np.asarray, shares(jax.random.PRNGKey(5)))
-    np.testing.assert_array_equal(np.broadcast_to(before, 6), np.ones(6))
-    np.testing.assert_array_equal(after, names)
-    np.testing.assert_array_equal((draws == -1.0).sum(1), 2)
-    assert ((draws == -1.0) | (draws == 1.0)).all() and ((draws == -1.0).sum(0) > 60).all()
-    assert chosen.jumps(10.0) == (3.0,) and chosen.jumps(3.0) == () and drawn.jumps(10.0) == ()
-
-
 @pytest.mark.parametrize(
     ("make", "name"),
     [
@@ -93,11 +75,6 @@ def test_thrusters_fail_from_their_time_on():
         (lambda: random_suite(span=0.0), "span"),
         (lambda: random_suite(axes=0), "axes"),
         (lambda: random_suite(axes=3).at(None, jnp.asarray(0.0), None, CALM), "axes"),
-        (lambda: thruster_loss(start=-1.0), "start"),
-        (lambda: thruster_loss(number=9), "number"),
-        (lambda: thruster_loss(number=-1), "number"),
-        (lambda: thruster_loss(failing=(0,)), "failing"),
-        (lambda: thruster_loss(failing=(9,)), "failing"),
     ],
 )
 def test_bad_input(make, name):
@@ -107,4 +84,3 @@ def test_bad_input(make, name):
 
 def test_limits_that_are_allowed():
     assert random_suite(slowest=1.0, fastest=1.0, axes=1).axes == 1
-    assert float(thruster_loss(number=0).number) == 0 and float(thruster_loss(number=8).number) == 8

@@ -12,7 +12,6 @@ from test_page import parsed
 import undertow as ut
 from undertow.analysis.metrics import meanings
 from undertow.control.navigation.perfect import perfect
-from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.thrusters.first_order import first_order
 from undertow.report import run_page
 from undertow.report.figures.run_files import LARGE
@@ -23,10 +22,12 @@ from undertow.report.replay.replay_data import hull_size, packed, page_data, rep
 from undertow.report.replay.trials_again import replays_of_trials
 from undertow.report.run_page import RunPageContents, write_run_page
 from undertow.scenario.build import build
+from undertow.scenario.faulted import faulted
 from undertow.scenario.reading import from_data
 from undertow.scenario.results.run_facts import facts_from
 from undertow.scenario.results.run_result import RunRecord, RunResult
 from undertow.scenario.results.run_scenario import run_scenario
+from undertow.scenario.schema import Fault
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 pytestmark = pytest.mark.full
@@ -40,10 +41,10 @@ def loop():
     plant = ut.HybridVehicle(
         ut.vehicles.bluerov2_heavy(), first_order(thrust_per_volt=2.0, time_constant=0.5, supply=16)
     )
-    load = SumOfDisturbances((ut.disturbances.current(WATER), ut.disturbances.thruster_loss(failing=[3], start=10.0)))
-    return ClosedLoop(
-        plant, ut.controllers.pid(plant.model(), frequency=1.0), ut.references.setpoint([0.0] * 6), load, perfect()
-    )
+    law, hold = ut.controllers.pid(plant.model(), frequency=1.0), ut.references.setpoint([0.0] * 6)
+    healthy = ClosedLoop(plant, law, hold, ut.disturbances.current(WATER), perfect())
+    lost = Fault(target="thruster 3", mode="fraction", severity=0.0, onset=10.0)
+    return faulted(healthy, [lost])[0]
 
 
 @pytest.fixture

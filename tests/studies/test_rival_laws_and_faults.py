@@ -1,4 +1,4 @@
-"""Rival laws, modified adaptation, degraded measurements and thruster loss, as parts of scenarios."""
+"""Rival laws, modified adaptation, degraded measurements and loss of thrust, as parts of scenarios."""
 
 import equinox as eqx
 import jax
@@ -14,7 +14,6 @@ from undertow.control.navigation import degraded
 from undertow.control.references import setpoint
 from undertow.core.contracts import Measurement
 from undertow.core.errors import BadInput
-from undertow.physics.disturbances import thruster_loss
 from undertow.physics.plants import double_integrator, hybrid_vehicle
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2_heavy
@@ -197,38 +196,35 @@ def test_noise_has_its_size_and_a_law_is_told_of_it():
     assert float(slow.velocity_noise(1e-3)) == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("number", [0, 1, 3])
-def test_as_many_thrusters_fail_as_are_asked_for(number):
-    loss = thruster_loss(0.25, number=number)
-    each = np.array([loss.realize(key) for key in jax.random.split(jax.random.PRNGKey(5), 40)])
-    assert (np.sort(each) == [0.25] * number + [1.0] * (8 - number)).all()
-    assert number == 0 or (each < 1).any(0).all(), "all thrusters have their turn"
+def test_as_many_thrusters_fail_as_there_are_entries():
+    entry = {"target": "thruster", "number": "random", "mode": "fraction", "severity": 0.25, "onset": 2.0}
+    odin = {"kind": "hybrid_vehicle", "vehicle": "odin"}
+    loop = build(STILL | {"plant": odin, "faults": [entry] * 3}).closed_loop
+    pose, no_load = loop.plant.pose(loop.plant.initial_state()), loop.plant.no_load()
+
+    @jax.jit
+    def shares(key):
+        at = lambda t: loop.faults.load(loop.faults.realize(key), t, pose, no_load).scaling.thrust
+        return at(1.99), at(2.0)
+
+    before, after = jax.vmap(shares)(jax.random.split(jax.random.PRNGKey(5), 40))
+    assert (before == 1.0).all() and (np.sort(after) == [0.25] * 3 + [1.0] * 5).all()
+    assert (after < 1).any(0).all(), "all thrusters have their turn"
 
 
 @pytest.mark.full
-def test_given_thrusters_fail_when_they_are_meant_to():
+def test_a_thruster_without_thrust_is_no_thruster():
     """One thruster of ODIN off is the vehicle without it."""
     odin = {"kind": "hybrid_vehicle", "vehicle": "odin"}
-    built = build(
-        STILL | {"plant": odin, "disturbance": {"kind": "thruster_loss", "failing": [3], "start": 2.0}}
-    ).closed_loop
+    loss = {"target": "thruster 3", "mode": "fraction", "severity": 0, "onset": 2.0}
+    loop = build(STILL | {"plant": odin, "faults": [loss]}).closed_loop
     without = build(STILL | {"plant": odin | {"thrusters": [1, 2, 4, 5, 6, 7, 8]}}).closed_loop.plant
-    plant, volts = built.plant, jnp.linspace(3.0, 10.0, 8)
-    x, left = plant.initial_state(), without.initial_state()
-    realization = built.disturbance.realize(jax.random.PRNGKey(0))
-    at = lambda t: plant.acceleration(t, x, volts, built.disturbance.at(realization, t, plant.pose(x), plant.no_load()))
+    plant, volts = loop.plant, jnp.linspace(3.0, 10.0, 8)
+    x, x_without = plant.initial_state(), without.initial_state()
+    realization = loop.realize(jax.random.PRNGKey(0))
+    at = lambda t: plant.acceleration(t, x, volts, realization.load(t, x))
     np.testing.assert_array_equal(at(1.99), plant.acceleration(0.0, x, volts, plant.no_load()))
-    kept = jnp.delete(volts, 2)
     np.testing.assert_allclose(
-        at(2.0), without.acceleration(0.0, left, kept, without.no_load()), rtol=1e-12, atol=1e-12
+        at(2.0), without.acceleration(0.0, x_without, jnp.delete(volts, 2), without.no_load()), rtol=1e-12, atol=1e-12
     )
-    assert built.disturbance.jumps(5.0) == (2.0,)
-
-
-@pytest.mark.full
-def test_thrusters_that_there_are_not():
-    with pytest.raises(BadInput, match="failing` must have numbers from 1 to 8"):
-        thruster_loss(failing=(0, 3))
-    plant = {"kind": "hybrid_vehicle", "vehicle": "bluerov2"}
-    with pytest.raises(BadInput, match="thrusters` must be 6"):
-        build(STILL | {"plant": plant, "disturbance": "thruster_loss"})
+    assert loop.faults.jumps(5.0) == (2.0,)

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from batch_compiler.emulated_gpu import EmulatedGpu
+from emulated_gpu import EmulatedGpu
 
 from simdjit import Driver, Loop, nvidia
 from undertow.cli.main import run

@@ -10,7 +10,8 @@ import undertow as ut
 from undertow.control.supervision.fault_tolerant_law import fault_tolerant
 from undertow.core.contracts import Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.scenario.faulted import faulted
+from undertow.scenario.schema import Fault
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import RunPlan
 from undertow.simulation.prepared_run import prepare_loop
@@ -23,14 +24,15 @@ LAW = ut.controllers.pid(PLANT.model(), sampling_time=DT, frequency=4.8)
 
 def losses():
     """Nothing lost, then each thruster off, then each reversed."""
-    rows = [(1.0, ())] + [(share, (i,)) for share in (0.0, -1.0) for i in range(1, 9)]
-    return [ut.disturbances.thruster_loss(remaining=share, start=ONSET, failing=failing) for share, failing in rows]
+    shares = [(1, 1.0)] + [(number, share) for share in (0.0, -1.0) for number in range(1, 9)]
+    return [Fault(target=f"thruster {i}", mode="fraction", severity=share, onset=ONSET) for i, share in shares]
 
 
-def loops(law, disturbances):
+def loops(law, faults):
     reference = ut.references.lissajous((1.0, 1.0, 0.5, 0.5), (0.3, 0.35, 0.25, 0.3))
     noise, current = ut.navigation.white_noise(0.005, 0.005), ut.disturbances.current([0.5, 0.2, 0.2])
-    return [ClosedLoop(PLANT, law, reference, SumOfDisturbances((current, one)), noise) for one in disturbances]
+    healthy = ClosedLoop(PLANT, law, reference, current, noise)
+    return [faulted(healthy, [fault], sampling_time=DT)[0] for fault in faults]
 
 
 def batch(several, signals, every=1):

@@ -14,7 +14,7 @@ from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, known_key, within
 from undertow.physics.faults.injected import Faults, InputFault, PlantFault, QuantityFault
-from undertow.physics.faults.kinds import Kind, check_pair
+from undertow.physics.faults.kinds import FaultKind, check_pair
 from undertow.physics.faults.mode import AbstractFault
 from undertow.physics.faults.occurrence import Occurrence
 from undertow.physics.faults.of_computation import ComputationFault, computed, law_of_computed
@@ -56,6 +56,7 @@ def faulted(
     known = targets_of(loop.plant, loop.navigation)
     names = input_names(loop.plant) if "thruster" in known else ()
     groups: dict[str, list[Any]] = {"quantity": [], "input": [], "plant": [], "sensor": [], "computation": []}
+    entries_of: dict[str, list[int]] = {name: [] for name in groups}
     resolved = []
     for place, entry in enumerate(entries):
         with within(f"[{place}]"):
@@ -67,9 +68,9 @@ def faulted(
             kind = check_pair(target, entry.mode, fault)
             occurrence = _occurrence(entry, kind, target, fault)
             sampled = sum(one.sampled is not None for one in groups["input"]) if number == "random" else None
-            groups["input" if target.role in ("thruster", "bus") else target.role] += _placed(
-                target, number, entry, fault, occurrence, sampled
-            )
+            group = "input" if target.role in ("thruster", "bus") else target.role
+            groups[group] += _placed(target, number, entry, fault, occurrence, sampled)
+            entries_of[group].append(place)
             resolved.append(_resolved(entry, kind, target, number, occurrence) | options)
     of_sensors, of_computer = tuple(groups["sensor"]), tuple(groups["computation"])
     navigation: Any = loop.navigation
@@ -77,7 +78,8 @@ def faulted(
         navigation = dataclasses.replace(navigation, faults=SensorFaults(of_sensors))
     elsewhere = tuple(one.occurrence for one in (*of_sensors, *of_computer))
     first, second, third = (tuple(groups[name]) for name in ("quantity", "input", "plant"))
-    faults = Faults(first, second, third, elsewhere, loop.plant.inputs())
+    in_order = (*entries_of["quantity"], *entries_of["input"], *entries_of["plant"])
+    faults = Faults(first, second, third, elsewhere, loop.plant.inputs(), in_order)
     controller = computed(loop.controller, of_computer)
     return dataclasses.replace(loop, navigation=navigation, controller=controller, faults=faults), resolved
 
@@ -115,7 +117,7 @@ def _default_severity(function: Any) -> float:
     return made.severity.default if isinstance(made, type) and issubclass(made, AbstractFault) else 0.0
 
 
-def _occurrence(entry: Fault, kind: Kind, target: FaultTarget, fault: AbstractFault) -> Occurrence:
+def _occurrence(entry: Fault, kind: FaultKind, target: FaultTarget, fault: AbstractFault) -> Occurrence:
     """When and how severe, checked against the range of the severity."""
     onset = _range("onset", 0.0 if entry.onset is None else entry.onset, 0.0, math.inf, "s")
     duration = entry.duration
@@ -177,7 +179,7 @@ def _placed(
 
 
 def _resolved(
-    entry: Fault, kind: Kind, target: FaultTarget, number: int | str | None, occurrence: Occurrence
+    entry: Fault, kind: FaultKind, target: FaultTarget, number: int | str | None, occurrence: Occurrence
 ) -> dict[str, Any]:
     """The entry as a scenario has it, with every default filled in."""
     ends = lambda pair: float(pair[0]) if float(pair[0]) == float(pair[1]) else [float(one) for one in pair]

@@ -1,4 +1,9 @@
-"""Position and velocity of a poor navigation system: noise, bias, quantisation, delay and a low rate."""
+"""Position and velocity of a poor navigation system: noise, bias, quantisation, delay and a low rate.
+
+These are the properties of the system as it was bought: a law is designed for the noise of its velocity, and
+predictions contain it. What goes wrong with a navigation system in a run, for which no law is designed, is a fault of
+`position`, `velocity`, ...
+"""
 
 from typing import Any, NamedTuple
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
-from undertow.simulation.loop.simd_batch import Unsupported, unavailable
+from undertow.simulation.loop.simd_batch import Unsupported, simdjit, unavailable
 from undertow.simulation.loop.stepped import CompiledStep, put
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
@@ -109,8 +109,7 @@ class CProgram:
         if system.name in _TAKEN:
             raise BadInput("name", f"not be one of {', '.join(_TAKEN)}, which are in the Makefile", system.name)
         check_compiler()
-        from simdjit import c99
-
+        c99 = simdjit.c99
         self.system, self._c99, self._source = system, c99, c99.Source()
         self._state, results = jax.eval_shape(system.start, system.inputs)
         self.fields = {"state": fields(self._state), "input": fields(system.inputs), "output": fields(results)}
@@ -218,8 +217,7 @@ def check_compiler() -> None:
 
 def has_counterpart(function: Callable, *arguments: Any) -> bool:
     """Whether a function of arrays can be written in C."""
-    from simdjit import c99
-
+    c99 = simdjit.c99
     count = sum(leaf.size for leaf in jax.tree.leaves(jax.eval_shape(function, *arguments)))
     given = sum(np.size(leaf) for leaf in jax.tree.leaves(arguments))
     try:

@@ -4,138 +4,68 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from undertow.physics.faults.mode import NO_SEVERITY, AbstractComputationFault, Execution, Severity
+from undertow.core.numerics.number import Number
+from undertow.physics.faults.mode import (
+    NO_SEVERITY,
+    AbstractComputationFault,
+    Execution,
+    Instant,
+    Severity,
+    execution_mode,
+)
 from undertow.physics.faults.numbers_of_state import flipped, with_entry
 
 # Multiples of the golden section, modulo one, fill (0, 1) evenly: H. Weyl, Math. Ann. 77 (1916).
 _GOLDEN = 0.6180339887498949
 
 
-class Hang(AbstractComputationFault):
-    """No control step is computed: the last input is held, the state does not advance."""
-
-    targets = ("computation",)
-    severity = NO_SEVERITY
-    default_duration = 1.0
-
-    def execution(self, instant, dt):
-        return Execution(jnp.asarray(False), dt)
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def hang() -> Hang:
+@execution_mode(default_duration=1.0)
+def hang(instant: Instant, dt: Number) -> Execution:
     """The computer hangs for a second, unless a duration is given, and then continues as if nothing had happened."""
-    return Hang()
+    return Execution(jnp.asarray(False), dt)
 
 
-class DroppedStep(AbstractComputationFault):
-    """Every n-th control step is left out: the last input is held, the state does not advance."""
-
-    targets = ("computation",)
-    severity = Severity("control steps from one that is dropped to the next", "", 5.0, 1.0, 1e6)
-    default_duration = float("inf")
-
-    def execution(self, instant, dt):
-        return Execution(instant.number % jnp.round(instant.severity).astype(int) != 0, dt)
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def dropped_step() -> DroppedStep:
+@execution_mode(Severity("control steps from one that is dropped to the next", "", 5.0, 1.0, 1e6))
+def dropped_step(instant: Instant, dt: Number) -> Execution:
     """Control steps that are left out, of which the controller does not know."""
-    return DroppedStep()
+    return Execution(instant.number % jnp.round(instant.severity).astype(int) != 0, dt)
 
 
-class DuplicatedStep(AbstractComputationFault):
-    """In every n-th control step the state advances twice."""
-
-    targets = ("computation",)
-    severity = Severity("control steps from one that is duplicated to the next", "", 5.0, 1.0, 1e6)
-    default_duration = float("inf")
-
-    def execution(self, instant, dt):
-        again = instant.number % jnp.round(instant.severity).astype(int) == 0
-        return Execution(jnp.asarray(True), dt, again)
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def duplicated_step() -> DuplicatedStep:
+@execution_mode(Severity("control steps from one that is duplicated to the next", "", 5.0, 1.0, 1e6))
+def duplicated_step(instant: Instant, dt: Number) -> Execution:
     """Control steps in which the controller is computed twice, as where a message arrives twice."""
-    return DuplicatedStep()
+    again = instant.number % jnp.round(instant.severity).astype(int) == 0
+    return Execution(jnp.asarray(True), dt, again)
 
 
-class Overrun(AbstractComputationFault):
-    """A computation takes several sampling times, during which the last input is held."""
-
-    targets = ("computation",)
-    severity = Severity("sampling times that a computation takes beyond one", "", 2.0, 1.0, 1e6)
-    default_duration = float("inf")
-
-    def execution(self, instant, dt):
-        length = 1 + jnp.round(instant.severity)
-        return Execution(instant.number % length.astype(int) == 0, dt * length)
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def overrun() -> Overrun:
+@execution_mode(Severity("sampling times that a computation takes beyond one", "", 2.0, 1.0, 1e6))
+def overrun(instant: Instant, dt: Number) -> Execution:
     """The controller is computed in one of several control steps only, and measures the time since the last."""
-    return Overrun()
+    length = 1 + jnp.round(instant.severity)
+    return Execution(instant.number % length.astype(int) == 0, dt * length)
 
 
-class Jitter(AbstractComputationFault):
-    """The sampling time that the law is given differs from the true one in each step, uniformly distributed."""
-
-    targets = ("computation",)
-    severity = Severity("largest error as a share of the sampling time", "", 0.8, 0.0, 100.0)
-    default_duration = float("inf")
-
-    def execution(self, instant, dt):
-        place = _GOLDEN * jnp.asarray(instant.number, dtype=float)
-        return Execution(jnp.asarray(True), dt * (1 + instant.severity * (2 * (place - jnp.floor(place)) - 1)))
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def jitter() -> Jitter:
+@execution_mode(Severity("largest error as a share of the sampling time", "", 0.8, 0.0, 100.0))
+def jitter(instant: Instant, dt: Number) -> Execution:
     """Errors of the measured sampling time, other ones in every step."""
-    return Jitter()
+    multiple = _GOLDEN * jnp.asarray(instant.number, dtype=float)
+    return Execution(jnp.asarray(True), dt * (1 + instant.severity * (2 * (multiple - jnp.floor(multiple)) - 1)))
 
 
-class ClockJump(AbstractComputationFault):
-    """In the step of the onset the law is given another sampling time."""
-
-    targets = ("computation",)
-    severity = Severity(
+@execution_mode(
+    Severity(
         "sampling time that the controller is given once; negative where the clock goes back", "s", -1.0, -1e9, 1e9
     )
-    default_duration = float("inf")
-
-    def execution(self, instant, dt):
-        return Execution(jnp.asarray(True), jnp.where(instant.number == 0, instant.severity, dt))
-
-    def state(self, instant, law, z, y, r):
-        return z
-
-
-def clock_jump() -> ClockJump:
+)
+def clock_jump(instant: Instant, dt: Number) -> Execution:
     """A jump of the clock: the controller is given a wrong sampling time once."""
-    return ClockJump()
+    return Execution(jnp.asarray(True), jnp.where(instant.number == 0, instant.severity, dt))
 
 
 class Reload(AbstractComputationFault):
     """The state of the law begins anew from the measurement of the onset."""
 
-    targets = ("computation",)
     severity = NO_SEVERITY
-    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)
@@ -155,9 +85,7 @@ class BitFlip(AbstractComputationFault):
 
     entry: int | None = eqx.field(static=True)  # from 1; None for the numbers of the largest magnitude
 
-    targets = ("computation",)
     severity = Severity("bit, from 0 for the sign; 1 is the largest of the exponent", "", 8.0, 0.0, 31.0)
-    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)
@@ -181,9 +109,7 @@ class NanState(AbstractComputationFault):
 
     entry: int | None = eqx.field(static=True)  # from 1; None for the numbers of the largest magnitude
 
-    targets = ("computation",)
     severity = NO_SEVERITY
-    default_duration = float("inf")
 
     def execution(self, instant, dt):
         return Execution(jnp.asarray(True), dt)

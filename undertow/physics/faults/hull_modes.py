@@ -16,9 +16,7 @@ class Mass(AbstractPlantFault):
     """A point mass that weighs nothing in water, such as water that is carried along."""
 
     point: Float[Param, "3"] = param("m", "where it is, body axes")
-    targets = ("plant",)
     severity = Severity("mass", "kg", 5.0, 0.0, 1e6)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")
@@ -40,9 +38,7 @@ def mass(point=(0.1, 0.0, 0.0)) -> Mass:
 class Drag(AbstractPlantFault):
     """A factor on linear and quadratic damping."""
 
-    targets = ("plant",)
     severity = Severity("additional share of the damping", "", 1.0, -1.0, 100.0)
-    default_duration = float("inf")
 
     def load(self, presence, pose, load):
         one = jnp.ones(())
@@ -58,9 +54,7 @@ class BuoyancyLoss(AbstractPlantFault):
     """A weight without mass."""
 
     point: Float[Param, "3"] = param("m", "where the buoyancy is lost, body axes")
-    targets = ("plant",)
     severity = Severity("lost buoyancy; negative for lost ballast", "N", 10.0, -1e6, 1e6)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")
@@ -84,9 +78,7 @@ class Leak(AbstractPlantFault):
 
     point: Float[Param, "3"] = param("m", "where the water collects, body axes")
     rise: Float[Param, ""] = param("s", "time in which it enters")
-    targets = ("plant",)
     severity = Severity("mass of the water in the end", "kg", 1.0, 0.0, 1e6)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("point", self.point, 3, "forward, starboard, down")
@@ -114,9 +106,7 @@ class BallastShift(AbstractPlantFault):
     ballast: Float[Param, ""] = param("kg", "mass that moves")
     point: Float[Param, "3"] = param("m", "where it was, body axes")
     direction: Float[Param, "3"] = param("", "in which it moves, body axes")
-    targets = ("plant",)
     severity = Severity("distance", "m", 0.1, -10.0, 10.0)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.not_negative("ballast", self.ballast, "kg")

@@ -79,6 +79,9 @@ class Faults(AbstractFaults):
     of_plant: tuple[PlantFault, ...]
     elsewhere: tuple[Occurrence, ...]
     inputs: int = eqx.field(static=True)
+    entries: tuple[int, ...] = eqx.field(
+        static=True
+    )  # of measurement, of input, of plant: their places in the scenario
 
     def realize(self, key):
         own, which = jax.random.split(key)
@@ -98,6 +101,14 @@ class Faults(AbstractFaults):
             found.append(Realized(fault.occurrence.realize(times), chosen, steps))
         first, second = len(self.of_measurement), len(self.of_measurement) + len(self.of_input)
         return tuple(found[:first]), tuple(found[first:second]), tuple(found[second:])
+
+    def sampled(self, realization) -> dict[int, dict[str, Array]]:
+        """What may be random in a run, by the place of the fault in the scenario: onset, severity, which thrusters."""
+        realized = [fault for group in realization for fault in group]
+        return {
+            entry: {"onset": fault.timing.onset, "severity": fault.timing.severity, "affected": fault.chosen}
+            for entry, fault in zip(self.entries, realized, strict=True)
+        }
 
     def init(self, realization, y: Measurement, u: Inputs) -> FaultsState:
         known = quantities_of(y)

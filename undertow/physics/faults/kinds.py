@@ -9,7 +9,7 @@ from undertow.physics.faults.mode import NO_SEVERITY, TARGET, AbstractFault, Abs
 from undertow.physics.faults.targets import FaultTarget, all_targets
 
 
-class Kind(NamedTuple):
+class FaultKind(NamedTuple):
     """A kind of fault, with the meaning of its severity.
 
     Attributes:
@@ -38,32 +38,32 @@ def supports(target: FaultTarget, fault: AbstractFault) -> bool:
     return target.role in fault.targets
 
 
-def kind_of(target: FaultTarget, mode: str, fault: AbstractFault) -> Kind:
+def kind_of(target: FaultTarget, mode: str, fault: AbstractFault) -> FaultKind:
     """Kind of a fault, with default and range of its severity for this target."""
     announced = target.role in ("thruster", "bus")
     if fault.severity == NO_SEVERITY:
-        return Kind(target.name, mode, "none", "", None, None, None, announced)
+        return FaultKind(target.name, mode, "none", "", None, None, None, announced)
     meaning, unit, default, lowest, highest = fault.severity
     if unit == TARGET:
         unit, default = target.unit, default * target.size
-    return Kind(target.name, mode, meaning, unit, default, lowest, highest, announced)
+    return FaultKind(target.name, mode, meaning, unit, default, lowest, highest, announced)
 
 
-def list_kinds(targets: Iterable[FaultTarget] | None = None) -> list[Kind]:
+def list_kinds(targets: Iterable[FaultTarget] | None = None) -> list[FaultKind]:
     """All kinds of faults of the catalogue, by target and mode; for the targets of one loop where these are given."""
     found = all_targets().values() if targets is None else targets
     modes: dict[str, Any] = {name: part() for name, part in sorted(catalogue.names("faults").items())}
     return [kind_of(one, name, fault) for one in found for name, fault in modes.items() if supports(one, fault)]
 
 
-def severity_cells(kind: Kind) -> tuple[str, str, str, str]:
+def severity_cells(kind: FaultKind) -> tuple[str, str, str, str]:
     """Meaning, unit, default and range of a severity as text, for tables."""
     if kind.default is None:
         return kind.meaning, "", "", ""
     return kind.meaning, kind.unit or "1", f"{kind.default:g}", f"{kind.lowest:g} to {kind.highest:g}"
 
 
-def check_pair(target: FaultTarget, mode: str, fault: AbstractFault) -> Kind:
+def check_pair(target: FaultTarget, mode: str, fault: AbstractFault) -> FaultKind:
     """The kind of a fault.
 
     Raises:

@@ -1,7 +1,11 @@
 """Contracts of modes: how a signal, the thrust, the plant or the computation of a controller fails."""
 
 import abc
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+import functools
+import inspect
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,10 +17,10 @@ from undertow.core.numerics.number import Number
 from undertow.core.returned import difference, form, not_two
 from undertow.core.user_code import place_of
 
-if TYPE_CHECKING:  # pyright knows no abstract class variables
-    from typing import ClassVar as AbstractClassVar
+if TYPE_CHECKING:  # pyright takes an abstract variable of a class for an argument of each of its parts
+    from typing import ClassVar as AbstractVar
 else:
-    from equinox import AbstractClassVar
+    from equinox import AbstractVar
 
 # What a mode can be a mode of: a quantity that the controller receives, the readings of a sensor before the navigation
 # filter, one input of the plant, all inputs together, the plant and its surroundings, the computer.
@@ -77,14 +81,14 @@ class Altered(NamedTuple):
 class AbstractFault(eqx.Module):
     """One way to fail: its parameters. Where and when is said beside it."""
 
-    targets: AbstractClassVar[tuple[str, ...]]  # of ROLES
-    severity: AbstractClassVar[Severity]
+    targets: AbstractVar[tuple[str, ...]]  # of ROLES
+    severity: AbstractVar[Severity]
 
 
 class AbstractMode(AbstractFault):
     """A fault of a signal: any vector, with memory. Inputs are in units of their largest value."""
 
-    delays: ClassVar[bool]  # whether it moves a reading in time, and with it the news that it is new
+    delays: ClassVar[bool] = False  # whether it moves a reading in time, and with it the news that it is new
 
     @abc.abstractmethod
     def init(self, value: Signal) -> PyTree:
@@ -95,8 +99,55 @@ class AbstractMode(AbstractFault):
         """The signal as it is where the fault is present, and the memory; called at every step, present or not."""
 
 
+class MemorylessMode(AbstractMode):
+    """A fault of a signal that follows from the present signal: a function, which `signal_mode` makes a part of."""
+
+    # In other modes targets and severity belong to the class, as is declared for pyright.
+    function: Callable[[Moment, Signal], Signal] = eqx.field(static=True)
+    targets: tuple[str, ...] = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    severity: Severity = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    arrives: bool = eqx.field(static=True)  # whether a sensor delivers its reading
+
+    def init(self, value):
+        return ()
+
+    def apply(self, memory, moment, value):
+        faulty_signal = self.function(moment, value)
+        if jnp.shape(faulty_signal) != value.shape:
+            name, location = self.function.__name__, place_of(self.function)
+            raise BadInput(name, f"return a signal of shape {value.shape}", form(faulty_signal), where=location)
+        return Altered(faulty_signal, jnp.asarray(self.arrives)), memory
+
+
+def signal_mode(
+    targets: tuple[str, ...], severity: Severity = NO_SEVERITY, arrives: bool = True
+) -> Callable[[Callable[[Moment, Signal], Signal]], Callable[[], MemorylessMode]]:
+    """Make a function of the moment and the signal a mode of the catalogue, whose name and description it keeps.
+
+    Args:
+        targets: what can fail so, of ROLES.
+        severity: what the severity means.
+        arrives: whether a sensor that fails so delivers its reading.
+    """
+
+    def part_from(signal_after: Callable[[Moment, Signal], Signal]) -> Callable[[], MemorylessMode]:
+        mode = lambda: MemorylessMode(function=signal_after, targets=targets, severity=severity, arrives=arrives)
+        return _without_options(signal_after, mode)
+
+    return part_from
+
+
+def _without_options(function: Callable[..., Any], make: Callable[[], Any]) -> Callable[[], Any]:
+    """`make` with name and description of the function that the part computes, and without options."""
+    part: Any = functools.wraps(function)(make)
+    part.__signature__ = inspect.Signature()  # without this, the arguments of `function` would be taken for options
+    return part
+
+
 class AbstractThrustMode(AbstractFault):
     """A fault of the thrust, which leaves the input of the thruster as it is."""
+
+    targets = ("thruster",)
 
     @abc.abstractmethod
     def factor(self, severity: Number) -> Number:
@@ -119,7 +170,8 @@ class Presence(NamedTuple):
 class AbstractPlantFault(AbstractFault):
     """A fault of a body in water, or of its surroundings."""
 
-    default_duration: ClassVar[float]  # s, unless given; infinite for most
+    targets = ("plant",)
+    default_duration: ClassVar[float] = math.inf  # s, unless given
 
     @abc.abstractmethod
     def load(self, presence: Presence, pose: Pose | None, load: Load) -> Load:
@@ -145,7 +197,8 @@ class Execution(NamedTuple):
 class AbstractComputationFault(AbstractFault):
     """A fault of the computer that runs the controller."""
 
-    default_duration: ClassVar[float]  # s, unless given; infinite for most
+    targets = ("computation",)
+    default_duration: ClassVar[float] = math.inf  # s, unless given
 
     @abc.abstractmethod
     def execution(self, instant: Instant, dt: Number) -> Execution:
@@ -154,6 +207,42 @@ class AbstractComputationFault(AbstractFault):
     @abc.abstractmethod
     def state(self, instant: Instant, law: AbstractController, z: PyTree, y: Measurement, r: Target) -> PyTree:
         """State of the law with which the step begins."""
+
+
+class ExecutionMode(AbstractComputationFault):
+    """A fault of when the controller is computed: a function, which `execution_mode` makes a part of."""
+
+    function: Callable[[Instant, Number], Execution] = eqx.field(static=True)
+    severity: Severity = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    default_duration: float = eqx.field(static=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def execution(self, instant, dt):
+        return self.function(instant, dt)
+
+    def state(self, instant, law, z, y, r):
+        return z
+
+
+def execution_mode(
+    severity: Severity = NO_SEVERITY, default_duration: float = math.inf
+) -> Callable[[Callable[[Instant, Number], Execution]], Callable[[], ExecutionMode]]:
+    """Make a function of the control step and the sampling time a mode of the catalogue.
+
+    Args:
+        severity: what the severity means.
+        default_duration: s, unless a scenario gives one.
+    """
+
+    def part_from(execution_in: Callable[[Instant, Number], Execution]) -> Callable[[], ExecutionMode]:
+        mode = lambda: ExecutionMode(function=execution_in, severity=severity, default_duration=default_duration)
+        return _without_options(execution_in, mode)
+
+    return part_from
+
+
+def name_of(fault: AbstractFault) -> str:
+    """Name of a mode in messages: that of the function that it is made of, or of its class."""
+    return getattr(fault, "function", type(fault)).__name__
 
 
 def altered_by(mode: AbstractMode, memory: PyTree, moment: Moment, value: Signal) -> tuple[Altered, PyTree]:

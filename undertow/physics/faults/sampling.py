@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from undertow.core.contracts import AbstractNavigation, AbstractPlant
-from undertow.physics.faults.kinds import Kind, list_kinds
+from undertow.physics.faults.kinds import FaultKind, list_kinds
 from undertow.physics.faults.targets import targets_of
 
 # Severities are sampled from this part of the default to this multiple of it, within their range.
@@ -35,7 +35,7 @@ def random_faults(
     return [random_fault(rng, kind, targets[kind.target].width, duration) for kind in chosen]
 
 
-def random_fault(rng: np.random.Generator, kind: Kind, width: int, duration: float) -> dict[str, Any]:
+def random_fault(rng: np.random.Generator, kind: FaultKind, width: int, duration: float) -> dict[str, Any]:
     """Entry of a random fault of one kind; `width` is the number of thrusters. As of `random_faults`."""
     thruster = kind.target in ("thruster", "input")
     target = f"{kind.target} {rng.integers(1, width + 1)}" if thruster else kind.target

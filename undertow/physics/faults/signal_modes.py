@@ -12,134 +12,75 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.numerics.random_keys import numbered
 from undertow.core.param import Param, param
-from undertow.physics.faults.mode import INPUTS, LARGE, NO_SEVERITY, READINGS, TARGET, AbstractMode, Altered, Severity
+from undertow.physics.faults.mode import (
+    INPUTS,
+    LARGE,
+    NO_SEVERITY,
+    READINGS,
+    TARGET,
+    AbstractMode,
+    Altered,
+    Moment,
+    Severity,
+    Signal,
+    signal_mode,
+)
 
 _MOST = 512  # control steps that are remembered
 
 
-class Bias(AbstractMode):
-    """An offset of every entry."""
-
-    targets = (*READINGS, "thruster")
-    severity = Severity("offset", TARGET, 1.0, -LARGE, LARGE)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(value + moment.severity, jnp.asarray(True)), memory
-
-
-def bias() -> Bias:
+@signal_mode((*READINGS, "thruster"), Severity("offset", TARGET, 1.0, -LARGE, LARGE))
+def bias(moment: Moment, value: Signal) -> Signal:
     """Offset of the signal."""
-    return Bias()
+    return value + moment.severity
 
 
-class Scale(AbstractMode):
-    """A factor on every entry."""
-
-    targets = (*READINGS, "thruster")
-    severity = Severity("factor", "", 1.5, -100.0, 100.0)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(moment.severity * value, jnp.asarray(True)), memory
-
-
-def scale() -> Scale:
+@signal_mode((*READINGS, "thruster"), Severity("factor", "", 1.5, -100.0, 100.0))
+def scale(moment: Moment, value: Signal) -> Signal:
     """Factor on the signal, such as a wrong calibration, or half of the voltage of a thruster."""
-    return Scale()
+    return moment.severity * value
 
 
-class Noise(AbstractMode):
-    """Normally distributed noise, independent from one control step to the next."""
-
-    targets = (*READINGS, *INPUTS)
-    severity = Severity("standard deviation", TARGET, 0.3, 0.0, LARGE)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(
-            value + moment.severity * jax.random.normal(numbered(moment.key, moment.step), value.shape, value.dtype),
-            jnp.asarray(True),
-        ), memory
-
-
-def noise() -> Noise:
+@signal_mode((*READINGS, *INPUTS), Severity("standard deviation", TARGET, 0.3, 0.0, LARGE))
+def noise(moment: Moment, value: Signal) -> Signal:
     """White noise on the signal; on the bus a ripple, which differs between the inputs."""
-    return Noise()
+    return value + moment.severity * _normal(moment, value)
 
 
-class Quantised(AbstractMode):
-    """Rounded to multiples of a step."""
-
-    targets = (*READINGS, "thruster")
-    severity = Severity("step", TARGET, 0.5, 1e-9, LARGE)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(moment.severity * jnp.round(value / moment.severity), jnp.asarray(True)), memory
+@signal_mode((*READINGS, "thruster"), Severity("standard deviation", TARGET, 2.0, 0.0, LARGE))
+def garbage(moment: Moment, value: Signal) -> Signal:
+    """Random numbers in place of the signal."""
+    return moment.severity * _normal(moment, value)
 
 
-def quantised() -> Quantised:
+def _normal(moment: Moment, value: Signal) -> Signal:
+    """Normally distributed numbers, independent from one control step to the next."""
+    return jax.random.normal(numbered(moment.key, moment.step), value.shape, value.dtype)
+
+
+@signal_mode((*READINGS, "thruster"), Severity("step", TARGET, 0.5, 1e-9, LARGE))
+def quantised(moment: Moment, value: Signal) -> Signal:
     """Rounded to multiples of the severity."""
-    return Quantised()
+    return moment.severity * jnp.round(value / moment.severity)
 
 
-class Off(AbstractMode):
-    """Zero; the readings of a sensor do not arrive."""
-
-    targets = (*READINGS, *INPUTS)
-    severity = NO_SEVERITY
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(jnp.zeros_like(value), jnp.asarray(False)), memory
-
-
-def off() -> Off:
+@signal_mode((*READINGS, *INPUTS), arrives=False)
+def off(moment: Moment, value: Signal) -> Signal:
     """Nothing: a quantity reads zero, a sensor delivers no readings, a thruster gets zero, the bus is dead."""
-    return Off()
+    return jnp.zeros_like(value)
 
 
-class Nan(AbstractMode):
-    """Not a number (NaN) in every entry."""
-
-    targets = READINGS
-    severity = NO_SEVERITY
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(jnp.full_like(value, jnp.nan), jnp.asarray(True)), memory
-
-
-def nan() -> Nan:
+@signal_mode(READINGS)
+def nan(moment: Moment, value: Signal) -> Signal:
     """Readings that are not a number."""
-    return Nan()
+    return jnp.full_like(value, jnp.nan)
 
 
-class Stuck(AbstractMode):
+class FrozenSignal(AbstractMode):
     """The value of the onset, bit for bit; a sensor goes on to deliver it."""
 
     targets = (*READINGS, "thruster")
     severity = NO_SEVERITY
-    delays = False
 
     def init(self, value):
         return value
@@ -149,40 +90,17 @@ class Stuck(AbstractMode):
         return Altered(held, jnp.asarray(True)), held
 
 
-def stuck() -> Stuck:
+def stuck() -> FrozenSignal:
     """Frozen at the last value before the onset."""
-    return Stuck()
+    return FrozenSignal()
 
 
-class Garbage(AbstractMode):
-    """Normally distributed random numbers, new at every control step, whatever the signal is."""
-
-    targets = (*READINGS, "thruster")
-    severity = Severity("standard deviation", TARGET, 2.0, 0.0, LARGE)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(
-            moment.severity * jax.random.normal(numbered(moment.key, moment.step), value.shape, value.dtype),
-            jnp.asarray(True),
-        ), memory
-
-
-def garbage() -> Garbage:
-    """Random numbers in place of the signal."""
-    return Garbage()
-
-
-class Glitch(AbstractMode):
+class PeriodicOutliers(AbstractMode):
     """An offset for one control step, at the onset and at regular intervals after it."""
 
     period: Float[Param, ""] = param("s", "between two glitches")
     targets = (*READINGS, *INPUTS)
     severity = Severity("offset", TARGET, 5.0, -LARGE, LARGE)
-    delays = False
 
     def __check_init__(self):
         checks.positive("period", self.period, "s")
@@ -195,13 +113,13 @@ class Glitch(AbstractMode):
         return Altered(jnp.where(number > memory, value + moment.severity, value), jnp.asarray(True)), number
 
 
-def glitch(period: float = 1.0) -> Glitch:
+def glitch(period: float = 1.0) -> PeriodicOutliers:
     """Single outliers.
 
     Args:
         period: between two of them, s.
     """
-    return Glitch(period)
+    return PeriodicOutliers(period)
 
 
 class Intermittent(AbstractMode):
@@ -210,7 +128,6 @@ class Intermittent(AbstractMode):
     period: Float[Param, ""] = param("s", "length of each period, which is lost as a whole or not")
     targets = (*READINGS, *INPUTS)
     severity = Severity("probability that a period is lost", "", 0.5, 0.0, 1.0)
-    delays = False
 
     def __check_init__(self):
         checks.positive("period", self.period, "s")
@@ -241,7 +158,6 @@ class Slow(AbstractMode):
 
     targets = (*READINGS, *INPUTS)
     severity = Severity("time constant", "s", 0.5, 0.0, 100.0)
-    delays = False
 
     def init(self, value):
         return value

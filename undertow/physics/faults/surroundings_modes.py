@@ -16,9 +16,7 @@ class CurrentStep(AbstractPlantFault):
     """Uniform water of constant velocity from the onset on; the water does not accelerate gradually."""
 
     direction: Float[Param, "3"] = param("", "of the current, world axes")
-    targets = ("plant",)
     severity = Severity("speed of the water", "m/s", 0.5, -10.0, 10.0)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")
@@ -42,7 +40,6 @@ class WaveBurst(AbstractPlantFault):
 
     direction: Float[Param, "3"] = param("", "of the motion, world axes")
     period: Float[Param, ""] = param("s", "of the waves")
-    targets = ("plant",)
     severity = Severity("amplitude of the velocity of the water", "m/s", 0.5, 0.0, 10.0)
     default_duration = 10.0
 
@@ -73,7 +70,6 @@ class Shove(AbstractPlantFault):
 
     direction: Float[Param, "3"] = param("", "of the force, world axes")
     point: Float[Param, "3"] = param("m", "where it acts, body axes")
-    targets = ("plant",)
     severity = Severity("force", "N", 50.0, -1e6, 1e6)
     default_duration = 1.0
 
@@ -97,11 +93,10 @@ def shove(direction=(1.0, 0.0, 0.0), point=(0.0, 0.0, 0.0)) -> Shove:
     return Shove(direction, point)
 
 
-class Twist(AbstractPlantFault):
+class ConstantMoment(AbstractPlantFault):
     """A constant moment in body axes."""
 
     direction: Float[Param, "3"] = param("", "of the moment, body axes")
-    targets = ("plant",)
     severity = Severity("moment", "N m", 10.0, -1e6, 1e6)
     default_duration = 1.0
 
@@ -115,13 +110,13 @@ class Twist(AbstractPlantFault):
         return load._replace(wrench=load.wrench - moment)
 
 
-def twist(direction=(0.0, 0.0, 1.0)) -> Twist:
+def twist(direction=(0.0, 0.0, 1.0)) -> ConstantMoment:
     """A moment for a second, unless a duration is given.
 
     Args:
         direction: of length 1: roll, pitch, yaw in body axes.
     """
-    return Twist(direction)
+    return ConstantMoment(direction)
 
 
 class Contact(AbstractPlantFault):
@@ -130,9 +125,7 @@ class Contact(AbstractPlantFault):
     direction: Float[Param, "3"] = param("", "from free water into the obstacle, world axes")
     stiffness: Float[Param, ""] = param("N/m", "force per depth of penetration")
     damping: Float[Param, ""] = param("N s/m", "force per speed of penetration")
-    targets = ("plant",)
     severity = Severity("position of the obstacle along its direction", "m", -0.05, -1e6, 1e6)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("direction", self.direction, 3, "north, east, down")
@@ -165,9 +158,7 @@ class TetherSnag(AbstractPlantFault):
     anchor: Float[Param, "3"] = param("m", "where it is caught, world axes")
     point: Float[Param, "3"] = param("m", "attachment on the vehicle, body axes")
     length: Float[Param, ""] = param("m", "length that is free")
-    targets = ("plant",)
     severity = Severity("tension per extension", "N/m", 100.0, 0.0, 1e6)
-    default_duration = float("inf")
 
     def __check_init__(self):
         checks.length("anchor", self.anchor, 3, "north, east, down")

@@ -2,13 +2,12 @@
 
 import jax.numpy as jnp
 
-from undertow.physics.faults.mode import NO_SEVERITY, AbstractMode, AbstractThrustMode, Altered, Severity
+from undertow.physics.faults.mode import AbstractThrustMode, Moment, Severity, Signal, signal_mode
 
 
 class Fraction(AbstractThrustMode):
     """A share of the thrust is left; voltage, current and speed of the motor are those of a thruster without fault."""
 
-    targets = ("thruster",)
     severity = Severity("share of the thrust that is left", "", 0.5, -1.0, 1.0)
 
     def factor(self, severity):
@@ -20,101 +19,36 @@ def fraction() -> Fraction:
     return Fraction()
 
 
-class DeadZone(AbstractMode):
-    """Inputs below a threshold have no effect."""
-
-    targets = ("thruster",)
-    severity = Severity("threshold as a share of the largest input", "", 0.3, 0.0, 1.0)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(
-            jnp.where(jnp.abs(value) < moment.severity, jnp.zeros_like(value), value), jnp.asarray(True)
-        ), memory
-
-
-def dead_zone() -> DeadZone:
+@signal_mode(("thruster",), Severity("threshold as a share of the largest input", "", 0.3, 0.0, 1.0))
+def dead_zone(moment: Moment, value: Signal) -> Signal:
     """Inputs smaller than the severity have no effect."""
-    return DeadZone()
+    return jnp.where(jnp.abs(value) < moment.severity, jnp.zeros_like(value), value)
 
 
-class OneSided(AbstractMode):
-    """Positive inputs are limited to less than negative ones."""
-
-    targets = ("thruster", "bus")
-    severity = Severity("largest positive input that is left, as a share of the largest", "", 0.0, 0.0, 1.0)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(jnp.minimum(value, moment.severity), jnp.asarray(True)), memory
-
-
-def one_sided() -> OneSided:
+@signal_mode(
+    ("thruster", "bus"), Severity("largest positive input that is left, as a share of the largest", "", 0.0, 0.0, 1.0)
+)
+def one_sided(moment: Moment, value: Signal) -> Signal:
     """Positive inputs are limited, negative ones are not, as with half of a bridge that has failed."""
-    return OneSided()
+    return jnp.minimum(value, moment.severity)
 
 
-class Reversed(AbstractMode):
-    """The sign of the input is wrong."""
-
-    targets = ("thruster",)
-    severity = NO_SEVERITY
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(-value, jnp.asarray(True)), memory
-
-
-def reversed() -> Reversed:
+@signal_mode(("thruster",))
+def reversed(moment: Moment, value: Signal) -> Signal:
     """The input acts with the other sign, as after two phases of a motor were exchanged."""
-    return Reversed()
+    return -value
 
 
-class Runaway(AbstractMode):
-    """A constant input, whatever is commanded."""
-
-    targets = ("thruster",)
-    severity = Severity("input as a share of the largest, negative for reverse", "", 1.0, -1.0, 1.0)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(jnp.full_like(value, 1.0) * moment.severity, jnp.asarray(True)), memory
-
-
-def runaway() -> Runaway:
+@signal_mode(("thruster",), Severity("input as a share of the largest, negative for reverse", "", 1.0, -1.0, 1.0))
+def runaway(moment: Moment, value: Signal) -> Signal:
     """Full thrust, or another constant one, whatever is commanded."""
-    return Runaway()
+    return jnp.full_like(value, 1.0) * moment.severity
 
 
-class Sag(AbstractMode):
-    """All inputs are limited to a smaller range."""
-
-    targets = ("bus",)
-    severity = Severity("lost share of the largest input", "", 0.4, 0.0, 1.0)
-    delays = False
-
-    def init(self, value):
-        return ()
-
-    def apply(self, memory, moment, value):
-        return Altered(jnp.clip(value, moment.severity - 1, 1 - moment.severity), jnp.asarray(True)), memory
-
-
-def sag() -> Sag:
+@signal_mode(("bus",), Severity("lost share of the largest input", "", 0.4, 0.0, 1.0))
+def sag(moment: Moment, value: Signal) -> Signal:
     """Inputs of all thrusters are limited to a smaller range, as by a supply that has lost voltage."""
-    return Sag()
+    return jnp.clip(value, moment.severity - 1, 1 - moment.severity)
 
 
 PARTS = (fraction, dead_zone, one_sided, reversed, runaway, sag)

@@ -83,14 +83,14 @@ def thrust_limits(thruster: AbstractThruster, count: int) -> Series:
 
 
 class Environment(NamedTuple):
-    """What the disturbance does at the vehicle, one entry per record; None where it does nothing of the kind."""
+    """What disturbance and faults do at the vehicle, one entry per record; None where they do nothing of the kind."""
 
     water: Series | None  # velocity of the water over ground, m/s: north, east, down
     thrust_share: Series | None  # share of its thrust that each thruster gives
 
 
 def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, velocity: Series) -> Environment:
-    """Water and thrust losses at the vehicle along a run; the random part of the disturbance is that of the run.
+    """Water and thrust losses at the vehicle along a run; what is random in disturbance and faults is that of the run.
 
     Args:
         loop: the closed loop that was run.
@@ -111,7 +111,7 @@ def _environment(
 
     def at(t, outputs, rates):
         pose = Pose(outputs[:3], rotation_from_quaternion(quaternion_from_euler(outputs[3:])), rates[:3])
-        load = loop.disturbance.at(realization.disturbance_realization, t, pose, loop.plant.no_load())
+        load = realization.load_at(t, pose)
         water = None if load.water is None else load.water.velocity
         share = None if load.scaling is None else jnp.broadcast_to(load.scaling.thrust, (loop.plant.inputs(),))
         return water, share

@@ -117,7 +117,8 @@ def _replay_of(
     position, reference = shown["position"].values, shown["reference"].values
     around = environment(loop, seed, shown["time"].values, position, shown["velocity"].values)
     step = float(time[1] - time[0])
-    thrust = _finite_values(thrust_along(plant.thruster, run["input"].values, step)[frames])
+    acting_input = run["acting_input" if "acting_input" in run else "input"].values
+    thrust = _finite_values(thrust_along(plant.thruster, acting_input, step)[frames])
     if around.thrust_share is not None:
         thrust = thrust * around.thrust_share
     error, energy = shown["error"].values, _energy(run)[frames]

@@ -21,6 +21,7 @@ from undertow.core.contracts import (
     Load,
     Measurement,
     Outputs,
+    Pose,
     Target,
     Time,
     starting_at,
@@ -148,8 +149,11 @@ class Realization(NamedTuple):
 
     def load(self, t: Time, x: PyTree) -> Load:
         """Load of the environment on the plant at time t."""
+        return self.load_at(t, self.loop.plant.pose(x))
+
+    def load_at(self, t: Time, pose: Pose | None) -> Load:
+        """Load of the environment at a pose: that of the disturbance and of the faults."""
         plant, faults = self.loop.plant, self.loop.faults
-        pose = plant.pose(x)
         load = self.loop.disturbance.at(self.disturbance_realization, t, pose, plant.no_load())
         return load if faults is None else faults.load(self.faults_realization, t, pose, load)
 

@@ -4,8 +4,8 @@ Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixe
 neither on the machine nor on the other runs.
 
 This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
-`unavailable` says why. What is unsupported runs by XLA: simulation/run_scenario.py falls back for a run,
-loop/batch_runner.py for many.
+`unavailable` says why; `outside/export` takes its C from here. What is unsupported runs by XLA: `run_scenario` falls
+back for a run, `batch_runner` for many.
 """
 
 import math
@@ -28,11 +28,14 @@ from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recording import instant
 
 if TYPE_CHECKING:
-    from simdjit import BatchStep, Driver, Unsupported
+    import simdjit
+    from simdjit import Unsupported
 else:
     try:
+        import simdjit
         from simdjit import Unsupported
     except ImportError as error:
+        simdjit = None
         _REASON = (
             f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
         )
@@ -49,12 +52,10 @@ def unavailable() -> str:
     return "" if TYPE_CHECKING else _REASON
 
 
-def gpu() -> "Driver | None":
+def gpu() -> "simdjit.Driver | None":
     """The GPU that runs SIMD batches; None where there is none."""
     if unavailable():
         return None
-    import simdjit
-
     return simdjit.gpu()
 
 
@@ -62,8 +63,6 @@ def simd_width(bits: int) -> int:
     """How many numbers of `bits` bits fit a vector register of this processor; 1 without the batch compiler."""
     if unavailable():
         return 1
-    import simdjit
-
     return simdjit.simd_width(bits)
 
 
@@ -83,14 +82,12 @@ def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     """
     if unavailable():
         raise Unsupported(unavailable())
-    from simdjit import Step
-
-    return Step(function, numbers, state, inputs, cache_folder() / "native")
+    return simdjit.Step(function, numbers, state, inputs, cache_folder() / "native")
 
 
 def kept_steps(
     function: Callable, numbers: Any, state: Any, inputs: Any, runs: int, constant: Sequence[bool]
-) -> "BatchStep":
+) -> "simdjit.BatchStep":
     """`simdjit.BatchStep`: one step of many runs, called by somebody else's clock.
 
     Raises:
@@ -98,9 +95,7 @@ def kept_steps(
     """
     if unavailable():
         raise Unsupported(unavailable())
-    from simdjit import BatchStep
-
-    return BatchStep(function, numbers, state, inputs, runs, constant, cache_folder() / "native")
+    return simdjit.BatchStep(function, numbers, state, inputs, runs, constant, cache_folder() / "native")
 
 
 def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence[bool]) -> Callable[[Any], Any]:
@@ -117,19 +112,10 @@ def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence
     """
     if unavailable():
         raise Unsupported(unavailable())
-    from simdjit import Loop
-
     record_start = lambda prepared, carry, k: begin(prepared)
     cache, no_output = cache_folder() / "native", np.zeros(())
-    loop = Loop(
-        prepare,
-        lambda prepared: no_output,
-        lambda prepared, carry, k: carry,
-        record_start,
-        numbers,
-        constant,
-        cache=cache,
-    )
+    unchanged = lambda prepared, carry, k: carry
+    loop = simdjit.Loop(prepare, lambda prepared: no_output, unchanged, record_start, numbers, constant, cache=cache)
     return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
 
 
@@ -161,13 +147,11 @@ class SimdBatchRunner:
         plan: RunPlan,
         constant: list[bool],
         width: int = 0,
-        driver: "Driver | None" = None,
+        driver: "simdjit.Driver | None" = None,
         runs: float = math.inf,
     ):
         if unavailable():
             raise Unsupported(unavailable())
-        from simdjit import Loop
-
         numbers, static = eqx.partition(run, eqx.is_array)
         if (largest := max(leaf.size for leaf in jax.tree.leaves(numbers))) > _LARGEST:
             raise Unsupported(f"a table of {largest} numbers, more than {_LARGEST}")
@@ -199,7 +183,8 @@ class SimdBatchRunner:
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
-        self._program = Loop(realize, start, control_step, record, numbers, constant, width, driver, cache, _PLANNED)
+        functions = realize, start, control_step, record
+        self._program = simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED)
 
     @property
     def operations(self) -> int:
@@ -231,8 +216,6 @@ def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
     """
     if unavailable():
         raise Unsupported(unavailable())
-    from simdjit import Loop
-
     numbers, static = eqx.partition((loop, key), eqx.is_array)
 
     def realize(numbers):
@@ -240,10 +223,10 @@ def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
         return loop.realize(key).disturbance_realization
 
     constant = [decides_structure(leaf) for leaf in jax.tree.leaves(numbers)]
-    unchanged, no_output = lambda prepared, carry, k: carry, lambda prepared, carry, k: jnp.zeros(())
-    program = Loop(
-        realize, lambda prepared: prepared, unchanged, no_output, numbers, constant, 1, None, cache_folder() / "native"
-    )
+    unchanged = lambda prepared, carry, k: carry
+    no_output = lambda prepared, carry, k: jnp.zeros(())
+    cache = cache_folder() / "native"
+    program = simdjit.Loop(realize, lambda prepared: prepared, unchanged, no_output, numbers, constant, 1, None, cache)
     carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
     return jax.tree.map(lambda leaf: leaf[0], carry)
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from undertow.studies.arena.vehicles import VEHICLES, ArenaVehicle
 
-VERSION = 2
+VERSION = 3
 
 METRICS = ("position_rms", "orientation_rms")  # those that have tolerances
 
@@ -88,8 +88,8 @@ def _payload(v: ArenaVehicle) -> Keys:
 
 
 def _dead_thruster(v: ArenaVehicle) -> Keys:
-    loss = {"kind": "thruster_loss", "number": 1, "start": _ONSET, "thrusters": v.thrusters}
-    return {"reference": _motion(v), "disturbance": [_current(v), loss]}
+    loss = {"target": "thruster", "number": "random", "mode": "fraction", "severity": 0, "onset": _ONSET}
+    return {"reference": _motion(v), "disturbance": [_current(v)], "faults": [loss]}
 
 
 def _wrong_model(v: ArenaVehicle) -> Keys:

@@ -15,6 +15,7 @@ from jaxtyping import PRNGKeyArray, PyTree
 
 from undertow.core import runtime
 from undertow.core.errors import BadInput
+from undertow.physics.faults.injected import Faults
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import loop_run
@@ -36,8 +37,9 @@ _OTHERS = range(1, 5)
 def realized_scalars(several: Trials, rows: Sequence[int]) -> dict[str, np.ndarray]:
     """Scalars that the seed determines, by key path and kind of part: `navigation.sensors[1].offset[0] (dvl)`.
 
-    These are the entries of what the disturbance realizes and of the state in which the navigation filter starts. One
-    that takes both signs, as an offset does, is there by its size as well: `|navigation.sensors[1].offset[0]| (dvl)`.
+    These are the entries of what disturbance and faults realize and of the state in which the navigation filter starts.
+    One that takes both signs, as an offset does, is there by its size as well:
+    `|navigation.sensors[1].offset[0]| (dvl)`.
 
     Args:
         several: the trials.
@@ -93,11 +95,12 @@ def _realized(built: Built, other: int = 0, trace: bool = False) -> dict[str, An
 
 
 def _start(loop: ClosedLoop, start: tuple[Any, Any], key: PRNGKeyArray) -> dict[str, PyTree]:
-    """What the disturbance realizes, and the state in which the navigation filter starts."""
+    """What the disturbance and the faults realize, and the state in which the navigation filter starts."""
     realization = loop.realize(key)
     truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state(*start))
     navigation = loop.navigation.init(realization.navigation_realization, truth)
-    return {"disturbance": realization.disturbance_realization, "navigation": navigation}
+    faults = loop.faults.sampled(realization.faults_realization) if isinstance(loop.faults, Faults) else {}
+    return {"disturbance": realization.disturbance_realization, "navigation": navigation, "faults": faults}
 
 
 _compiled = eqx.filter_jit(_start)
@@ -110,12 +113,12 @@ def _name(path: tuple[Any, ...]) -> str:
 
 
 def _kind(resolved: Any, name: str) -> str:
-    """Kind of the innermost part on a key path of a scenario; of a part in a file, the name of its function."""
+    """Kind of the innermost part on a key path, or mode of a fault; of a part in a file, the name of its function."""
     kind = ""
     for step in key_path(name):
         try:
             resolved = resolved[step]
         except (KeyError, IndexError, TypeError):
             break
-        kind = resolved.get("kind", kind) if isinstance(resolved, dict) else kind
+        kind = resolved.get("kind", resolved.get("mode", kind)) if isinstance(resolved, dict) else kind
     return kind.rpartition(":")[2]

@@ -1,0 +1,202 @@
+"""A loop over steps, written for one run and compiled for any number of them at once."""
+
+import json
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from simdjit import estimate, nvidia
+from simdjit.cache import cached
+from simdjit.codegen import STEP, VECTORS, Head, Sections, assembly, operations
+from simdjit.cpu import Code, simd_width
+from simdjit.cuda import Driver
+from simdjit.fingerprint import fingerprint
+from simdjit.graph import I64, Unsupported, flat
+from simdjit.layout import Layout
+from simdjit.lowering import TooLong, evaluate
+from simdjit.prologue import Prologue, inputs
+from simdjit.tracing import Traced
+
+# Operations; machine code of a longer program would take minutes to make, whatever the estimate for XLA is.
+_MOST = 200_000
+
+
+class Loop:
+    """A time-stepping loop, compiled for vector registers or for a GPU.
+
+    Args:
+        prepare: numbers -> everything that does not change from step to step, random draws included.
+        start: prepared -> carry.
+        step: prepared, carry, number of the step -> carry.
+        record: prepared, carry, number of the step -> what is recorded of an instant.
+        numbers: of one run; a tree of arrays.
+        constant: which leaves of `numbers` are the same in every run; they make the program short. None for none.
+        lanes: runs at once; as many as fit a register unless given. No result depends on it.
+        driver: of the GPU that runs it, as `gpu` finds it; None for this processor. No result depends on it.
+        cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
+        planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
+
+    Raises:
+        Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the
+            planned steps, compiling included (see `estimate`).
+        OSError: the GPU's driver fails.
+    """
+
+    def __init__(
+        self,
+        prepare: Callable,
+        start: Callable,
+        step: Callable,
+        record: Callable,
+        numbers: Any,
+        constant: Sequence[bool] | None = None,
+        lanes: int = 0,
+        driver: Driver | None = None,
+        cache: Path | None = None,
+        planned: int = 0,
+    ):
+        prepared = Traced(prepare, numbers)
+        constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
+        of_arrays = lambda function: lambda arrays, *rest: function(eqx.combine(arrays, prepared.still), *rest)
+        begun = Traced(of_arrays(start), prepared.shapes)
+        number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
+        carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
+        self._step, self._record = (
+            Traced(of_arrays(carried(function)), prepared.shapes, begun.shapes, number) for function in (step, record)
+        )
+        if self._step.types != begun.types:
+            raise Unsupported("a carry that changes its type")
+        self._prologue = Prologue(prepared, numbers, constant)
+        lanes = nvidia.LANES if driver else lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
+        head = nvidia.THREADS if driver else VECTORS
+        traced = (prepared, begun, self._step, self._record)
+        beside = simd_width(64) if lanes == 1 and not driver else 1
+        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside, planned)
+        name = fingerprint(
+            [function.closed for function in traced], self._prologue.constants, lanes, beside, bool(driver), planned
+        )
+        program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
+        if program.prologue_lacks and not self._prologue.lacking:
+            self._prologue.leave_to_xla(program.prologue_lacks)
+        self.operations = program.operations
+        self._code = (
+            nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache, lanes > 1)
+        )
+        trees = (self._prologue.inputs, begun.leaves, self._record.leaves)
+        self._lanes = lanes
+        self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in trees)
+
+    def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
+        """Run the loop for a batch.
+
+        Args:
+            numbers: as in the example, with a leading axis over runs.
+            steps: how many.
+            every: steps between records, the first before the first step; 0 for none.
+
+        Returns:
+            The carry after the last step, and what was recorded, with an axis over records; both with a leading axis
+            over runs.
+        """
+        runs = len(jax.tree.leaves(numbers)[0])
+        memory = self._numbers_layout.packed(self._prologue.packed(numbers), runs)
+        carry = self._carry_layout.memory(len(memory))
+        series = self._record_layout.memory(len(memory), steps // every + 1 if every else 0)
+        self._code.run(memory, carry, series, steps, every)
+        final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
+        return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
+
+    def kept(self) -> "Kept":
+        """What records one instant of one run again and again, in memory that is kept.
+
+        Raises:
+            Unsupported: XLA computes what comes before the first step, or a GPU the steps.
+        """
+        call, memory, series = self._kept(1)
+        views = self._numbers_layout.views(memory), self._record_layout.views(series)
+        return Kept(call, *views, memory[0, 0], series[0, 0])
+
+    def kept_runs(self, runs: int) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
+        """`kept` of many runs: arrays of shape (groups, runs of a group, ...), the last runs of which may be idle."""
+        call, memory, series = self._kept(-(-runs // self._lanes))
+        return call, self._numbers_layout.views_of_groups(memory), self._record_layout.views_of_groups(series)
+
+    def _kept(self, groups: int) -> tuple[Callable[[], None], np.ndarray, np.ndarray]:
+        if self._prologue.lacking or not isinstance(self._code, Code):
+            raise Unsupported(self._prologue.lacking or "a GPU that computes one step at a time")
+        layouts = self._numbers_layout, self._carry_layout, self._record_layout
+        memory, carry, series = (layout.memory(groups) for layout in layouts)
+        return self._code.repeated(memory, carry, series), memory, series
+
+
+class Kept(NamedTuple):
+    """A function without arguments, and the memory that it reads and writes.
+
+    Attributes:
+        call: the function.
+        numbers, recorded: what it reads and what it records, as arrays in that memory.
+        read, written: the same memory, bytes of one slot after the other, in the order of the numbers of these arrays.
+    """
+
+    call: Callable[[], None]
+    numbers: list[np.ndarray]
+    recorded: list[np.ndarray]
+    read: np.ndarray
+    written: np.ndarray
+
+
+class Program(NamedTuple):
+    """What is kept of a program, so that nobody needs to lower it again.
+
+    Attributes:
+        assembly: LLVM's.
+        operations: arithmetic ones of one step.
+        prologue_lacks: why XLA computes the prologue; empty where the program does.
+    """
+
+    assembly: str
+    operations: int
+    prologue_lacks: str
+
+    def written(self) -> bytes:
+        """For a file."""
+        return zlib.compress(json.dumps(self).encode(), level=1)
+
+    @classmethod
+    def read(cls, written: bytes) -> "Program":
+        """From a file."""
+        return cls(*json.loads(zlib.decompress(written)))
+
+
+def _lowered(
+    prologue: Prologue,
+    traced: tuple[Traced, Traced, Traced, Traced],
+    number: Any,
+    lanes: int,
+    head: Head,
+    beside: int,
+    planned: int,
+) -> Program:
+    """The program of traced functions: prepare, start, step and record."""
+    _, begun, step, record = traced
+    graph, prepared = prologue.lowered()
+    try:
+        first = evaluate(graph, begun.closed, prepared, _MOST)
+        k = graph.input(STEP, I64)
+        k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
+        arguments = [*prepared, *inputs(graph, "carry", begun.leaves), np.array(k)]
+        stepped, recorded = (evaluate(graph, function.closed, arguments, _MOST) for function in (step, record))
+    except TooLong as error:
+        seconds = estimate.compiled_here(_MOST).compiling
+        raise Unsupported(f"{error}, which would take more than {seconds:.0f} s to compile") from error
+    sections = Sections(*map(flat, (first, stepped, recorded)))
+    written = operations(graph, sections, written=True)
+    if planned and (why := estimate.reason_for_xla(written, step.closed, planned)):
+        raise Unsupported(why)
+    return Program(assembly(graph, sections, lanes, head, beside), operations(graph, sections), prologue.lacking)
