@@ -134,8 +134,10 @@ class Run:
         for name, metric in facts.meanings.items():
             if name not in facts.whole:
                 continue
-            late, value = (_shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole))
-            lines.append(f"  {name:<20}{late:>12}{value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
+            steady_value, whole_value = (
+                _shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole)
+            )
+            lines.append(f"  {name:<20}{steady_value:>12}{whole_value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
         if facts.success is not None:
             lines.append(f"  {facts.success.sentence(facts.meanings)}")
         return "\n".join(lines)
@@ -191,10 +193,10 @@ def simulate(
         disturbance = SumOfDisturbances(tuple(disturbance))
     acting: Any = none() if disturbance is None else disturbance
     navigation = perfect() if navigation is None else navigation
-    named = isinstance(controller, str | Mapping)
+    described_controller = isinstance(controller, str | Mapping)
     for name, part, contract in (
         ("plant", plant, AbstractPlant),
-        ("controller", controller, str | Mapping if named else AbstractController),
+        ("controller", controller, str | Mapping if described_controller else AbstractController),
         ("reference", reference, AbstractReference),
         ("disturbance", acting, AbstractDisturbance),
         ("navigation", navigation, AbstractNavigation),
@@ -203,7 +205,7 @@ def simulate(
             raise BadInput(name, f"be an {contract.__name__}", f"a {type(part).__name__}")
     checks.choice("precision", precision, ("float64", "float32"))
     with runtime.in_precision(precision):
-        law = _named_law(controller, plant, navigation, dt) if named else controller
+        law = _named_law(controller, plant, navigation, dt) if described_controller else controller
         closed_loop = ClosedLoop(plant, law, reference, acting, navigation)
         closed_loop = in_present_precision(_with_faults(closed_loop, faults, dt))
         return _simulate(closed_loop, loop, (duration, dt, record), seed, position, velocity)
@@ -227,17 +229,19 @@ def _with_faults(
         return dataclasses.replace(loop, faults=faults)
     if not isinstance(faults, list | tuple) or not all(isinstance(entry, Mapping) for entry in faults):
         raise BadInput("faults", "be a list of mappings", faults)
-    made = {place: entry["mode"] for place, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)}
-    named = {place: {"mode": name_of(mode)} for place, mode in made.items()}
+    mode_objects = {
+        index: entry["mode"] for index, entry in enumerate(faults) if isinstance(entry.get("mode"), AbstractFault)
+    }
+    mode_names = {index: {"mode": name_of(mode)} for index, mode in mode_objects.items()}
     entries = []
-    for place, entry in enumerate(faults):
-        with within(f"faults[{place}]"):
+    for index, entry in enumerate(faults):
+        with within(f"faults[{index}]"):
             try:
-                entries.append(Fault.model_validate({**entry, **named.get(place, {})}))
+                entries.append(Fault.model_validate({**entry, **mode_names.get(index, {})}))
             except ValidationError as errors:
                 raise complaint(errors, from_data({}), Fault) from None
     with within("faults"):
-        return faulted(loop, entries, sampling_time=dt, made=made)[0]
+        return faulted(loop, entries, sampling_time=dt, made=mode_objects)[0]
 
 
 def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:
@@ -248,13 +252,13 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
     except ValidationError as errors:
-        wrong = complaint(errors, nowhere)
-        raise BadInput("loop" if wrong.name == "kind" else wrong.name, wrong.must, wrong.got) from None
+        bad_input = complaint(errors, nowhere)
+        raise BadInput("loop" if bad_input.name == "kind" else bad_input.name, bad_input.must, bad_input.got) from None
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)
-    for one in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
-        warnings.warn(one.sentence, stacklevel=3)
+    for advice in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
+        warnings.warn(advice.sentence, stacklevel=3)
     outcome, left_to_xla = run_loop(closed_loop, settings, start, seed)
     criterion = criterion_of(None, meanings(closed_loop))
     metrics_settings = MetricsSettings(window.of_run(settings.duration), settings.dt, criterion=criterion)

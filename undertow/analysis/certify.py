@@ -52,7 +52,7 @@ def certify(
         rate = np.concatenate([[np.nan], np.diff(function.value) / np.diff(run["time"].values)])
         summary = {
             "function": function.meaning,
-            "hypotheses": [_summed(one, time, steady) for one in hypotheses],
+            "hypotheses": [_summed(hypothesis, time, steady) for hypothesis in hypotheses],
             **_course(function.value[: len(time)], time, steady),
             **numbers,
         }
@@ -60,24 +60,25 @@ def certify(
 
 
 def _signals(function: Lyapunov, rate: np.ndarray) -> dict[str, xr.Variable]:
-    described = {
+    signal_data = {
         "lyapunov": (f"Lyapunov function: {function.meaning}", function.value, _UNITS),
         "lyapunov_estimation": ("its part that eps and the weights make", function.estimation, _UNITS),
         "lyapunov_rate": ("its mean rate since the record before", rate, "m^2/s^3, rad^2/s^3"),
     }
     return {
         name: series(("time",), values, meaning, units)
-        for name, (meaning, values, units) in described.items()
+        for name, (meaning, values, units) in signal_data.items()
         if values is not None
     }
 
 
-def _summed(one: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
-    known = {"name": one.name, "sentence": one.sentence}
-    if one.held is None:
-        return known | {"whole": None, "steady": None, "first_failure": None, "unknown": one.unknown}
-    broken = time[~one.held]
-    return known | window.shares(one.held, time) | {"first_failure": float(broken[0]) if broken.size else None}
+def _summed(hypothesis: Hypothesis, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:
+    summary = {"name": hypothesis.name, "sentence": hypothesis.sentence}
+    if hypothesis.held is None:
+        return summary | {"whole": None, "steady": None, "first_failure": None, "unknown": hypothesis.unknown}
+    failure_times = time[~hypothesis.held]
+    first_failure = float(failure_times[0]) if failure_times.size else None
+    return summary | window.shares(hypothesis.held, time) | {"first_failure": first_failure}
 
 
 def _course(value: np.ndarray, time: np.ndarray, window: SteadyWindow) -> dict[str, Any]:

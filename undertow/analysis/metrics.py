@@ -81,8 +81,8 @@ class Settling(NamedTuple):
         Of results on the host, whose leaves may have leading axes.
         """
         last, resting = self.last[..., None], self.resting[..., None]
-        found = np.where(self.since < (1 - _STAYS) * last, self.since, np.inf)
-        return np.where((np.abs(self.start + self.target) > _NO_WAY) & (resting > 0), found, np.nan)
+        settling_times = np.where(self.since < (1 - _STAYS) * last, self.since, np.inf)
+        return np.where((np.abs(self.start + self.target) > _NO_WAY) & (resting > 0), settling_times, np.nan)
 
 
 # Metric -> the signals that it needs, and what it is the rms of. A law that lacks one has no such metric.
@@ -104,13 +104,12 @@ _ALL = "tracking"
 
 def output_groups(units: Sequence[str]) -> dict[str, tuple[str, list[int]]]:
     """Outputs that share a unit: name -> unit and places. Metres and radians never make one number."""
-    found = {
-        name: (unit, [i for i, one in enumerate(units) if one == unit])
-        for unit, name in _GROUPS.items()
-        if unit in units
-    }
-    one_kind = not found and len(set(units)) == 1
-    return {_ALL: (units[0], list(range(len(units))))} if one_kind else found
+    groups = {}
+    for unit, name in _GROUPS.items():
+        if unit in units:
+            groups[name] = (unit, [i for i, output_unit in enumerate(units) if output_unit == unit])
+    one_kind = not groups and len(set(units)) == 1
+    return {_ALL: (units[0], list(range(len(units))))} if one_kind else groups
 
 
 def euler_places(outputs: Sequence[str]) -> tuple[int, ...]:
@@ -143,7 +142,7 @@ class Metrics(AbstractAccumulator):
         axes, zero = jnp.zeros_like(signals["error"]), jnp.zeros(())
         return MetricsState(
             samples=zero,
-            squares={name: axes for name, (needed, _) in _RMS.items() if all(one in signals for one in needed)},
+            squares={name: axes for name, (needed, _) in _RMS.items() if all(signal in signals for signal in needed)},
             largest_error=axes,
             turn_squares=zero if self.euler else None,
             input_squares=zero,
@@ -199,16 +198,16 @@ class Metrics(AbstractAccumulator):
         """Metrics by name, of many runs at once where the leaves have leading axes; NaN where one is not defined."""
         state = jax.tree.map(np.asarray, state)
         count = np.where(state.samples > 0, state.samples, np.nan)
-        found = {}
+        metrics = {}
         for group, (_, axes) in output_groups(self.units).items():
             for name, sums in state.squares.items():
-                found[of_group(group, f"{name}_rms")] = np.sqrt(sums[..., axes].mean(-1) / count)
-            found[of_group(group, "error_max")] = state.largest_error[..., axes].max(-1)
+                metrics[of_group(group, f"{name}_rms")] = np.sqrt(sums[..., axes].mean(-1) / count)
+            metrics[of_group(group, "error_max")] = state.largest_error[..., axes].max(-1)
             if state.weights_peak is not None:
-                found[of_group(group, "weights_peak")] = state.weights_peak[..., axes].max(-1)
+                metrics[of_group(group, "weights_peak")] = state.weights_peak[..., axes].max(-1)
         if state.turn_squares is not None:
-            found[_TURN] = np.sqrt(state.turn_squares / count)
-        found |= {
+            metrics[_TURN] = np.sqrt(state.turn_squares / count)
+        metrics |= {
             "input_rms": np.sqrt(state.input_squares / count),
             "input_peak": state.input_peak,
             "input_variation": state.variation / np.where(state.span > 0, state.span, np.nan),
@@ -218,20 +217,20 @@ class Metrics(AbstractAccumulator):
             "bad_readings": state.bad_readings,
         }
         if state.nees is not None:
-            found["nees"] = state.nees / count
-        return {name: np.where(np.isnan(count), np.nan, value) for name, value in found.items()}
+            metrics["nees"] = state.nees / count
+        return {name: np.where(np.isnan(count), np.nan, value) for name, value in metrics.items()}
 
     def per_axis(self, state: MetricsState) -> dict[str, list[float]]:
         """Metrics of each output, in its own unit, of one run."""
         state = jax.tree.map(np.asarray, state)
         if not state.samples:
             return {}
-        found = {f"{name}_rms_axes": np.sqrt(sums / state.samples).tolist() for name, sums in state.squares.items()}
-        found["error_max_axes"] = state.largest_error.tolist()
+        metrics = {f"{name}_rms_axes": np.sqrt(sums / state.samples).tolist() for name, sums in state.squares.items()}
+        metrics["error_max_axes"] = state.largest_error.tolist()
         if state.weights_peak is not None:
-            found["weights_peak_axes"] = state.weights_peak.tolist()
+            metrics["weights_peak_axes"] = state.weights_peak.tolist()
         settled = state.settling.times()
-        return found if np.isnan(settled).all() else found | {"settling_time_axes": settled.tolist()}
+        return metrics if np.isnan(settled).all() else metrics | {"settling_time_axes": settled.tolist()}
 
 
 def _supplied(signals: Signals, before: Scalar, span: Scalar) -> tuple[Scalar, Scalar]:
@@ -264,11 +263,11 @@ class Windowed(AbstractAccumulator):
 Gathered = tuple[AbstractAccumulator, ...]
 
 
-def accumulators(plant: AbstractPlant, own: Sequence[AbstractMetric], start: float, stop: float) -> Gathered:
-    """What gathers all metrics of a run of a plant between two times, s; `own` are the scenario's own."""
+def accumulators(plant: AbstractPlant, user_metrics: Sequence[AbstractMetric], start: float, stop: float) -> Gathered:
+    """What gathers all metrics of a run of a plant between two times, s; `user_metrics` are the scenario's own."""
     return (
         Metrics(start, stop, plant.output_units, euler_places(plant.outputs)),
-        *(Windowed(metric, start, stop) for metric in own),
+        *(Windowed(metric, start, stop) for metric in user_metrics),
     )
 
 
@@ -277,29 +276,32 @@ def results(gathered: Gathered, states: Sequence[Any]) -> dict[str, Any]:
 
     Figures as numbers; those of each output, in its own unit, as lists named `<name>_axes`.
     """
-    found: dict[str, Any] = {}
-    for one, state in zip(gathered, states, strict=True):
+    metrics: dict[str, Any] = {}
+    for accumulator, state in zip(gathered, states, strict=True):
         host = jax.tree.map(np.asarray, state)
-        if isinstance(one, Metrics):
-            found |= one.values(host) | one.per_axis(host)
-        elif isinstance(one, Windowed):
-            found |= one.metric.values(host)
-    plain = {name: value if isinstance(value, list) else float(value) for name, value in found.items()}
+        if isinstance(accumulator, Metrics):
+            metrics |= accumulator.values(host) | accumulator.per_axis(host)
+        elif isinstance(accumulator, Windowed):
+            metrics |= accumulator.metric.values(host)
+    plain = {name: value if isinstance(value, list) else float(value) for name, value in metrics.items()}
     return {name: value for name, value in plain.items() if isinstance(value, list) or not math.isnan(value)}
 
 
 def results_of_batch(gathered: Gathered, states: Sequence[Any]) -> dict[str, np.ndarray]:
     """Metrics of many runs, whose states have one leading axis; NaN where one is not defined."""
-    found: dict[str, np.ndarray] = {}
-    for one, state in zip(gathered, states, strict=True):
-        if isinstance(one, Metrics):
-            found |= one.values(state)
-        elif isinstance(one, Windowed):
+    metrics: dict[str, np.ndarray] = {}
+    for accumulator, state in zip(gathered, states, strict=True):
+        if isinstance(accumulator, Metrics):
+            metrics |= accumulator.values(state)
+        elif isinstance(accumulator, Windowed):
             host = jax.tree.map(np.asarray, state)
             count = len(jax.tree.leaves(host)[0])
-            each = [one.metric.values(jax.tree.map(lambda leaf, i=i: leaf[i], host)) for i in range(count)]
-            found |= {name: np.array([float(run[name]) for run in each]) for name in one.metric.metrics()}
-    return found
+            metrics_of_runs = [
+                accumulator.metric.values(jax.tree.map(lambda leaf, i=i: leaf[i], host)) for i in range(count)
+            ]
+            for name in accumulator.metric.metrics():
+                metrics[name] = np.array([float(run[name]) for run in metrics_of_runs])
+    return metrics
 
 
 def measure(
@@ -307,22 +309,26 @@ def measure(
     plant: AbstractPlant,
     start: float = 0.0,
     stop: float = math.inf,
-    own: Sequence[AbstractMetric] = (),
+    user_metrics: Sequence[AbstractMetric] = (),
 ) -> dict[str, Any]:
     """Metrics of a recorded run over start <= t <= stop, s, at the rate of the record."""
-    signals, kept = outcome.signals, int((np.asarray(outcome.time) <= stop + _HAIR).sum())
-    if 0 < kept < len(outcome.time):  # what comes later may be no numbers, and none of them times zero is none
-        index = np.minimum(np.arange(len(outcome.time)), kept - 1)
+    signals = outcome.signals
+    count = int((np.asarray(outcome.time) <= stop + _HAIR).sum())
+    if 0 < count < len(outcome.time):  # what comes later may be no numbers, and none of them times zero is none
+        index = np.minimum(np.arange(len(outcome.time)), count - 1)
         signals = jax.tree.map(lambda series: np.asarray(series)[index], signals)
-    gathered = accumulators(plant, own, start, stop)
+    gathered = accumulators(plant, user_metrics, start, stop)
     return results(gathered, _over_series(gathered, outcome.time, signals))
 
 
 @eqx.filter_jit
 def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any, ...]:
     first = jax.tree.map(lambda series: series[0], signals)
-    step = lambda states, at: (tuple(one.update(s, *at) for one, s in zip(gathered, states, strict=True)), None)
-    return jax.lax.scan(step, tuple(one.init(first) for one in gathered), (time, signals))[0]
+    step = lambda states, at: (
+        tuple(accumulator.update(s, *at) for accumulator, s in zip(gathered, states, strict=True)),
+        None,
+    )
+    return jax.lax.scan(step, tuple(accumulator.init(first) for accumulator in gathered), (time, signals))[0]
 
 
 # Metrics of the outputs: each comes for those in m, for those in rad (the short way round), or for all where they
@@ -389,7 +395,7 @@ _NEEDED = {f"{name}_rms": needed[0] for name, (needed, _) in _RMS.items()}
 _NEEDED |= {"error_max": "error", "weights_peak": "weights"}
 
 
-def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
+def meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
     """Metrics that a run of a loop may have, by name, in the order of tables, with their units for its plant.
 
     Raises:
@@ -398,22 +404,22 @@ def meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, 
     plant, signals = loop.plant, loop.signals()
     possible = {name for name, needed in _NEEDED.items() if needed in signals}
     own_groups = {of_group(group, name) for group in output_groups(plant.output_units) for name in possible}
-    others = {of_group(group, name) for group in (*_GROUPS.values(), _ALL) for name in _OF_OUTPUTS} - own_groups
-    others |= set() if euler_places(plant.outputs) else {_TURN}
-    others |= set() if "nees" in signals else {"nees"}
-    found = {name: metric for name, metric in MEANINGS.items() if name not in others}
-    for metric in own:
+    unavailable = {of_group(group, name) for group in (*_GROUPS.values(), _ALL) for name in _OF_OUTPUTS} - own_groups
+    unavailable |= set() if euler_places(plant.outputs) else {_TURN}
+    unavailable |= set() if "nees" in signals else {"nees"}
+    metrics = {name: metric for name, metric in MEANINGS.items() if name not in unavailable}
+    for metric in user_metrics:
         for name, meaning in metric.metrics().items():
-            if name in found:
+            if name in metrics:
                 raise BadInput("metrics", "have names of their own", f"a second `{name}`")
-            found[name] = meaning
+            metrics[name] = meaning
     unit = lambda metric: Signal((), metric.unit, "").unit_for(plant.output_units, plant.input_unit)
-    return {name: Metric(unit(metric), metric.meaning) for name, metric in found.items()}
+    return {name: Metric(unit(metric), metric.meaning) for name, metric in metrics.items()}
 
 
-def gathered_meanings(loop: ClosedLoop, own: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
+def gathered_meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
     """Those of `meanings` that are gathered along a run: what `results_of_batch` gives."""
-    return {name: metric for name, metric in meanings(loop, own).items() if name not in _AFTERWARDS}
+    return {name: metric for name, metric in meanings(loop, user_metrics).items() if name not in _AFTERWARDS}
 
 
 def for_people(value: float, unit: str) -> tuple[float, str]:

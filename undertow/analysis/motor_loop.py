@@ -45,17 +45,17 @@ def motor_matrix(
     torque_slope = 2 * float(motor.torque_coefficient) * abs(speed)
     if not inductance:
         resisted = float(motor.k2) + float(motor.k3) * torque_slope
-        own = np.array([[-resisted]]) / float(motor.k1)
-        return _closed(g, own, np.array([volts_per_thrust / float(motor.k1)]), np.array([thrust_slope]), drifted)
+        actuator = np.array([[-resisted]]) / float(motor.k1)
+        return _closed(g, actuator, np.array([volts_per_thrust / float(motor.k1)]), np.array([thrust_slope]), drifted)
     inertia, winding = float(motor.rotor_inertia), float(motor.inductance)
-    own = np.array(
+    actuator = np.array(
         [
             [-(float(motor.friction) + torque_slope) / inertia, float(motor.torque_constant) / inertia],
             [-float(motor.back_emf_constant) / winding, -float(motor.resistance) / winding],
         ]
     )
     drive, push = np.array([0.0, volts_per_thrust / winding]), np.array([thrust_slope, 0.0])
-    return _closed(g, own, drive, push, drifted)
+    return _closed(g, actuator, drive, push, drifted)
 
 
 def rightmost(matrix: np.ndarray) -> complex:
@@ -75,25 +75,26 @@ def stable_gains(matrix: Callable[[float], np.ndarray], largest: float) -> tuple
     Returns:
         None if there is none: drifted weights cannot hold such a loop.
     """
-    still, slope = matrix(0.0), matrix(1.0) - matrix(0.0)
+    offset, slope = matrix(0.0), matrix(1.0) - matrix(0.0)
     values = np.arange(largest + 1)
-    stable = values[np.linalg.eigvals(still + values[:, None, None] * slope).real.max(1) < 0]
+    stable = values[np.linalg.eigvals(offset + values[:, None, None] * slope).real.max(1) < 0]
     return (float(stable[0]), float(stable[-1])) if stable.size else None
 
 
-def _closed(g: Gains, own: np.ndarray, drive: np.ndarray, push: np.ndarray, drifted: float) -> np.ndarray:
-    """Law around an actuator m' = own m + drive a_c, a = push m; d_hat = z - drifted eps."""
-    states = 4 + len(own)
-    asked = np.zeros(states)
-    asked[:4] = g.stiffness, g.damping, drifted, -1.0
-    given = np.zeros(states)
-    given[4:] = push
+def _closed(g: Gains, actuator: np.ndarray, drive: np.ndarray, push: np.ndarray, drifted: float) -> np.ndarray:
+    """Law around an actuator m' = actuator m + drive a_c, a = push m; d_hat = z - drifted eps."""
+    # Rows and columns are e, e_dot, eps, z and m. `demanded` gives a_c from them, `delivered` the acceleration a.
+    states = 4 + len(actuator)
+    demanded = np.zeros(states)
+    demanded[:4] = g.stiffness, g.damping, drifted, -1.0
+    delivered = np.zeros(states)
+    delivered[4:] = push
     matrix = np.zeros((states, states))
     matrix[0, 1] = 1.0
-    matrix[1] = -given
-    matrix[2] = asked - given
+    matrix[1] = -delivered
+    matrix[2] = demanded - delivered
     matrix[2, 2:4] += -g.pole - drifted, 1.0
     matrix[3, :3] = -g.adaptation * g.p12, -g.adaptation * g.p22, -g.b2
-    matrix[4:, 4:] = own
-    matrix[4:] += np.outer(drive, asked)
+    matrix[4:, 4:] = actuator
+    matrix[4:] += np.outer(drive, demanded)
     return matrix

@@ -33,23 +33,24 @@ def navigation_consistency(
     navigation = loop.navigation
     if not (isinstance(navigation, SensorNavigation) and isinstance(navigation.filter, Kalman)):
         return None
-    own, found = navigation.filter, []
-    for i, (name, sensor) in enumerate(zip(sensor_names(own.sensors), own.sensors, strict=True)):
+    kalman, sensors = navigation.filter, []
+    for i, (name, sensor) in enumerate(zip(sensor_names(kalman.sensors), kalman.sensors, strict=True)):
         if not isinstance(sensor, PropellerSpeed):
-            found.append({"sensor": name} | _assumed(own, sensor) | _innovations(run, i))
+            sensors.append({"sensor": name} | _assumed(kalman, sensor) | _innovations(run, i))
     nees = None if metrics is None else metrics.get("nees")
-    return {"sensors": found, "nees": nees, "findings": [*_findings(found, nees), *_gate_findings(run)]}
+    return {"sensors": sensors, "nees": nees, "findings": [*_findings(sensors, nees), *_gate_findings(run)]}
 
 
-def _assumed(own: Kalman, sensor: AbstractSensor) -> dict[str, list[float]]:
+def _assumed(kalman: Kalman, sensor: AbstractSensor) -> dict[str, list[float]]:
     """Standard deviations that the filter assumes: of the noise of each entry, and of the correlated errors."""
-    scale, sampling = float(np.asarray(own.noise_scale)), sensor.sampling
+    scale = float(np.asarray(kalman.noise_scale))
+    sampling = sensor.sampling
     plain = lambda values, factor=1.0: (factor * np.ravel(np.asarray(values, dtype=float))).tolist()
-    found = {"noise": plain(sampling.noise, scale), "correlated": [], "correlation_time": []}
+    deviations = {"noise": plain(sampling.noise, scale), "correlated": [], "correlation_time": []}
     errors = sampling.errors
-    if own.sensor_error_states and errors is not None:
-        found |= {"correlated": plain(errors.deviation, scale), "correlation_time": plain(errors.correlation_time)}
-    return found
+    if kalman.sensor_error_states and errors is not None:
+        deviations |= {"correlated": plain(errors.deviation, scale), "correlation_time": plain(errors.correlation_time)}
+    return deviations
 
 
 def _innovations(run: xr.Dataset, sensor: int) -> dict[str, float]:
@@ -66,39 +67,39 @@ def _innovations(run: xr.Dataset, sensor: int) -> dict[str, float]:
 
 def _findings(sensors: list[dict[str, Any]], nees: float | None) -> list[str]:
     """Sentences about a filter that is surer than it may be."""
-    contradicted = [one for one in sensors if one["inconsistent"] > 0]
-    found = []
+    contradicted = [sensor for sensor in sensors if sensor["inconsistent"] > 0]
+    findings = []
     if contradicted:
-        each = ", ".join(
-            f"those of {one['sensor']} are {one['innovation_rms']:.2g} times as large as it assumes and correlated by "
-            f"{one['innovation_correlation']:.2f} from one reading to the next"
-            for one in contradicted
+        contradictions = ", ".join(
+            f"those of {sensor['sensor']} are {sensor['innovation_rms']:.2g} times as large as it assumes and "
+            f"correlated by {sensor['innovation_correlation']:.2f} from one reading to the next"
+            for sensor in contradicted
         )
-        found.append(
-            f"The navigation filter is inconsistent with its innovations: {each}. State such errors in the "
+        findings.append(
+            f"The navigation filter is inconsistent with its innovations: {contradictions}. State such errors in the "
             "sensors (`correlated_noise`, `correlation_time`; of a compass `hard_iron`, `soft_iron`, `interference`), "
             "or raise its `noise_scale`"
         )
     if nees is not None and nees > _TOO_LARGE * _EXPECTED:
         unseen = "" if contradicted else ", and no innovation shows it"
-        found.append(
+        findings.append(
             f"The errors of the navigation filter are {math.sqrt(nees / _EXPECTED):.2g} times as large as it says "
             f"(`nees` is {nees:.3g}, {_EXPECTED} is expected){unseen}"
         )
-    return found
+    return findings
 
 
 def _gate_findings(run: xr.Dataset) -> list[str]:
     """Sentences about gates of the filter that had to act."""
     inertial, reopened = (int(run[name].values[-1]) for name in ("rejected_inertial", "reopened_gates"))
-    found = []
+    findings = []
     if inertial:
-        found.append(
+        findings.append(
             f"The navigation filter did not believe {inertial} samples of the IMU: no motion of the vehicle explains "
             "them. Look for glitches, or raise its `inertial_factor` or `largest_rate`"
         )
     if reopened:
-        found.append(
+        findings.append(
             f"The navigation filter was wrong {reopened} times: most sensors contradicted it, and were believed again"
         )
-    return found
+    return findings

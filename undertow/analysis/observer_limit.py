@@ -61,18 +61,19 @@ def loop_poles(law: LinearLaw, bandwidth: float, order: int = 3) -> Float[np.nda
     gains = {2: (2 * w, w**2, 0.0), 3: (3 * w, 3 * w**2, w**3)}[order]
     x, v, x_hat, v_hat, a_hat, v_bar, d_hat = np.eye(7)
     u = -d_hat - k1 * x_hat - k2 * v_hat
-    eps, off = v_bar - v_hat, x - x_hat
+    eps, position_error = v_bar - v_hat, x - x_hat
     rows = [
         v,
         u,
-        v_hat + gains[0] * off,
-        (a_hat if order == 3 else 0 * a_hat) + gains[1] * off,
-        gains[2] * off,
+        v_hat + gains[0] * position_error,
+        (a_hat if order == 3 else 0 * a_hat) + gains[1] * position_error,
+        gains[2] * position_error,
         -law.pole * eps + u + d_hat,
         -(law.frequency**2) * (eps - m1 * x_hat - m2 * v_hat),
     ]
-    matrix, kept = np.stack(rows), [i for i in range(7) if order == 3 or i != 4]
-    return np.asarray(np.linalg.eigvals(matrix[np.ix_(kept, kept)]), dtype=complex)
+    matrix = np.stack(rows)
+    states = [i for i in range(7) if order == 3 or i != 4]
+    return np.asarray(np.linalg.eigvals(matrix[np.ix_(states, states)]), dtype=complex)
 
 
 def slowest_observer(law: LinearLaw, order: int = 3) -> float:

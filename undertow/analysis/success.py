@@ -27,35 +27,37 @@ class Success(NamedTuple):
     exceeded: dict[str, float | None]
     within: bool
 
-    def sentence(self, known: Mapping[str, Metric]) -> str:
+    def sentence(self, metrics: Mapping[str, Metric]) -> str:
         """The verdict as a sentence."""
-        said = lambda name, value: "{:.4g} {}".format(*for_people(value, known[name].unit)).rstrip()
-        each = lambda name: f"{name} {said(name, self.criterion[name])}"
+        quantity = lambda name, value: "{:.4g} {}".format(*for_people(value, metrics[name].unit)).rstrip()
+        bound_text = lambda name: f"{name} {quantity(name, self.criterion[name])}"
         if self.within:
-            return f"tracking: within {', '.join(map(each, self.criterion))}"
+            return f"tracking: within {', '.join(map(bound_text, self.criterion))}"
         if not self.exceeded:
-            return f"tracking: not within {', '.join(map(each, self.criterion))}, as the run did not reach its end"
-        off = [
-            f"{each(name)} ({'not defined' if value is None else f'is {said(name, value)}'})"
+            return (
+                f"tracking: not within {', '.join(map(bound_text, self.criterion))}, as the run did not reach its end"
+            )
+        violations = [
+            f"{bound_text(name)} ({'not defined' if value is None else f'is {quantity(name, value)}'})"
             for name, value in self.exceeded.items()
         ]
-        return f"tracking: not within {', '.join(off)}"
+        return f"tracking: not within {', '.join(violations)}"
 
 
-def criterion_of(given: Mapping[str, float] | None, known: Mapping[str, Metric]) -> dict[str, float]:
+def criterion_of(criterion: Mapping[str, float] | None, metrics: Mapping[str, Metric]) -> dict[str, float]:
     """What a run is judged by: what the scenario says, or the default for what its plant has; {} for nothing.
 
     Raises:
         BadInput: a metric that this plant does not have.
     """
-    if given is None:
-        tracking = {name: most for name, most in DEFAULT.items() if name in known}
+    if criterion is None:
+        tracking = {name: most for name, most in DEFAULT.items() if name in metrics}
         return tracking | SATURATED if tracking else {}
-    for name in given:
-        if name not in known:
+    for name in criterion:
+        if name not in metrics:
             must = "be a metric of this plant"
-            raise BadInput(name, must, "unknown", hint=did_you_mean(name, known))
-    return dict(given)
+            raise BadInput(name, must, "unknown", hint=did_you_mean(name, metrics))
+    return dict(criterion)
 
 
 def judged(criterion: Mapping[str, float], steady: Mapping[str, Any] | None) -> Success | None:

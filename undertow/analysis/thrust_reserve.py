@@ -57,16 +57,16 @@ def attainable_wrench(
         BadInput: a thruster that does not exist, or limits without 0 between them.
     """
     matrix, low, high = _checked(matrix, low, high, lost)
-    kept = np.delete(np.arange(matrix.shape[1]), list(lost))
+    working = np.delete(np.arange(matrix.shape[1]), list(lost))
     controlled = list(controlled_axes(matrix, lost) if axes is None else axes)
-    matrix, low, high = matrix[:, kept], low[kept], high[kept]
+    matrix, low, high = matrix[:, working], low[working], high[working]
     ends = np.stack([matrix * low, matrix * high])
     free = np.stack([ends.min(0).sum(-1), ends.max(0).sum(-1)], axis=-1)
     alone = np.full((len(matrix), 2), np.nan)
     for axis in controlled:
-        others = [other for other in controlled if other != axis]
+        other_axes = [other_axis for other_axis in controlled if other_axis != axis]
         for side, sign in enumerate((-1.0, 1.0)):
-            alone[axis, side] = sign * _most(sign * matrix[axis], matrix[others], low, high)
+            alone[axis, side] = sign * _most(sign * matrix[axis], matrix[other_axes], low, high)
     return AttainableWrench(alone, free)
 
 
@@ -112,16 +112,17 @@ def reference_reserve(
     Raises:
         BadInput: an actuator that does not exist.
     """
-    own = model.in_body_axes()
+    body_model = model.in_body_axes()
     times = np.linspace(0.0, duration, samples)
-    demands, gains = (np.asarray(value) for value in _demands(own, reference, jnp.asarray(times), jnp.asarray(water)))
-    held = own.actuators.quasi_static()
+    demands_and_gains = _demands(body_model, reference, jnp.asarray(times), jnp.asarray(water))
+    demands, gains = (np.asarray(value) for value in demands_and_gains)
+    held = body_model.actuators.quasi_static()
     least, largest = held.range(held.init(), jnp.ones(()))
     _, low, high = _checked(gains[0], least, largest, lost)
-    left = controlled_axes(gains[0], lost)
-    share = lambda required, effect: _share(effect, required, low, high, lost, left)
+    controlled = controlled_axes(gains[0], lost)
+    share = lambda required, effect: _share(effect, required, low, high, lost, controlled)
     worst, time = min((share(*both), float(t)) for *both, t in zip(demands, gains, times, strict=True))
-    return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(left))))
+    return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(controlled))))
 
 
 @eqx.filter_jit
@@ -134,8 +135,8 @@ def _demands(model: Model, reference: AbstractReference, times, water):
         ground = coordinates.measurement(target.position, target.velocity)
         flow = jnp.zeros_like(target.velocity)
         flow = flow.at[:3].set(water) if flow.shape[0] == 6 else flow
-        through = coordinates.measurement(target.position, target.velocity - flow)
-        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(through)
+        relative_measurement = coordinates.measurement(target.position, target.velocity - flow)
+        required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(relative_measurement)
         return required, dynamics.gain(ground)
 
     return jax.vmap(demand)(times)
@@ -143,13 +144,13 @@ def _demands(model: Model, reference: AbstractReference, times, water):
 
 def _share(effect, required, low, high, lost, axes) -> float:
     """Largest s with E f = s times the demand along the axes, and f within its limits."""
-    kept = np.delete(np.arange(effect.shape[1]), list(lost))
-    rows = effect[np.ix_(list(axes), kept)]
+    working = np.delete(np.arange(effect.shape[1]), list(lost))
+    rows = effect[np.ix_(list(axes), working)]
     if np.linalg.norm(required[list(axes)]) < _NOTHING:
         return _ENOUGH
     extended = np.concatenate([rows, -required[list(axes), None]], axis=1)
-    low, high = np.append(low[kept], 0.0), np.append(high[kept], _ENOUGH)
-    return _most(np.append(np.zeros(len(kept)), 1.0), extended, low, high)
+    low, high = np.append(low[working], 0.0), np.append(high[working], _ENOUGH)
+    return _most(np.append(np.zeros(len(working)), 1.0), extended, low, high)
 
 
 def _most(gain: np.ndarray, zero: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
@@ -158,8 +159,8 @@ def _most(gain: np.ndarray, zero: np.ndarray, low: np.ndarray, high: np.ndarray)
 
     bounds = list(zip(low, high, strict=True))
     rows = {"A_eq": zero, "b_eq": np.zeros(len(zero))} if len(zero) else {}
-    found = linprog(-gain, bounds=bounds, **rows)
-    return float("inf") if found.status == 3 else -float(found.fun)
+    optimum = linprog(-gain, bounds=bounds, **rows)
+    return float("inf") if optimum.status == 3 else -float(optimum.fun)
 
 
 def _checked(matrix, low, high, lost) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -167,9 +168,9 @@ def _checked(matrix, low, high, lost) -> tuple[np.ndarray, np.ndarray, np.ndarra
     matrix = np.asarray(matrix, dtype=float)
     count = matrix.shape[1]
     low, high = (np.broadcast_to(np.asarray(end, dtype=float), (count,)) for end in (low, high))
-    for one in lost:
-        if not 0 <= one < count:
-            raise BadInput("lost", f"have numbers from 0 to {count - 1}, one per actuator", one)
+    for actuator in lost:
+        if not 0 <= actuator < count:
+            raise BadInput("lost", f"have numbers from 0 to {count - 1}, one per actuator", actuator)
     if not ((low <= 0) & (high >= 0)).all():
         raise BadInput("low, high", "have 0 between them", f"{low.tolist()}, {high.tolist()}")
     return matrix, low, high

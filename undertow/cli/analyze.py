@@ -35,8 +35,8 @@ def analyze(command: AnalyzeCommand) -> int:
         built = build(read(command.scenario, allow_code=command.allow_code))
         with shares(console) as progress:
             prediction = interruptible(lambda: predict(built, progress))
-        before = (*built.advice(), *flow_advice(built))
-        warnings = (*(one.sentence for one in before), *advice(prediction))
+        all_advice = (*built.advice(), *flow_advice(built))
+        warnings = (*(piece.sentence for piece in all_advice), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail

@@ -16,7 +16,9 @@ from undertow.outside.thruster_channels import channels_of_vehicle
 
 def ardupilot(command: ArdupilotCommand) -> int:
     """Answer ArduPilot's packets until Ctrl-C; return the exit code."""
-    console, depth, duration = wide_console(), command.depth, command.duration
+    console = wide_console()
+    depth = command.depth
+    duration = command.duration
     if depth is not None:
         checks.finite("depth", depth, "m")
     if duration is not None:

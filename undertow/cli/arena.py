@@ -60,7 +60,7 @@ _TUNING, _SCENARIOS = "tuning", "scenarios"
 _WRITTEN = (PAGE, "leaderboard.json", "leaderboard.csv", "leaderboard.md", "figures")
 
 
-class _Asked(NamedTuple):
+class _Settings(NamedTuple):
     """What every law runs."""
 
     trials: int
@@ -73,85 +73,91 @@ class _Asked(NamedTuple):
 
 def arena(command: ArenaCommand) -> int:
     """Run laws through the tasks, those that are missing in the folder, and write the leader board; the exit code."""
-    entries, trials, budget = command.controllers or [], command.trials, command.tune
+    entries = command.controllers or []
+    trials = command.trials
+    budget = command.tune
     tasks, vehicles, robustness = command.tasks, command.vehicles, command.robustness
     check_pdf(command.pdf)
     checks.positive("--trials", trials)
     if budget is not None:
         check_budget(budget)
-    found = laws([word for entry in entries or EVERY for word in entry.split(",")])
-    asked = _Asked(
+    candidates = laws([word for entry in entries or EVERY for word in entry.split(",")])
+    settings = _Settings(
         trials, _cells(tasks, vehicles), budget, robustness, worker_count(command.workers), command.overwrite
     )
     console = wide_console()
     with output_folder(command.out or Path("runs") / "arena", Path()) as folder:
         _check_place(folder)
-        again = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
-        again += ["--tune", str(budget)] if budget is not None else []
-        again += ["--robustness"] if robustness else []
-        for option, given in (("--tasks", tasks), ("--vehicles", vehicles)):
-            again += [option, given] if given is not None else []
+        resume_command = ["arena", *entries, "--out", str(folder), "--trials", str(trials)]
+        resume_command += ["--tune", str(budget)] if budget is not None else []
+        resume_command += ["--robustness"] if robustness else []
+        for option, value in (("--tasks", tasks), ("--vehicles", vehicles)):
+            resume_command += [option, value] if value is not None else []
         try:
-            for number, law in enumerate(found, 1):
-                console.rule(f"{law.name} ({number} of {len(found)})", align="left")
-                _run(console, law, folder_of(folder, law.name), asked)
+            for number, law in enumerate(candidates, 1):
+                console.rule(f"{law.name} ({number} of {len(candidates)})", align="left")
+                _run(console, law, folder_of(folder, law.name), settings)
         except (KeyboardInterrupt, OSError):
-            typer.echo(f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *again])}", err=True)
+            typer.echo(
+                f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *resume_command])}", err=True
+            )
             raise
         return _conclude(console, folder, command.pdf)
 
 
 def _check_place(folder: Path) -> None:
     """Files of the names of results must be results."""
-    taken = [name for name in (LAWS, *_WRITTEN) if (folder / name).exists()]
-    if taken and not (folder / LAWS).is_dir():
-        hint = f"Choose another folder, or move {taken[0]} out of this one"
-        raise BadInput("--out", "be a folder of an arena, or a free one", f"{folder}, which has {taken[0]}", hint=hint)
+    existing = [name for name in (LAWS, *_WRITTEN) if (folder / name).exists()]
+    if existing and not (folder / LAWS).is_dir():
+        hint = f"Choose another folder, or move {existing[0]} out of this one"
+        raise BadInput(
+            "--out", "be a folder of an arena, or a free one", f"{folder}, which has {existing[0]}", hint=hint
+        )
 
 
 def _cells(tasks: str | None, vehicles: str | None) -> tuple[Cell, ...]:
     """Tasks and vehicles that were asked for."""
-    asked = []
-    for option, given, known in (("--tasks", tasks, TASKS), ("--vehicles", vehicles, VEHICLES)):
-        names = list(known) if given is None else [one.strip() for one in given.split(",") if one.strip()]
+    selections = []
+    for option, text, choices in (("--tasks", tasks, TASKS), ("--vehicles", vehicles, VEHICLES)):
+        names = list(choices) if text is None else [word.strip() for word in text.split(",") if word.strip()]
         for name in names:
-            if name not in known:
+            if name not in choices:
                 raise BadInput(
-                    option, f"name {option.removeprefix('--')} of the arena", name, hint=did_you_mean(name, known)
+                    option, f"name {option.removeprefix('--')} of the arena", name, hint=did_you_mean(name, choices)
                 )
-        asked.append(names)
-    found = tuple((task, vehicle) for task, vehicle in CELLS if task in asked[0] and vehicle in asked[1])
-    if not found:
+        selections.append(names)
+    cells = tuple((task, vehicle) for task, vehicle in CELLS if task in selections[0] and vehicle in selections[1])
+    if not cells:
         hint = "`pitch_turn` is for bluerov2_heavy and odin, foreign models for bluerov2_heavy"
         raise BadInput("--tasks", "be tasks that one of the vehicles has", f"{tasks} with {vehicles}", hint=hint)
-    return found
+    return cells
 
 
-def _run(console: Console, law: Candidate, folder: Path, asked: _Asked) -> None:
+def _run(console: Console, law: Candidate, folder: Path, settings: _Settings) -> None:
     """Tune and run one law, as far as its folder does not have that already."""
-    if asked.overwrite:
+    if settings.overwrite:
         results_folder.remove(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    gains = None if asked.budget is None else _tuned(console, law, folder, asked.cells, asked.budget)
+    gains = None if settings.budget is None else _tuned(console, law, folder, settings.cells, settings.budget)
     with stage(console, "building"):
-        entry, prepared = interruptible(lambda: prepare_entry(law, asked.trials, asked.cells, gains))
-    if (folder / ENTRY).exists() and (kept := read_entry(folder)) != entry:
-        different = next(name for name in entry._fields if getattr(entry, name) != getattr(kept, name))
+        entry, prepared = interruptible(lambda: prepare_entry(law, settings.trials, settings.cells, gains))
+    if (folder / ENTRY).exists() and (stored_entry := read_entry(folder)) != entry:
+        different = next(name for name in entry._fields if getattr(entry, name) != getattr(stored_entry, name))
         hint = "Give the law another name (NAME=ENTRY), choose another folder, or run it again with --overwrite"
         raise BadInput(law.name, "be the law that is in the folder", f"another: its {different} differ", hint=hint)
     for cell, why in entry.refused.items():
         typer.echo(f"Advice: {law.name} cannot run {cell[0]} on {cell[1]}, which counts as lost: {why}", err=True)
-    _trials(console, prepared, folder, asked.workers)
+    _trials(console, prepared, folder, settings.workers)
     write_entry(entry, folder)
-    _write_scenarios(law, folder / _SCENARIOS, asked.cells, gains)
+    _write_scenarios(law, folder / _SCENARIOS, settings.cells, gains)
     if not (folder / STEP).exists():
         with stage(console, "time of a step"):
-            found = interruptible(lambda: step_time(prepared.first))
-            write_whole(folder / STEP, to_json(found._asdict()) + "\n")
-    if asked.robustness:
+            timing = interruptible(lambda: step_time(prepared.first))
+            write_whole(folder / STEP, to_json(timing._asdict()) + "\n")
+    if settings.robustness:
         with stage(console, "building robustness"):
-            harder = interruptible(lambda: prepare_robustness(law, max(2, asked.trials // 4), gains))
-        _trials(console, harder, folder / FOLDER, asked.workers)
+            harder = interruptible(lambda: prepare_robustness(law, max(2, settings.trials // 4), gains))
+        _trials(console, harder, folder / FOLDER, settings.workers)
 
 
 def _tuned(console: Console, law: Candidate, folder: Path, cells: Sequence[Cell], budget: int) -> TunedGains:
@@ -171,8 +177,8 @@ def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains:
     folder.mkdir(exist_ok=True)
     for cell in cells:
         for name, keys in with_law(cell, law, gains).items():
-            said = f"# {law.name} in task {cell[0]} on {cell[1]}: {TASKS[cell[0]].question}.\n"
-            write_whole(folder / f"{name.replace(' ', '-')}.yaml", said + dump(keys))
+            header = f"# {law.name} in task {cell[0]} on {cell[1]}: {TASKS[cell[0]].question}.\n"
+            write_whole(folder / f"{name.replace(' ', '-')}.yaml", header + dump(keys))
 
 
 def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
@@ -185,10 +191,10 @@ def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
         write_whole(folder / "leaderboard.csv", as_csv(board))
         write_whole(folder / "leaderboard.md", as_markdown(rows))
     warn_of(failures)
-    shown = titled("Leader board", rows.head[0], *map(numbers, rows.head[1:]))
+    table = titled("Leader board", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:
-        shown.add_row(*row)
-    console.print(shown)
+        table.add_row(*row)
+    console.print(table)
     console.print(SCORE, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
     return DONE

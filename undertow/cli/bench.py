@@ -34,55 +34,56 @@ _WORKLOADS = {
 
 def bench(command: BenchCommand) -> int:
     """Measure workloads W1 and W2, or how long users wait, and print tables or JSON."""
-    console, work = wide_console(), waiting_times if command.users else measure
+    console = wide_console()
+    work = waiting_times if command.users else measure
     if command.as_json:
-        found = interruptible(lambda: work(lambda what, share: None))
-        typer.echo(json.dumps({key: _short(value) for key, value in found.items()}, indent=1))
+        figures = interruptible(lambda: work(lambda what, share: None))
+        typer.echo(json.dumps({key: _short(value) for key, value in figures.items()}, indent=1))
         return DONE
     with shares(console) as progress:
-        found = interruptible(lambda: work(progress))
+        figures = interruptible(lambda: work(progress))
     if command.users:
-        console.print(_waiting_table(found))
+        console.print(_waiting_table(figures))
         return DONE
-    if "simd_unavailable" in found:
-        console.print(f"Figures of SIMD batches are left out: {found['simd_unavailable']}.", highlight=False)
+    if "simd_unavailable" in figures:
+        console.print(f"Figures of SIMD batches are left out: {figures['simd_unavailable']}.", highlight=False)
     for words, prefix in _WORKLOADS.items():
-        if f"{prefix}steps" not in found:
+        if f"{prefix}steps" not in figures:
             continue
-        console.print(_table(words, found, prefix))
-        if f"{prefix}single_compile_s" not in found:
+        console.print(_table(words, figures, prefix))
+        if f"{prefix}single_compile_s" not in figures:
             continue
-        compiling = f"{found[f'{prefix}single_compile_s']:.2g} s for one run"
-        if f"{prefix}single_xla_compile_s" in found:
-            compiling += f" (XLA {found[f'{prefix}single_xla_compile_s']:.2g} s)"
-        compiling += f", {found[f'{prefix}batch_float64_compile_s']:.2g} s for a batch"
-        figures = (
-            f"{found[f'{prefix}batch_float64_operations']} operations per step, "
-            f"rms of all six errors {found[f'{prefix}tracking_rms']:.6f}"
+        compiling = f"{figures[f'{prefix}single_compile_s']:.2g} s for one run"
+        if f"{prefix}single_xla_compile_s" in figures:
+            compiling += f" (XLA {figures[f'{prefix}single_xla_compile_s']:.2g} s)"
+        compiling += f", {figures[f'{prefix}batch_float64_compile_s']:.2g} s for a batch"
+        details = (
+            f"{figures[f'{prefix}batch_float64_operations']} operations per step, "
+            f"rms of all six errors {figures[f'{prefix}tracking_rms']:.6f}"
         )
-        console.print(f"Compile time: {compiling}; {figures}.", highlight=False)
-    first = f"{found['first_cold_s']:.2g} s without cached code, {found['first_kept_s']:.2g} s with it"
+        console.print(f"Compile time: {compiling}; {details}.", highlight=False)
+    first = f"{figures['first_cold_s']:.2g} s without cached code, {figures['first_kept_s']:.2g} s with it"
     console.print(f"Time from the start of a process to its first result (W1): {first}.", highlight=False)
     return DONE
 
 
-def _waiting_table(found: dict[str, Any]) -> Table:
+def _waiting_table(figures: dict[str, Any]) -> Table:
     """Seconds that commands take, and how many times as long as the start of JAX that is."""
     table = titled("Seconds that users wait", "command", *map(numbers, ("s", "times the start of JAX")))
-    for key, value in found.items():
-        table.add_row(key.removesuffix("_s").replace("_", " "), f"{value:.3g}", f"{value / found['jax_start_s']:.3g}")
+    for key, value in figures.items():
+        table.add_row(key.removesuffix("_s").replace("_", " "), f"{value:.3g}", f"{value / figures['jax_start_s']:.3g}")
     return table
 
 
-def _table(words: str, found: dict[str, Any], prefix: str) -> Table:
+def _table(words: str, figures: dict[str, Any], prefix: str) -> Table:
     """One workload, with ratios to plain NumPy where that was measured."""
-    steps = f"{found[f'{prefix}steps']} steps, SIMD width {found['simd_width']}, {found['threads']} threads"
-    compared = f"{prefix}numpy_ns" in found
-    columns = map(numbers, ("ns", "speed-up over NumPy") if compared else ("ns",))
+    steps = f"{figures[f'{prefix}steps']} steps, SIMD width {figures['simd_width']}, {figures['threads']} threads"
+    has_numpy = f"{prefix}numpy_ns" in figures
+    columns = map(numbers, ("ns", "speed-up over NumPy") if has_numpy else ("ns",))
     table = titled(f"{words}: nanoseconds per step and run ({steps})", "execution", *columns)
     for key, row in _ROWS.items():
-        if (value := found.get(f"{prefix}{key}")) is not None:
-            ratio = (f"{found[f'{prefix}numpy_ns'] / value:.3g}",) if compared else ()
+        if (value := figures.get(f"{prefix}{key}")) is not None:
+            ratio = (f"{figures[f'{prefix}numpy_ns'] / value:.3g}",) if has_numpy else ()
             table.add_row(row, f"{value:.4g}", *ratio)
     return table
 

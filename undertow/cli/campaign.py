@@ -55,21 +55,22 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | Non
     """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stage(console, "summary"):
         results = load(folder)
-        found = summary(results, prepared.trials)
-    shown, part_cache = found["worst"][:_REPLAYED] if replay else [], PartCache()
-    worst = {f"trial {trial}": build_trial(prepared.trials, part_cache, trial) for trial in shown}
+        summary_data = summary(results, prepared.trials)
+    worst_trials = summary_data["worst"][:_REPLAYED] if replay else []
+    part_cache = PartCache()
+    worst = {f"trial {trial}": build_trial(prepared.trials, part_cache, trial) for trial in worst_trials}
     replays, missing = run_again(console, worst)
     with stage(console, "page"):
-        write_whole(folder / "summary.json", to_json(found, indent=1) + "\n")
-        _write_worst(prepared, found["worst"], folder / "worst")
+        write_whole(folder / "summary.json", to_json(summary_data, indent=1) + "\n")
+        _write_worst(prepared, summary_data["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page, failures = write_campaign(title, results, found, folder, pdf, replays)
+        page, failures = write_campaign(title, results, summary_data, folder, pdf, replays)
     warn_of([*missing, *failures])
-    console.print(table(results, found))
-    for sentence in sentences(found):
+    console.print(table(results, summary_data))
+    for sentence in sentences(summary_data):
         console.print(sentence, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
-    return DONE if set(found["status"]) <= {"completed"} else RUN_FAILED
+    return DONE if set(summary_data["status"]) <= {"completed"} else RUN_FAILED
 
 
 def _status(command: CampaignCommand) -> int:
@@ -104,24 +105,28 @@ _REPLAYED = 3  # trials in the replay
 _WRITTEN = (STORE, "campaign.html", "summary.json", "figures", "worst")
 
 
-def table(results: Results, found: dict) -> Table:
+def table(results: Results, summary_data: dict) -> Table:
     """One row per combination of the swept values."""
-    swept, shown = list(results.campaign.axes), [*results.tracking, "input_rms"]
-    counts = ("trials", "failed", "invalid") if found["invalid"] else ("trials", "failed")
-    metrics = (f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}" for name in shown)
+    swept = list(results.campaign.axes)
+    metric_names = [*results.tracking, "input_rms"]
+    counts = ("trials", "failed", "invalid") if summary_data["invalid"] else ("trials", "failed")
+    metrics = (f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}" for name in metric_names)
     table = titled("Median [5 %, 95 %] of completed trials", *swept, *counts, "within", *metrics)
-    for one in found["combinations"]:
-        cells = [_spread(one["metrics"].get(name), results.unit(name)) for name in shown]
+    for combination in summary_data["combinations"]:
+        cells = [_spread(combination["metrics"].get(name), results.unit(name)) for name in metric_names]
         table.add_row(
-            *(one["values"][key] for key in swept), *(str(one[count]) for count in counts), _within(one), *cells
+            *(combination["values"][key] for key in swept),
+            *(str(combination[count]) for count in counts),
+            _within(combination),
+            *cells,
         )
     return table
 
 
-def _within(one: dict) -> str:
+def _within(combination: dict) -> str:
     """Share of the trials of a combination that kept to the scenario's criterion of success."""
-    judged = one["success"]["within"] + one["success"]["not_within"]
-    return f"{100 * one['success']['within'] / judged:.1f} %" if judged else "-"
+    judged = combination["success"]["within"] + combination["success"]["not_within"]
+    return f"{100 * combination['success']['within'] / judged:.1f} %" if judged else "-"
 
 
 def _spread(quantiles: dict | None, unit: str) -> str:
@@ -131,20 +136,22 @@ def _spread(quantiles: dict | None, unit: str) -> str:
     return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
 
 
-def sentences(found: dict) -> list[str]:
+def sentences(summary_data: dict) -> list[str]:
     """The numbers of trials by status, and the verdict on each requirement."""
-    ended = ", ".join(f"{word} {number}" for word, number in found["status"].items())
-    text = [f"{found['done']} trials: {ended}."]
-    text += [sentence for sentence in (found["nominal_model"], by_xla(found)) if sentence]
-    text += [f"Invalid trials ({one['trials']} with this error): {one['why']}." for one in found["invalid"]]
-    for one in found["combinations"]:
-        of = "".join(f", {key} {value}" for key, value in one["values"].items())
-        for requirement in one["requirements"]:
+    endings_text = ", ".join(f"{word} {number}" for word, number in summary_data["status"].items())
+    text = [f"{summary_data['done']} trials: {endings_text}."]
+    text += [sentence for sentence in (summary_data["nominal_model"], by_xla(summary_data)) if sentence]
+    for invalid in summary_data["invalid"]:
+        text.append(f"Invalid trials ({invalid['trials']} with this error): {invalid['why']}.")
+    for combination in summary_data["combinations"]:
+        values_text = "".join(f", {key} {value}" for key, value in combination["values"].items())
+        for requirement in combination["requirements"]:
             low, high = (100 * bound for bound in requirement["interval"])
             formula, name = requirement["formula"], requirement["metric"]
             bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
             text.append(
-                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{of}: {requirement['verdict']}; "
-                f"kept by {100 * requirement['kept']:.1f} % (95 % interval {low:.1f} to {high:.1f} %)."
+                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{values_text}: "
+                f"{requirement['verdict']}; kept by {100 * requirement['kept']:.1f} % "
+                f"(95 % interval {low:.1f} to {high:.1f} %)."
             )
     return text

@@ -44,8 +44,9 @@ def _check_campaign(path: Path, options: Sequence[str], allow_code: bool) -> int
     prepared = prepare(path, allow_code)
     for sentence in prepared.advice:
         print(f"Advice: {sentence}")
-    number, each = prepared.trials.number, len(prepared.trials.combinations)
-    of = f" of {each} combinations" if each > 1 else ""
+    number = prepared.trials.number
+    combinations = len(prepared.trials.combinations)
+    of = f" of {combinations} combinations" if combinations > 1 else ""
     print(f"{path}: {_counted(0, 'error')}, {_counted(len(prepared.advice), 'piece')} of advice; {number} trials{of}")
     return DONE
 

@@ -51,49 +51,52 @@ def compare(command: CompareCommand) -> int:
     count = worker_count(command.workers)
     if trials is not None:
         checks.positive("--trials", trials)
-    several = None if entries is None else [one for one in map(str.strip, entries.split(",")) if one]
-    again = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
-    again += ["--trials", str(trials)] if trials is not None else []
-    again += ["--replay"] if replay else []
-    again += ["--tune", str(budget)] if budget is not None else []
-    name, written = f"{paths[0].stem}-comparison", (*_WRITTEN, FOLDER)
-    with trials_folder(command.out, name, written, resume, command.overwrite, FOLDER) as folder:
+    controllers = None if entries is None else [word for word in map(str.strip, entries.split(",")) if word]
+    resume_command = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
+    resume_command += ["--trials", str(trials)] if trials is not None else []
+    resume_command += ["--replay"] if replay else []
+    resume_command += ["--tune", str(budget)] if budget is not None else []
+    name = f"{paths[0].stem}-comparison"
+    file_names = (*_WRITTEN, FOLDER)
+    with trials_folder(command.out, name, file_names, resume, command.overwrite, FOLDER) as folder:
         console = wide_console()
         if not resume:
             results_folder.remove(folder / FOLDER)
-        with _tuning(console, folder, budget, again) as tuner:
-            prepare = lambda: prepare_comparison(paths, several, trials, command.allow_code, tuner)
+        with _tuning(console, folder, budget, resume_command) as tuner:
+            prepare = lambda: prepare_comparison(paths, controllers, trials, command.allow_code, tuner)
             ready = built_with_advice(console, prepare)
         if replay:
             check_replay(ready.built)
-        with resumable(folder, again):
+        with resumable(folder, resume_command):
             run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count)
             return _conclude(console, ready, folder, command.pdf, replay)
 
 
 @contextlib.contextmanager
-def _tuning(console: Console, folder: Path, budget: int | None, again: Sequence[str]) -> Iterator[Tuner | None]:
+def _tuning(
+    console: Console, folder: Path, budget: int | None, resume_command: Sequence[str]
+) -> Iterator[Tuner | None]:
     """What tunes the controllers, with its progress; None without a budget. Stopped, it says how to continue."""
     if budget is None:
         yield None
         return
-    place, say = folder / FOLDER, new_lines(console)
+    store, say = folder / FOLDER, new_lines(console)
     try:
-        yield lambda candidates, scenario: equal_budgets(candidates, scenario, budget, place, say)
+        yield lambda candidates, scenario: equal_budgets(candidates, scenario, budget, store, say)
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt) and place.is_dir() and any(place.iterdir()):
-            line = shlex.join(["undertow", *again, "--out", str(folder), "--resume"])
+        if isinstance(error, KeyboardInterrupt) and store.is_dir() and any(store.iterdir()):
+            line = shlex.join(["undertow", *resume_command, "--out", str(folder), "--resume"])
             typer.echo(f"Stopped while tuning; what was evaluated is kept. To continue: {line}", err=True)
         elif not (folder / STORE).exists():
-            _remove_empty(place, folder)
+            _remove_empty(store, folder)
         raise
 
 
 def _remove_empty(*folders: Path) -> None:
     """Remove folders in which nothing was kept."""
-    for one in folders:
+    for folder in folders:
         with contextlib.suppress(OSError):
-            one.rmdir()
+            folder.rmdir()
 
 
 def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: str | None, replay: bool) -> int:
@@ -105,34 +108,35 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
     with stage(console, "statistics and page"):
         results = load(folder)
         comparison = read_comparison(folder, results, ready)
-        found = comparison.findings
+        findings = comparison.findings
         files = _write_scenarios(ready, comparison, folder / "scenarios")
         for style, name in _TABLES.items():
             write_whole(folder / name, comparison.table(style))
         tuned = {} if ready.budgets is None else {"budgets": ready.budgets.data()}
-        write_whole(folder / "comparison.json", to_json(found.data() | tuned, indent=1) + "\n")
-        written = {name: one._asdict() for name, one in times.items()}  # apart: they differ from run to run
-        write_whole(folder / _TIMES, to_json(written, indent=1) + "\n")
+        write_whole(folder / "comparison.json", to_json(findings.data() | tuned, indent=1) + "\n")
+        # In a file of their own: they differ from run to run.
+        step_time_data = {name: step_time._asdict() for name, step_time in times.items()}
+        write_whole(folder / _TIMES, to_json(step_time_data, indent=1) + "\n")
         page, failures = write_comparison(
             comparison, results, ready.subject, folder, pdf, replays, times, ready.budgets
         )
     warn_of([*missing, *failures])
-    rows = medians(found, times)
-    table = titled(f"Median of {found.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
+    rows = medians(findings, times)
+    table = titled(f"Median of {findings.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:
         table.add_row(*row)
     console.print(table)
-    said = [] if ready.budgets is None else budget_sentences(ready.budgets)
-    for sentence in (NOTE, HOW_LONG, *sentences(found), *said):
+    budget_notes = [] if ready.budgets is None else budget_sentences(ready.budgets)
+    for sentence in (NOTE, HOW_LONG, *sentences(findings), *budget_notes):
         console.print(sentence, highlight=False, soft_wrap=True)
-    for name, note in found.tuning.items():
+    for name, note in findings.tuning.items():
         console.print(f"{name}: {note}.", highlight=False, soft_wrap=True)
     for name, note in zip(ready.names, ready.notes, strict=True):
         if not note.tuned and name in files and ready.budgets is None:
-            said = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
-            console.print(said, highlight=False, soft_wrap=True)
+            message = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
+            console.print(message, highlight=False, soft_wrap=True)
     console.print(f"Page: {page}", highlight=False, soft_wrap=True)
-    return DONE if all(found.completed(name) == found.trials for name in found.names) else RUN_FAILED
+    return DONE if all(findings.completed(name) == findings.trials for name in findings.names) else RUN_FAILED
 
 
 def _write_scenarios(ready: PreparedComparison, comparison: Comparison, folder: Path) -> dict[str, Path]:

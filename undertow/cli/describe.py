@@ -49,8 +49,8 @@ def describe(command: DescribeCommand) -> None:
             _show_keys(console, f"Keys of {section}", model)
     elif name == "metrics":
         rows = [
-            (key, one.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), one.meaning)
-            for key, one in MEANINGS.items()
+            (key, metric.unit.replace("[axis]", "[output]"), PER_AXIS.get(key, ""), metric.meaning)
+            for key, metric in MEANINGS.items()
         ]
         _show_table(console, "Metrics", ("metric", "unit", "of each output", "meaning"), rows)
     elif name == "signals":
@@ -81,7 +81,10 @@ def _show_part(console: Console, part: describing.Description) -> None:
 
 
 def _show_signals(console: Console, title: str, declared: Mapping[str, Signal]) -> None:
-    rows = [(name, ", ".join(("time", *one.dimensions)), one.unit, one.meaning) for name, one in declared.items()]
+    rows = [
+        (name, ", ".join(("time", *signal.dimensions)), signal.unit, signal.meaning)
+        for name, signal in declared.items()
+    ]
     _show_table(console, title, ("signal", "dimensions", "unit", "meaning"), rows)
 
 
@@ -103,16 +106,16 @@ def list_parts(command: ListCommand) -> None:
     shown_kinds = (kind,) if kind else catalogue.KINDS
     if as_json:
         rows = [
-            {"kind": shown, "name": name, "description": sentence}
-            for shown in shown_kinds
-            for name, sentence in describing.listed(shown)
+            {"kind": part_kind, "name": name, "description": sentence}
+            for part_kind in shown_kinds
+            for name, sentence in describing.listed(part_kind)
         ]
         print(json.dumps(rows, indent=1))
         return
     table = Table("kind", "name", "description")
-    for shown in shown_kinds:
-        for name, sentence in describing.listed(shown):
-            table.add_row(shown, name, sentence)
+    for part_kind in shown_kinds:
+        for name, sentence in describing.listed(part_kind):
+            table.add_row(part_kind, name, sentence)
         table.add_section()
     console = wide_console()
     console.print(table)
@@ -121,19 +124,19 @@ def list_parts(command: ListCommand) -> None:
 
 def _list_faults(as_json: bool) -> None:
     """Print every kind of fault: target, mode, and the severity with its unit, default and range."""
-    found = list_kinds()
+    faults = list_kinds()
     if as_json:
-        print(json.dumps([one._asdict() for one in found], indent=1))
+        print(json.dumps([fault._asdict() for fault in faults], indent=1))
         return
     table = Table("target", "mode", "severity", "unit", "default", "range")
-    for i, one in enumerate(found):
-        table.add_row(one.target, one.mode, *severity_cells(one))
-        if found[i + 1 : i + 2] and found[i + 1].target != one.target:
+    for i, fault in enumerate(faults):
+        table.add_row(fault.target, fault.mode, *severity_cells(fault))
+        if faults[i + 1 : i + 2] and faults[i + 1].target != fault.target:
             table.add_section()
     console = wide_console()
     console.print(table)
     console.print(
-        f"{len(found)} kinds. `undertow describe faults/NAME` shows the options of a mode.",
+        f"{len(faults)} kinds. `undertow describe faults/NAME` shows the options of a mode.",
         highlight=False,
         soft_wrap=True,
     )

@@ -39,7 +39,8 @@ def falsify_scenario(command: FalsifyCommand) -> int:
         raise BadInput("--budget", "be at least 1 run", budget)
     if not 0 <= seed < 2**32:
         raise BadInput("--seed", "be between 0 and 2^32 - 1", seed)
-    console, first = wide_console(), Path("runs") / f"{scenario.stem}-falsified"
+    console = wide_console()
+    first = Path("runs") / f"{scenario.stem}-falsified"
     text = read(scenario, allow_code=command.allow_code)
     out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
@@ -49,23 +50,23 @@ def falsify_scenario(command: FalsifyCommand) -> int:
     ):
         with _live(console, budget) as (say, watch):
             options = {"budget": budget, "seed": seed, "method": method, "checkpoint": checkpoint, "resume": resume}
-            found = interruptible(lambda: falsify(text, **options, say=say, watch=watch))
-        data = as_data(found)
+            falsification = interruptible(lambda: falsify(text, **options, say=say, watch=watch))
+        data = as_data(falsification)
         (draft.path / "falsify.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
-        if found.violation is not None:
-            sentence = f"Counter-example of {scenario.name}: {_violated(found)}."
-            written = trial_text(found.single_runs[-1].built, sentence)
-            (draft.path / "counterexample.yaml").write_text(written, encoding="utf-8")
+        if falsification.violation is not None:
+            sentence = f"Counter-example of {scenario.name}: {_violated(falsification)}."
+            scenario_text = trial_text(falsification.single_runs[-1].built, sentence)
+            (draft.path / "counterexample.yaml").write_text(scenario_text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
         checkpoint.unlink()
         plots = {"search": lambda: search_figure(data)}
-        if found.violation is not None:
-            nominal, broken = (one.dataset for one in found.single_runs)
+        if falsification.violation is not None:
+            nominal, broken = (run.dataset for run in falsification.single_runs)
             plots["counterexample"] = lambda: beside_nominal_figure(nominal, broken)
         warn_of(save_all(lambda: plots, draft.path / "figures", command.pdf).failures)
-    if found.violation is not None:
-        console.print(_table(found))
-    for line in _sentences(found, folder):
+    if falsification.violation is not None:
+        console.print(_table(falsification))
+    for line in _sentences(falsification, folder):
         console.print(line, highlight=False, soft_wrap=True)
     return DONE
 
@@ -91,34 +92,35 @@ def _live(
         yield say, watch
 
 
-def _violated(found: Falsified) -> str:
-    broken = [f"{name} (robustness {value:.3g})" for name, value in found.broken.items() if not value > 0]
+def _violated(falsification: Falsified) -> str:
+    broken = [f"{name} (robustness {value:.3g})" for name, value in falsification.broken.items() if not value > 0]
     return f"violates {', '.join(broken)}"
 
 
-def _table(found: Falsified) -> Table:
-    assert found.violation is not None
+def _table(falsification: Falsified) -> Table:
+    assert falsification.violation is not None
     table = titled("Counter-example", "key", *map(numbers, ("low", "nominal", "value", "high", "departure")))
-    for axis, away in zip(found.box.axes, found.violation.departure.tolist(), strict=True):
-        row = (axis.low, axis.nominal, found.values()[axis.key], axis.high)
+    for axis, away in zip(falsification.box.axes, falsification.violation.departure.tolist(), strict=True):
+        row = (axis.low, axis.nominal, falsification.values()[axis.key], axis.high)
         table.add_row(axis.key, *(f"{value:.5g}" for value in row), f"{100 * away:.3g} %")
     return table
 
 
-def _sentences(found: Falsified, folder: Path) -> list[str]:
-    runs, objective = found.objective.runs, found.objective
-    known = [sentence for sentence in (found.nominal_model(),) if sentence]
-    how = "by differentiation" if found.differentiated else "by differences"
-    ended = "the search converged" if found.finished else "the budget is used up"
-    if found.violation is None:
+def _sentences(falsification: Falsified, folder: Path) -> list[str]:
+    runs, objective = falsification.objective.runs, falsification.objective
+    remarks = [sentence for sentence in (falsification.nominal_model(),) if sentence]
+    gradient_method = "by differentiation" if falsification.differentiated else "by differences"
+    ending = "the search converged" if falsification.finished else "the budget is used up"
+    if falsification.violation is None:
         least = min(objective.robustnesses)
         none = f"No violation in {runs} runs within the bounds; least robustness {least:.4g}. This proves nothing"
-        return [f"{none}: {ended}, gradients {how}.", *known, f"Results: {folder}"]
-    alone = "repeats" if found.repeated() else "does not repeat"
+        return [f"{none}: {ending}, gradients {gradient_method}.", *remarks, f"Results: {folder}"]
+    departure = f"{falsification.violation.size:.4g} of the bounds (norm)"
+    repetition = "repeats" if falsification.repeated() else "does not repeat"
     return [
-        f"The counter-example {_violated(found)}. Its departure is {found.violation.size:.4g} of the bounds (norm). "
-        f"{runs} runs: {ended}, gradients {how}.",
-        *known,
-        f"A single run {alone} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
+        f"The counter-example {_violated(falsification)}. Its departure is {departure}. "
+        f"{runs} runs: {ending}, gradients {gradient_method}.",
+        *remarks,
+        f"A single run {repetition} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
         f"Results: {folder}",
     ]

@@ -79,8 +79,8 @@ def _law(controller: str | None, folder: Path) -> str | None:
         raise BadInput("--controller", "be FILE.py:FUNCTION", controller, hint=hint)
     catalogue.find("controllers", controller, Path(), "--controller")
     file, _, function = controller.rpartition(":")
-    there = _from_folder(file, folder)
-    return _quoted(f"{there if there.startswith('..') else f'./{there}'}:{function}")
+    relative_path = _from_folder(file, folder)
+    return _quoted(f"{relative_path if relative_path.startswith('..') else f'./{relative_path}'}:{function}")
 
 
 def _from_folder(file: str, folder: Path) -> str:
@@ -95,16 +95,16 @@ def _quoted(text: str) -> str:
 def _scenario(name: str, vehicle: str, thruster: str, controller: str | None) -> str:
     """The template with the chosen parts in place of its own."""
     text = _template("scenario.yaml")
-    chosen = {"undertow check scenario.yaml": f"undertow check {name}"}
-    chosen["undertow simulate scenario.yaml"] = f"undertow simulate {name}"
-    chosen[f"vehicle: {_DEFAULT}"] = f"vehicle: {vehicle}"
-    chosen[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {thruster}"
+    replacements = {"undertow check scenario.yaml": f"undertow check {name}"}
+    replacements["undertow simulate scenario.yaml"] = f"undertow simulate {name}"
+    replacements[f"vehicle: {_DEFAULT}"] = f"vehicle: {vehicle}"
+    replacements[f"thruster: {_THRUSTERS[_DEFAULT]}"] = f"thruster: {thruster}"
     if controller is not None:
         line = next(line for line in text.splitlines() if line.startswith("  kind: pid"))
-        chosen[line] = f"  kind: {controller}"
+        replacements[line] = f"  kind: {controller}"
         if controller == f"./{_CONTROLLER}:{_CONTROLLER.removesuffix('.py')}":
-            chosen[line] += "\n  slope: 2                         # 1/s, an option of the function"
-    for old, new in chosen.items():
+            replacements[line] += "\n  slope: 2                         # 1/s, an option of the function"
+    for old, new in replacements.items():
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     return text
@@ -118,16 +118,16 @@ def _check_free(folder: Path, names: Mapping[str, str]) -> None:
     for part in (folder, *folder.parents):
         if part.exists() and not part.is_dir():
             raise BadInput("PATH", "be a folder, or a file that ends in .yaml", f"{part}, another file")
-    taken = [str(folder / name) for name in names if (folder / name).exists()]
-    if taken:
+    existing = [str(folder / name) for name in names if (folder / name).exists()]
+    if existing:
         hint = "Nothing was written. Name another folder or scenario, for example `undertow init my_study`"
-        raise BadInput("PATH", "be a place without these files", f"one that has {', '.join(taken)}", hint=hint)
+        raise BadInput("PATH", "be a place without these files", f"one that has {', '.join(existing)}", hint=hint)
 
 
 def _write(folder: Path, contents: Mapping[str, str]) -> None:
     """All files, or none of them."""
     written: list[Path] = []
-    made = [part for part in (folder, *folder.parents) if not part.exists()]
+    new_folders = [part for part in (folder, *folder.parents) if not part.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in contents.items():
@@ -136,7 +136,7 @@ def _write(folder: Path, contents: Mapping[str, str]) -> None:
     except BaseException:
         for path in written:
             path.unlink(missing_ok=True)
-        for part in made:
+        for part in new_folders:
             with contextlib.suppress(OSError):
                 part.rmdir()
         raise

@@ -29,14 +29,18 @@ def remember_interrupts() -> None:
     The first one is answered by a line on stderr. During an import the exception waits until it ends: a half-imported
     compiled module crashes.
     """
-    for one in ending_signals():
-        signal.signal(one, _handler)
+    for ending_signal in ending_signals():
+        signal.signal(ending_signal, _handler)
     signal.signal(signal.SIGALRM, _handler)
 
 
 def ending_signals() -> list[signal.Signals]:
     """The signals that end a command: all but what `nohup` switched off."""
-    return [one for one in _ENDING if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN]
+    return [
+        ending_signal
+        for ending_signal in _ENDING
+        if ending_signal != signal.SIGHUP or signal.getsignal(ending_signal) != signal.SIG_IGN
+    ]
 
 
 def forget_interrupts() -> None:
@@ -107,12 +111,12 @@ class EndingSignal:
             if time.monotonic() - self._looked > _STUCK:  # as in a line that nobody reads
                 raise KeyboardInterrupt
 
-        before = {one: signal.signal(one, note) for one in ending_signals()}
+        before = {ending_signal: signal.signal(ending_signal, note) for ending_signal in ending_signals()}
         try:
             yield
         finally:
-            for one, handler in before.items():
-                signal.signal(one, handler)
+            for ending_signal, handler in before.items():
+                signal.signal(ending_signal, handler)
 
 
 def interruptible(work: Callable[[], Result]) -> Result:

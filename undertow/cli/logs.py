@@ -24,8 +24,8 @@ _UNIX = (9e8, 4.1e9)  # s since 1970, from 1998 to 2099
 
 def logs(command: LogsCommand) -> int:
     """Show what is in a file, and convert it if `out` is given; return the exit code."""
-    first, *others = command.words
-    check_words(others, 0, "FILE")
+    first, *further_words = command.words
+    check_words(further_words, 0, "FILE")
     path, out = Path(first), command.out
     if out is not None:
         _check_new(out, (".mcap", ".csv"), command.overwrite)
@@ -74,10 +74,10 @@ def _print(log: Log, console: Console) -> None:
     title = f"{log.source}: {log.format}, {len(log.signals)} signals, {log.duration():.6g} s"
     rows = [_row(log, name) for name in log.signals]
     heads = ("signal", "columns", "unit", *map(numbers, _NUMBERS), "taken from")
-    kept = [i for i in range(len(heads)) if any(row[i] for row in rows)]  # most logs have no gaps
-    table = titled(title, *(heads[i] for i in kept))
+    used_columns = [i for i in range(len(heads)) if any(row[i] for row in rows)]  # most logs have no gaps
+    table = titled(title, *(heads[i] for i in used_columns))
     for row in rows:
-        table.add_row(*(row[i] for i in kept))
+        table.add_row(*(row[i] for i in used_columns))
     console.print(table)
     console.print("World axes are north, east, down; body axes forward, starboard, down.", highlight=False)
     if dates := _dates(log):
@@ -89,11 +89,11 @@ def _print(log: Log, console: Console) -> None:
 def _row(log: Log, name: str) -> tuple[str, ...]:
     series, how = log[name], log.sampling(name)
     names = series.column_names()
-    shown = ", ".join(names) if len(names) <= _SHOWN else f"{names[0]}, ..., {names[-1]} ({len(names)})"
+    columns = ", ".join(names) if len(names) <= _SHOWN else f"{names[0]}, ..., {names[-1]} ({len(names)})"
     times = _clock(how.start), _clock(how.end)
     gaps = (str(how.gaps), f"{how.longest_gap:.3g}") if how.gaps else ("", "")
     missing = f"{100 * how.missing:.3g} %" if how.missing else ""
-    return name, shown, series.unit, str(how.samples), f"{how.rate:.4g}", *times, *gaps, missing, series.origin
+    return name, columns, series.unit, str(how.samples), f"{how.rate:.4g}", *times, *gaps, missing, series.origin
 
 
 def _clock(seconds: float) -> str:

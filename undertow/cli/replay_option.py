@@ -25,8 +25,8 @@ def check_replay(trials: Sequence[Built]) -> None:
 
 def run_again(console: Console, trials: Mapping[str, Built]) -> tuple[list[ReplayData], list[str]]:
     """Replays of trials, label -> trial, of which the first four are run again; and a sentence for each failure."""
-    shown = dict(islice(trials.items(), MOST))
-    if not shown:
+    first_trials = dict(islice(trials.items(), MOST))
+    if not first_trials:
         return [], []
-    with stage(console, f"replay: running {len(shown)} again"):
-        return interruptible(lambda: replays_of_trials(shown))
+    with stage(console, f"replay: running {len(first_trials)} again"):
+        return interruptible(lambda: replays_of_trials(first_trials))

@@ -25,10 +25,10 @@ def reproduce(command: ReproduceCommand) -> None:
         shares(console) as progress,
         worker_processes(preload="undertow.paper.reproduce") as pool,
     ):
-        found = interruptible(lambda: reproduce_paper(draft.path, command.quick, progress, pool))
+        reproduction = interruptible(lambda: reproduce_paper(draft.path, command.quick, progress, pool))
         progress("figures and report", 0.9)
         draft.publish()  # before the figures, which may fail
-        page = interruptible(lambda: write(found, draft.path, command.pdf, pool))
+        page = interruptible(lambda: write(reproduction, draft.path, command.pdf, pool))
     for claim in json.loads((command.out / "results.json").read_text(encoding="utf-8"))["claims"]:
         line = f"{claim['id']:<4}{claim['verdict']}: {claim['claim']}"
         console.print(line, highlight=False, soft_wrap=True)

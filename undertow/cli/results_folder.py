@@ -33,7 +33,7 @@ def output_folder(out: Path | None, default: Path) -> Iterator[Path]:
         BadInput: another process is writing there, or the folder cannot be written.
     """
     folder = default if out is None else out
-    made = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
+    new_parents = [parent for parent in (folder.parent, *folder.parent.parents) if not parent.exists()]
     try:
         with contextlib.ExitStack() as held:
             if out is None:
@@ -42,7 +42,7 @@ def output_folder(out: Path | None, default: Path) -> Iterator[Path]:
                 _hold(out, held)
             yield folder
     finally:
-        for parent in made:
+        for parent in new_parents:
             with contextlib.suppress(OSError):  # results are in it
                 parent.rmdir()
 
@@ -92,14 +92,14 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
     check_folder(folder, names, marker, overwrite)
     staging = _stage(folder)
     published: list[Path] = []
-    kept: list[Path] = []
+    rescued: list[Path] = []
 
     def publish() -> None:
         try:
             _publish(staging, folder, names, marker)
         except OSError:
-            kept.append(_rescued(staging, folder))
-            print(f"The results are in {kept[0]}.", file=sys.stderr)
+            rescued.append(_rescued(staging, folder))
+            print(f"The results are in {rescued[0]}.", file=sys.stderr)
             raise
         published.append(folder)
 
@@ -108,11 +108,11 @@ def results_folder(folder: Path, names: Sequence[str], marker: str, overwrite: b
         publish()
     except KeyboardInterrupt:
         missing = ", ".join(name for name in names if not (folder / name).exists())
-        left = f"The results are in {folder}" + (f", without {missing}" if missing else "")
-        print(f"{left if published else f'No results were written to {folder}'}.", file=sys.stderr)
+        message = f"The results are in {folder}" + (f", without {missing}" if missing else "")
+        print(f"{message if published else f'No results were written to {folder}'}.", file=sys.stderr)
         raise
     finally:
-        if not kept:
+        if not rescued:
             shutil.rmtree(staging, ignore_errors=True)
 
 
@@ -129,11 +129,14 @@ def check_folder(
         BadInput: the folder cannot be used.
     """
     _check_place(folder)
-    taken = [name for name in names if (folder / name).exists()]
-    if not taken:
+    existing = [name for name in names if (folder / name).exists()]
+    if not existing:
         return
     if not (folder / marker).exists():
-        got, move = f"{folder}, which has {taken[0]}", f"Choose another folder, or move {taken[0]} out of this one"
+        got, move = (
+            f"{folder}, which has {existing[0]}",
+            f"Choose another folder, or move {existing[0]} out of this one",
+        )
         raise BadInput("--out", "be a folder without files of the names of results", got, hint=move)
     links = [name for name in names if (folder / name).is_symlink() and (folder / name).is_dir()]
     if overwrite and links:
@@ -156,7 +159,8 @@ def _check_place(folder: Path) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> BadInput:
-    got, hint = f"{folder}, where nothing can be written ({error.strerror})", "Choose another folder"
+    got = f"{folder}, where nothing can be written ({error.strerror})"
+    hint = "Choose another folder"
     return BadInput("--out", "be a folder that can be made and written", got, hint=hint)
 
 
@@ -172,9 +176,9 @@ def _stage(folder: Path) -> Path:
     beside, inside = folder.parent / _staging_name(folder), folder / _staging_name(folder)
     staging = inside if folder.exists() else beside
     try:
-        for left in (beside, inside):
-            if left.is_dir():
-                shutil.rmtree(left)
+        for leftover in (beside, inside):
+            if leftover.is_dir():
+                shutil.rmtree(leftover)
         staging.mkdir(parents=True)
     except OSError as error:
         raise _unwritable(folder, error) from None
@@ -210,11 +214,11 @@ def _move(new: Path, old: Path) -> None:
 def _rescued(staging: Path, folder: Path) -> Path:
     """Where results are that could not be moved to their folder: under a name that no later command removes."""
     for number in itertools.count(1):
-        place = staging.with_name(f"{folder.resolve().name}-rescued-{number}")
-        if not place.exists():
+        target = staging.with_name(f"{folder.resolve().name}-rescued-{number}")
+        if not target.exists():
             with contextlib.suppress(OSError):
-                os.replace(staging, place)
-                return place
+                os.replace(staging, target)
+                return target
             return staging
     raise AssertionError("there are always further numbers")
 

@@ -46,7 +46,8 @@ def ros2(command: Ros2Command) -> int:
     names = Topics().remapped(command.remap or [])
     frames = Frames(tuple(command.world_frame or ()) or Frames().world, command.body_frame)
     reporter = Reporter(report)
-    domain, localhost = _domain(command.domain), command.localhost or _environment_says_localhost()
+    domain = _domain(command.domain)
+    localhost = command.localhost or _environment_says_localhost()
     bag = None if command.bag is None else BagWriter(command.bag, command.storage)
     reporter.say(f"compiling the {command.role}")
     compiled = _compiled_controller if command.role == "controller" else _compiled_vehicle
@@ -78,8 +79,10 @@ def _compiled_controller(command: Ros2Command, names: Any, frames: Any, reporter
     if command.duration is not None:
         checks.positive("--duration", command.duration, "s", finite=False)
     options_of_law = {"unsupervised": command.unsupervised, "allow_code": command.allow_code}
-    made = lambda: CompiledController(command.scenario, command.output or "input", command.rate, **options_of_law)
-    controller = interruptible(made)
+    make_controller = lambda: CompiledController(
+        command.scenario, command.output or "input", command.rate, **options_of_law
+    )
+    controller = interruptible(make_controller)
     settings = ControllerSettings(command.max_age, command.use_sim_time, names, frames)
 
     def run(link: Any) -> int:
@@ -95,7 +98,8 @@ def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: A
     if command.rate is not None:
         checks.positive("--rate", command.rate, "Hz")
     period = None if command.rate is None else 1 / command.rate
-    pace, duration = command.pace or "real-time", command.duration
+    pace = command.pace or "real-time"
+    duration = command.duration
     settings = VehicleSettings(pace, duration, command.max_age, topics=names, frames=frames)
 
     def made() -> Vehicle:
@@ -120,15 +124,15 @@ def _compiled_vehicle(command: Ros2Command, names: Any, frames: Any, reporter: A
     return run
 
 
-def _domain(given: int | None) -> int:
+def _domain(number: int | None) -> int:
     """The domain: as given, or that of ROS_DOMAIN_ID, or 0."""
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    if given is None and not text.isdecimal():
+    if number is None and not text.isdecimal():
         raise BadInput("ROS_DOMAIN_ID", "be a whole number", repr(text))
-    return int(text) if given is None else given
+    return int(text) if number is None else number
 
 
 def _environment_says_localhost() -> bool:
     """Whether the variables of ROS 2 keep its nodes on this machine."""
-    there = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
-    return there or os.environ.get("ROS_LOCALHOST_ONLY") == "1"
+    range_is_localhost = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+    return range_is_localhost or os.environ.get("ROS_LOCALHOST_ONLY") == "1"

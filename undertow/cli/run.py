@@ -60,8 +60,8 @@ def run(command: RunCommand) -> int:
 
 
 def _check(command: RunCommand) -> None:
-    kind, colon, rest = command.link.partition(":")
-    if not (command.link == "vehicle" or (kind in ("udp", "log") and colon and rest)):
+    kind, colon, address = command.link.partition(":")
+    if not (command.link == "vehicle" or (kind in ("udp", "log") and colon and address)):
         raise BadInput("--link", "be vehicle, udp:HOST:PORT or log:FILE", repr(command.link))
     if command.fast and kind == "udp":
         raise BadInput("--fast", "be left out with a link to a real vehicle", command.link)
@@ -73,8 +73,10 @@ def _check(command: RunCommand) -> None:
 
 def _controlled(built: Built, command: RunCommand) -> int:
     """The loop with the vehicle of the scenario, or one behind UDP, with a log."""
-    own, period, stop = command.link == "vehicle", float(built.scenario.loop.dt), EndingSignal()
-    duration = command.duration or (built.scenario.loop.duration if own else math.inf)
+    simulated = command.link == "vehicle"
+    period = float(built.scenario.loop.dt)
+    stop = EndingSignal()
+    duration = command.duration or (built.scenario.loop.duration if simulated else math.inf)
     steps = duration if math.isinf(duration) else round(duration / period)
     if steps < 1:
         raise BadInput("--duration", f"be at least one sampling time ({period:g} s)", f"{duration:g} s")
@@ -85,12 +87,13 @@ def _controlled(built: Built, command: RunCommand) -> int:
         pass
     with output_folder(command.out, Path("runs") / command.scenario.stem) as folder:
         check_folder(folder, _WRITTEN, "run.mcap", command.overwrite)
-        for one in built.advice():
-            typer.echo(f"Advice: {one.sentence}", err=True)
-        link = VehicleLink(built) if own else UdpVehicleLink(command.link.removeprefix("udp:"), built)
-        given, troubles = built if own else _starting_anywhere(built), list[str]()
+        for advice in built.advice():
+            typer.echo(f"Advice: {advice.sentence}", err=True)
+        link = VehicleLink(built) if simulated else UdpVehicleLink(command.link.removeprefix("udp:"), built)
+        built_for_link = built if simulated else _starting_anywhere(built)
+        troubles: list[str] = []
         with contextlib.nullcontext() if command.as_json else stage(wide_console(), "compiling"):
-            autopilot = interruptible(lambda: _autopilot(given, link.form or Format()))
+            autopilot = interruptible(lambda: _autopilot(built_for_link, link.form or Format()))
         (folder / _BEFORE).mkdir(parents=True, exist_ok=True)
         with logging_to(folder / _BEFORE / "run.mcap", autopilot, troubles):  # see `_begin_log`
             loop = RealTimeLoop(autopilot, link, clock, settings, stop.asked, lambda: _begin_log(folder))
@@ -99,14 +102,14 @@ def _controlled(built: Built, command: RunCommand) -> int:
             with stop.listening(), scheduled(command.priority, command.cpu):
                 reason = loop.run(periods=steps)
         if loop.statistics.steps:
-            found = _data(loop.statistics, link, autopilot, reason, command)
-            texts = {"scenario.yaml": dump(built.resolved), "statistics.json": json.dumps(found, indent=2) + "\n"}
+            statistics = _data(loop.statistics, link, autopilot, reason, command)
+            texts = {"scenario.yaml": dump(built.resolved), "statistics.json": json.dumps(statistics, indent=2) + "\n"}
             for name, text in texts.items():
                 try:
                     write_whole(folder / name, text)
                 except OSError as error:
                     troubles.append(f"{folder / name} could not be written: {error.strerror or error}")
-            _print(found, folder, command.as_json)
+            _print(statistics, folder, command.as_json)
         else:
             remove(folder / _BEFORE)
             with contextlib.suppress(OSError):  # it held something before
@@ -119,13 +122,13 @@ def _controlled(built: Built, command: RunCommand) -> int:
 def _safe(text: str, actuators: int) -> Any:
     """The safe output: one number, or one per actuator separated by commas."""
     try:
-        found = [float(one) for one in text.split(",")]
+        outputs = [float(number) for number in text.split(",")]
     except ValueError:
         raise BadInput("--safe", "be a number, or one per actuator separated by commas", repr(text)) from None
-    checks.finite("--safe", np.array(found))
-    if len(found) not in (1, actuators):
-        raise BadInput("--safe", f"be one number, or {actuators} separated by commas", len(found))
-    return found if len(found) > 1 else found[0]
+    checks.finite("--safe", np.array(outputs))
+    if len(outputs) not in (1, actuators):
+        raise BadInput("--safe", f"be one number, or {actuators} separated by commas", len(outputs))
+    return outputs if len(outputs) > 1 else outputs[0]
 
 
 def _starting_anywhere(built: Built) -> Built:
@@ -146,7 +149,7 @@ def _autopilot(built: Built, form: Format) -> Autopilot:
 
 
 def _data(
-    seen: LoopStatistics, link: AbstractLink, autopilot: Autopilot, reason: Reason, command: RunCommand
+    statistics: LoopStatistics, link: AbstractLink, autopilot: Autopilot, reason: Reason, command: RunCommand
 ) -> dict[str, Any]:
     """Everything about a run as JSON; times in s."""
     machine = {"python": platform.python_version(), "system": platform.platform(), "processors": os.cpu_count()}
@@ -157,7 +160,7 @@ def _data(
         "sampling_time": autopilot.sampling_time,
         "deadline": command.deadline or autopilot.sampling_time,
         "backend": autopilot.backend,
-        **seen.as_data(),
+        **statistics.as_data(),
         **_supervision(autopilot),
         "link_counts": dict(link.counts()),
         "autopilot_counts": autopilot.counts,
@@ -169,35 +172,43 @@ def _supervision(autopilot: Autopilot) -> dict[str, Any]:
     """Transitions of the supervisor; nothing without one, or where no step was taken."""
     if not autopilot.supervised:
         return {}
-    return {"transitions": [one._asdict() | {"state": one.state.name} for one in autopilot.transitions()]}
+    return {
+        "transitions": [
+            transition._asdict() | {"state": transition.state.name} for transition in autopilot.transitions()
+        ]
+    }
 
 
-def _print(found: dict[str, Any], folder: Path, as_json: bool) -> None:
+def _print(statistics: dict[str, Any], folder: Path, as_json: bool) -> None:
     if as_json:
-        typer.echo(json.dumps(found, indent=2))
+        typer.echo(json.dumps(statistics, indent=2))
         return
-    console, longest = wide_console(), 1e3 * found["longest_stale"]
-    if found["clock"] == "monotonic":
+    console = wide_console()
+    longest = 1e3 * statistics["longest_stale"]
+    if statistics["clock"] == "monotonic":
         table = titled("Times, ms", "", *(numbers(name) for name in ("mean", "p50", "p99", "p99.9", "max")))
         for name in ("computing", "lateness", "jitter"):
-            if found[name]:
-                cells = (f"{1e3 * found[name][share]:.3f}" for share in ("mean", "p50", "p99", "p99.9", "max"))
+            if statistics[name]:
+                cells = (f"{1e3 * statistics[name][share]:.3f}" for share in ("mean", "p50", "p99", "p99.9", "max"))
                 table.add_row({"lateness": "late start", "jitter": "jitter of the period"}.get(name, name), *cells)
         console.print(table)
     table = titled("Counts", "", numbers("number"))
     for name in ("steps", "overruns", "missed", "stale"):
-        said = {"missed": "missed periods", "stale": f"without a new measurement (longest {longest:.0f} ms)"}
-        table.add_row(said.get(name, name), str(found[name]))
-    for name, number in found["link_counts"].items():
+        labels = {"missed": "missed periods", "stale": f"without a new measurement (longest {longest:.0f} ms)"}
+        table.add_row(labels.get(name, name), str(statistics[name]))
+    for name, number in statistics["link_counts"].items():
         if number:
             table.add_row(f"link: {name}", str(number))
-    if found["autopilot_counts"]["not recorded"]:
-        table.add_row("not recorded: the disk was too slow", str(found["autopilot_counts"]["not recorded"]))
+    if statistics["autopilot_counts"]["not recorded"]:
+        table.add_row("not recorded: the disk was too slow", str(statistics["autopilot_counts"]["not recorded"]))
     console.print(table)
-    if "transitions" in found:
-        several = [SupervisorTransition(**one | {"state": State[one["state"]]}) for one in found["transitions"]]
-        console.print(terminal_table(transition_rows(several)))
-    console.print(f"Ended: {found['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
+    if "transitions" in statistics:
+        transitions = [
+            SupervisorTransition(**transition | {"state": State[transition["state"]]})
+            for transition in statistics["transitions"]
+        ]
+        console.print(terminal_table(transition_rows(transitions)))
+    console.print(f"Ended: {statistics['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 
 
 def _ending(reason: Reason, link: AbstractLink, command: RunCommand, stop: EndingSignal) -> int:
@@ -209,8 +220,8 @@ def _ending(reason: Reason, link: AbstractLink, command: RunCommand, stop: Endin
     elif reason is Reason.LINK_LOST:
         complain(f"no measurement for {command.max_age:g} s: the safe output was sent, and the run ended")
     elif reason is Reason.STALLED:
-        said = "the controller stood still for longer than --max-age"
-        complain(f"{said} ({command.max_age:g} s): the safe output was sent, and the run ended")
+        cause = "the controller stood still for longer than --max-age"
+        complain(f"{cause} ({command.max_age:g} s): the safe output was sent, and the run ended")
     elif reason is Reason.NO_START:
         complain(f"no first measurement within {command.patience:g} s over {command.link}; nothing was written")
     failed = (Reason.LINK_LOST, Reason.STALLED, Reason.NO_START)
@@ -228,21 +239,29 @@ def _replay(text: Text, built: Built, command: RunCommand) -> int:
     for note in link.notes:
         typer.echo(f"Note: {note}", err=True)
     reason = RealTimeLoop(autopilot, link, SimulatedClock()).run()
-    replayed, apart = link.counts()["replayed"], link.differences()
-    data = {"replayed": replayed, "ended": reason.value, "differences": [one._asdict() for one in apart]}
+    replayed = link.counts()["replayed"]
+    differences = link.differences()
+    data = {
+        "replayed": replayed,
+        "ended": reason.value,
+        "differences": [difference._asdict() for difference in differences],
+    }
     if command.as_json:
         typer.echo(json.dumps(data, indent=2))
-    elif apart:
+    elif differences:
         unit = autopilot.unit
         table = titled("Commands that differ", "actuator", *map(numbers, ("steps", "first, s", f"largest, {unit}")))
-        for one in apart:
-            table.add_row(one.actuator, str(one.steps), f"{one.first:.6g}", f"{one.largest:.3g}")
+        for difference in differences:
+            table.add_row(
+                difference.actuator, str(difference.steps), f"{difference.first:.6g}", f"{difference.largest:.3g}"
+            )
         wide_console().print(table)
     else:
         typer.echo(f"{replayed} steps replayed: every bit of the commands is that of the log.")
-    if apart:
-        complain(f"the commands of {max(one.steps for one in apart)} or more of {replayed} steps differ from the log")
-    return RUN_FAILED if apart else DONE
+    if differences:
+        differing_steps = max(difference.steps for difference in differences)
+        complain(f"the commands of {differing_steps} or more of {replayed} steps differ from the log")
+    return RUN_FAILED if differences else DONE
 
 
 def _serve(built: Built, command: RunCommand) -> int:
@@ -255,8 +274,10 @@ def _serve(built: Built, command: RunCommand) -> int:
             server.serve(lambda: stop.asked() or time.monotonic() >= end)
     finally:
         server.close()
-    said = ", ".join(f"{number} {name}" for name, number in server.counts().items() if number)
-    typer.echo(f"Ended. Commands: {said or 'none'}. The last one: {np.array2string(server.last_command, precision=4)}")
+    counts = ", ".join(f"{number} {name}" for name, number in server.counts().items() if number)
+    typer.echo(
+        f"Ended. Commands: {counts or 'none'}. The last one: {np.array2string(server.last_command, precision=4)}"
+    )
     if server.ended:
         complain(server.ended)
     return RUN_FAILED if server.ended else stop.exit_code

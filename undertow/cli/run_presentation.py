@@ -53,7 +53,7 @@ def present(
     result: ScenarioResult,
     plotting: PlottingProcess,
     predicting: Future[PredictedMetrics] | None,
-    asked: bool,
+    requested: bool,
     draft: Draft,
     folder: Path,
     console: Console,
@@ -64,7 +64,7 @@ def present(
         result: of the run.
         plotting: plots its figures.
         predicting: predicts its metrics; None for no prediction.
-        asked: whether the user asked for it: the reason is printed as well where there can be none.
+        requested: whether the user asked for it: the reason is printed as well where there can be none.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.
@@ -80,14 +80,14 @@ def present(
     draft.publish()  # nobody waits for the prediction, which is added to the page
     console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
     if predicting is not None:
-        _add_prediction(result, predicting, asked, draft, looks, console)
+        _add_prediction(result, predicting, requested, draft, looks, console)
     return looks.replay
 
 
 def _add_prediction(
     result: ScenarioResult,
     predicting: Future[PredictedMetrics],
-    asked: bool,
+    requested: bool,
     draft: Draft,
     looks: RunPageContents,
     console: Console,
@@ -100,7 +100,7 @@ def _add_prediction(
     if predicted.metrics is not None:
         write_run_page(draft.path / "run.html", result, looks, predicted.metrics)
     draft.publish()
-    if asked or not foregone:
+    if requested or not foregone:
         _print_prediction(predicted, result, console)
 
 
@@ -120,12 +120,14 @@ def comparison(predicted: PredictedMetrics, result: ScenarioResult) -> str:
         return f"No prediction: {predicted.why_not}"
     assert result.steady is not None  # or there were no prediction
     zero = _NOTHING * max(predicted.metrics.values())
-    compared = [one for one in compare_metrics(predicted.metrics, result.steady) if one.measured > zero]
-    departing = [one for one in compared if one.name not in _PEAKS and one.departure > _DEPARTS]
+    metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.measured > zero]
+    departing = [metric for metric in metrics if metric.name not in _PEAKS and metric.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
-    named = ", ".join(f"{one.name} {_by(one.departure)}" for one in departing)
-    return f"The run departs from the linear prediction by more than 10 %: {named}{_because(result, result.steady)}"
+    departures = ", ".join(f"{metric.name} {_by(metric.departure)}" for metric in departing)
+    return (
+        f"The run departs from the linear prediction by more than 10 %: {departures}{_because(result, result.steady)}"
+    )
 
 
 def _by(departure: float) -> str:
@@ -164,7 +166,7 @@ def _because(result: ScenarioResult, steady: Mapping[str, Any]) -> str:
 
 def _print_prediction(predicted: PredictedMetrics, result: ScenarioResult, console: Console) -> None:
     if predicted.metrics and result.steady:
-        known = result.facts.meanings
-        compared = [one for one in compare_metrics(predicted.metrics, result.steady) if one.name in known]
-        console.print(terminal_table(prediction_rows(compared, result.built.window(), known)))
+        meanings = result.facts.meanings
+        metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.name in meanings]
+        console.print(terminal_table(prediction_rows(metrics, result.built.window(), meanings)))
     console.print(f"{comparison(predicted, result)}.", highlight=False, soft_wrap=True)

@@ -66,8 +66,8 @@ def _run(path: Path, console: Console, allow_code: bool) -> ScenarioResult:
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    for one in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
-        typer.echo(f"Advice: {one.sentence}", err=True)
+    for advice in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
+        typer.echo(f"Advice: {advice.sentence}", err=True)
     with stage(console, "compiling and running"):
         return interruptible(lambda: run_scenario(built))
 
@@ -88,19 +88,22 @@ def _print_results(result: ScenarioResult, folder: Path, console: Console) -> No
     verdict = f"; {facts.success.sentence(facts.meanings)}" if facts.success else ""
     console.print(f"Status: {result.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
     for name, verdict in facts.requirements.items():
-        said = "holds" if verdict.holds else "is violated"
+        outcome = "holds" if verdict.holds else "is violated"
         console.print(
-            f"Requirement {name} {said}: robustness {verdict.robustness:.4g}", highlight=False, soft_wrap=True
+            f"Requirement {name} {outcome}: robustness {verdict.robustness:.4g}", highlight=False, soft_wrap=True
         )
-    own = own_parts(result.built.scenario, result.built.text.folder).get("controller")
-    if own and (result.status is not Status.OK or (result.success and not result.success.within)):
-        typer.echo(f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {own}", err=True)
+    controller = own_parts(result.built.scenario, result.built.text.folder).get("controller")
+    if controller and (result.status is not Status.OK or (result.success and not result.success.within)):
+        typer.echo(
+            f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {controller}", err=True
+        )
 
 
 def _ending_code(result: ScenarioResult) -> int:
     if result.status is Status.OK:
         return DONE
-    ended, duration = float(result.outcome.ended), result.built.scenario.loop.duration
+    ended = float(result.outcome.ended)
+    duration = result.built.scenario.loop.duration
     ending = f"ended as `{result.status.word}` at {ended:.4g} s of {duration:g} s"
     complain(f"the run {ending}. {result.facts.sentence}")
     return RUN_FAILED

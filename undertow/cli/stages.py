@@ -46,8 +46,14 @@ def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str,
 
     The remaining time can be shown too, for work that proceeds evenly.
     """
-    left = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), *left)
+    remaining_columns = (TextColumn("left"), TimeRemainingColumn()) if remaining else ()
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        *remaining_columns,
+    )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
         task = live.add_task("starting", total=1.0)
 

@@ -21,8 +21,8 @@ def numbers(title: str) -> Column:
 
 def terminal_table(rows: RunTable) -> Table:
     """A table of a run: names on the left, numbers set to the right, units and sentences as they are."""
-    first, *others = rows.head
-    table = titled(rows.title, first, *(title if title == "unit" else numbers(title) for title in others))
+    first, *further_heads = rows.head
+    table = titled(rows.title, first, *(title if title == "unit" else numbers(title) for title in further_heads))
     for row in rows.rows:
         table.add_row(*map(plain, row))
     if rows.sentences:
@@ -41,8 +41,11 @@ class _Output(Console):
         super().__init__(markup=False, emoji=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        shown = (one if one.isprintable() or one == "\n" else one.encode("unicode_escape").decode() for one in text)
-        return super().render_str("".join(shown), **options)
+        characters = (
+            character if character.isprintable() or character == "\n" else character.encode("unicode_escape").decode()
+            for character in text
+        )
+        return super().render_str("".join(characters), **options)
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has caught, and would end the process for

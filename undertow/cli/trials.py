@@ -71,7 +71,7 @@ def trials_folder(
             hint = "Add --resume to continue it, or --overwrite to replace it"
             marker = STORE if (folder / STORE).exists() else before
             results_folder.check_folder(folder, written, marker, overwrite, hint)
-        elif not any((folder / one).exists() for one in (STORE, before)):
+        elif not any((folder / entry).exists() for entry in (STORE, before)):
             hint = "Leave --resume out to start one"
             raise BadInput("--resume", "find a campaign to continue", f"none in {folder}", hint=hint)
         yield folder
@@ -98,8 +98,8 @@ def resumable(folder: Path, command: Sequence[str]) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, OSError):
         if (folder / STORE).is_dir():
-            again = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
-            typer.echo(f"Stopped{_kept(folder)}. To continue: {again}", err=True)
+            resume_command = shlex.join(["undertow", *command, "--out", str(folder), "--resume"])
+            typer.echo(f"Stopped{_kept(folder)}. To continue: {resume_command}", err=True)
         raise
 
 
@@ -147,17 +147,17 @@ def _clear(folder: Path, names: Sequence[str]) -> None:
 @contextlib.contextmanager
 def _live(console: Console, resumed: bool) -> Iterator[Watch]:
     """Show the number of finished trials, their rate and the remaining time; first, where resumed, what is kept."""
-    begun, first = time.perf_counter(), None
+    start_time, first = time.perf_counter(), None
     with shares(console, remaining=True) as progress:
 
         def watch(tally: Tally) -> None:
             nonlocal first
             if first is None and resumed:
-                again = "" if tally.done == tally.trials else "; chunks that were not finished run again"
-                kept = f"continuing: {tally.done} of {tally.trials} trials kept{again}"
-                console.print(kept, highlight=False)
+                remark = "" if tally.done == tally.trials else "; chunks that were not finished run again"
+                message = f"continuing: {tally.done} of {tally.trials} trials kept{remark}"
+                console.print(message, highlight=False)
             first = tally.done if first is None else first
-            rate = (tally.done - first) / max(time.perf_counter() - begun, 1e-9)
+            rate = (tally.done - first) / max(time.perf_counter() - start_time, 1e-9)
             invalid = f", {tally.invalid} invalid" if tally.invalid else ""
             waiting = "compiling" if tally.done < tally.trials else "all trials are done"
             text = f"{rate:.3g} per second, {tally.failed} failed{invalid}" if tally.done > first else waiting

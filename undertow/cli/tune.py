@@ -35,7 +35,8 @@ def tune_scenario(command: TuneCommand) -> int:
     check_pdf(command.pdf)
     checks.choice("--method", method, METHODS)
     checks.positive("--budget", budget, "s")
-    console, first = wide_console(), Path("runs") / f"{command.scenario.stem}-tuned"
+    console = wide_console()
+    first = Path("runs") / f"{command.scenario.stem}-tuned"
     text = read(command.scenario, allow_code=command.allow_code)
     out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
@@ -45,15 +46,15 @@ def tune_scenario(command: TuneCommand) -> int:
     ):
         with _live(console, budget) as (say, watch):
             options: dict[str, Any] = {"method": method, "budget": budget, "started": command.since, "resume": resume}
-            found = interruptible(lambda: tune(text, checkpoint, **options, say=say, watch=watch))
-        data = as_data(found)
-        (draft.path / "tuned.yaml").write_text(as_scenario(found), encoding="utf-8")
+            tuning = interruptible(lambda: tune(text, checkpoint, **options, say=say, watch=watch))
+        data = as_data(tuning)
+        (draft.path / "tuned.yaml").write_text(as_scenario(tuning), encoding="utf-8")
         (draft.path / "tuning.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         draft.publish()  # before the figure, which may fail
         checkpoint.unlink()
         warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures", command.pdf).failures)
-    console.print(_table(found))
-    for line in _sentences(found):
+    console.print(_table(tuning))
+    for line in _sentences(tuning):
         console.print(line, highlight=False, soft_wrap=True)
     console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
     return DONE
@@ -74,47 +75,53 @@ def _live(
                 console.print(stage, highlight=False)
 
         def watch(best: Improvement, evaluations: int) -> None:
-            left = max(0.0, budget - best.elapsed)
+            remaining = max(0.0, budget - best.elapsed)
             line = f"{evaluations} evaluations, best cost {best.cost:.4g}, spectral radius {best.radius:.5f}"
-            live.update(task, description=line, completed=best.elapsed, left=f"{left:.0f} s left at most")
+            live.update(task, description=line, completed=best.elapsed, left=f"{remaining:.0f} s left at most")
             if not console.is_terminal:
                 console.print(line, highlight=False)
 
         yield say, watch
 
 
-def _table(found: Tuned) -> Table:
+def _table(tuning: Tuned) -> Table:
     columns = ("training", "held out", "tracking", "effort", "variation", "failure", "spectral radius")
     table = titled("Cost, mean over runs", "gains", *map(numbers, columns))
-    for one in found.evaluated:
-        parts = [f"{float(part.mean()):.4g}" for part in one.held_out]
+    for gains in tuning.evaluated:
+        parts = [f"{float(part.mean()):.4g}" for part in gains.held_out]
         table.add_row(
-            one.name, f"{one.train_cost:.4g}", f"{one.held_out_cost:.4g}", *parts, f"{one.certificate.worst:.5f}"
+            gains.name,
+            f"{gains.train_cost:.4g}",
+            f"{gains.held_out_cost:.4g}",
+            *parts,
+            f"{gains.certificate.worst:.5f}",
         )
     return table
 
 
-def _sentences(found: Tuned) -> list[str]:
-    given, *_, tuned = found.evaluated
-    kept = found.kept
+def _sentences(tuning: Tuned) -> list[str]:
+    scenario_gains, *_, tuned = tuning.evaluated
+    chosen_gains = tuning.kept
     options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
-    ending = "the search has converged" if found.finished else "the time budget is used up"
-    if found.searched == 0:
+    ending = "the search has converged" if tuning.finished else "the time budget is used up"
+    if tuning.searched == 0:
         ending += ", and only the initial design (the given gains and points spread over their ranges) was evaluated"
-    if kept is given:
-        said = (
-            f"The given gains are kept: on held-out runs their cost is {given.held_out_cost:.4g}, and "
+    if chosen_gains is scenario_gains:
+        summary = (
+            f"The given gains are kept: on held-out runs their cost is {scenario_gains.held_out_cost:.4g}, and "
             f"{tuned.held_out_cost:.4g} with the best that were found ({options})."
         )
     else:
-        uncertified = "" if given.certificate.holds else ", which have no certificate of stability"
-        said = (
+        uncertified = "" if scenario_gains.certificate.holds else ", which have no certificate of stability"
+        summary = (
             f"Tuned: {options}\n"
-            f"The held-out cost is {times_other(tuned.held_out_cost, given.held_out_cost)} with the given gains"
-            f"{uncertified}."
+            f"The held-out cost is {times_other(tuned.held_out_cost, scenario_gains.held_out_cost)} with the given "
+            f"gains{uncertified}."
         )
-    spent = f"{found.evaluations} evaluations, {found.rejected} rejected without a certificate, {found.elapsed:.0f} s"
-    return [f"{said} {spent}; {ending}."]
+    spent = (
+        f"{tuning.evaluations} evaluations, {tuning.rejected} rejected without a certificate, {tuning.elapsed:.0f} s"
+    )
+    return [f"{summary} {spent}; {ending}."]
 
 
 def _short(value: Any) -> str:

@@ -61,8 +61,8 @@ def replacing_folder(path: Path) -> Iterator[Path]:
             raise
         sync(path.parent)
     finally:
-        for left in (new, old):
-            shutil.rmtree(left, ignore_errors=True)
+        for leftover in (new, old):
+            shutil.rmtree(leftover, ignore_errors=True)
 
 
 def fsync_tree(path: Path) -> None:

@@ -12,8 +12,8 @@ BEYOND = 1e9  # more than any actuator takes, in its unit
 def limits_of(plant: AbstractPlant, x: PyTree) -> tuple[Inputs, Inputs]:
     """Least and largest input that a plant takes in a state; infinite where there is no limit."""
     beyond = jnp.full(plant.inputs(), BEYOND)
-    found = (plant.admissible(x, sign * beyond) for sign in (-1.0, 1.0))
-    low, high = (jnp.where(jnp.abs(limit) < beyond, limit, jnp.inf * jnp.sign(limit)) for limit in found)
+    limits = (plant.admissible(x, sign * beyond) for sign in (-1.0, 1.0))
+    low, high = (jnp.where(jnp.abs(limit) < beyond, limit, jnp.inf * jnp.sign(limit)) for limit in limits)
     return low, high
 
 

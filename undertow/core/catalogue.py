@@ -120,10 +120,10 @@ def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Map
         BadInput: there is no such preset, or it has no such option.
     """
     check_preset(presets, preset)
-    known = list(inspect.signature(presets[preset]).parameters)[1:]
+    option_names = list(inspect.signature(presets[preset]).parameters)[1:]
     for name in options:
-        if name not in known:
-            raise BadInput(name, f"be an option of preset `{preset}`", "unknown", hint=did_you_mean(name, known))
+        if name not in option_names:
+            raise BadInput(name, f"be an option of preset `{preset}`", "unknown", hint=did_you_mean(name, option_names))
     return presets[preset](model, **options)
 
 
@@ -179,8 +179,9 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, [*presets(kind), *parts]) if parts else "Name a file of your own: ./file.py:function"
-        other = next((one for one in KINDS if one != kind and name in names(one)), None) if parts else None
-        hint = f"`{name}` is one of the {other}: give it at `{KEY_OF[other]}`" if other else hint
+        kinds_with_it = (part_kind for part_kind in KINDS if part_kind != kind and name in names(part_kind))
+        other_kind = next(kinds_with_it, None) if parts else None
+        hint = f"`{name}` is one of the {other_kind}: give it at `{KEY_OF[other_kind]}`" if other_kind else hint
         hint = f"Did you mean `{_OTHER_WORDS[name.lower()]}`?" if _OTHER_WORDS.get(name.lower()) in parts else hint
         if kind == "plants" and name.endswith((".yaml", ".yml")):
             hint = f"A vehicle file is named as `plant: {{vehicle: {name}}}`"
@@ -216,8 +217,8 @@ def _from_file(name: str, folder: Path, what: str) -> Part:
         if isinstance(error, KeyboardInterrupt):
             raise
         fault = fault_of(error)
-        says = f"{'' if fault.says.startswith('cannot') else 'Python cannot run it: '}{fault.says}"
-        raise BadInput(what, "", says, hint=fault.hint) from error
+        message = f"{'' if fault.says.startswith('cannot') else 'Python cannot run it: '}{fault.says}"
+        raise BadInput(what, "", message, hint=fault.hint) from error
     part = getattr(module, attribute, None)
     if not callable(part):
         functions, classes = _defined_in(path)

@@ -37,10 +37,10 @@ class Unknown(Exception):
 @contextlib.contextmanager
 def recorded_conditions() -> Iterator[list[Any]]:
     """Inside, every check of a traced value becomes a condition in this list: a traced boolean."""
-    found = _Record([], get_opaque_trace_state())
-    outside = _record.set(found)
+    record = _Record([], get_opaque_trace_state())
+    outside = _record.set(record)
     try:
-        yield found.conditions
+        yield record.conditions
     finally:
         _record.reset(outside)
 
@@ -53,7 +53,7 @@ def _recorded() -> list[Any] | None:
 
 def traced(*values: Any) -> bool:
     """Whether some of the values, or of the entries of lists, are traced."""
-    return any(traced(*one) if isinstance(one, list | tuple) else isinstance(one, Tracer) for one in values)
+    return any(traced(*value) if isinstance(value, list | tuple) else isinstance(value, Tracer) for value in values)
 
 
 def known(*values: Any) -> bool:
@@ -76,8 +76,8 @@ def assumed(condition: Callable[..., Any], *values: Any) -> bool:
     """
     if not traced(*values):
         return bool(condition(*map(np.asarray, values)))
-    if (found := _recorded()) is not None:
-        found.append(condition(*map(jnp.asarray, values)))
+    if (conditions := _recorded()) is not None:
+        conditions.append(condition(*map(jnp.asarray, values)))
     return True
 
 
@@ -105,12 +105,12 @@ def numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     try:
         if np.asarray(value).dtype.kind in "SU":  # NumPy takes "10" for a number
             raise TypeError
-        found = np.asarray(value, dtype=float)
+        array = np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise BadInput(name, "be numbers" if shape else "be a number", repr(value)) from None
-    if found.shape != shape:
-        raise BadInput(name, f"have shape {shape}", f"of shape {found.shape}")
-    return found
+    if array.shape != shape:
+        raise BadInput(name, f"have shape {shape}", f"of shape {array.shape}")
+    return array
 
 
 def length(name: str, value: Any, expected: int, what: str) -> None:

@@ -32,8 +32,8 @@ def parts_of(model: Model) -> tuple[Parts, tuple[int, ...]]:
     """Models of the subsystems of a model, and their numbers of inputs; the model itself where it is of one."""
     if isinstance(model.dynamics, CompositeDynamics):
         return model.dynamics.parts, model.dynamics.inputs
-    still = jnp.zeros(len(model.coordinates.angles))
-    return (model,), (model.dynamics.gain(model.coordinates.measurement(still, still)).shape[1],)
+    zeros = jnp.zeros(len(model.coordinates.angles))
+    return (model,), (model.dynamics.gain(model.coordinates.measurement(zeros, zeros)).shape[1],)
 
 
 def split(values: Float[Array, " k"], sizes: tuple[int, ...]) -> tuple[Array, ...]:
@@ -46,16 +46,17 @@ def split_measurement(coordinates: tuple[AbstractCoordinates, ...], y: Measureme
     """Measurement of each subsystem: its own outputs, and the report of its own actuators."""
     if len(coordinates) == 1:
         return (y,)
-    sizes = tuple(len(one.angles) for one in coordinates)
+    sizes = tuple(len(part.angles) for part in coordinates)
     reports = (None,) * len(sizes) if y.actuator is None else y.actuator
-    each = zip(coordinates, split(y.position, sizes), split(y.velocity, sizes), reports, strict=True)
-    return tuple(one.measurement(position, velocity, report) for one, position, velocity, report in each)
+    subsystems = zip(coordinates, split(y.position, sizes), split(y.velocity, sizes), reports, strict=True)
+    return tuple(part.measurement(position, velocity, report) for part, position, velocity, report in subsystems)
 
 
 def split_target(coordinates: tuple[AbstractCoordinates, ...], r: Target) -> tuple[Target, ...]:
     """Reference of each subsystem."""
-    sizes = tuple(len(one.angles) for one in coordinates)
-    return tuple(Target(*parts) for parts in zip(*(split(one, sizes) for one in r), strict=True))
+    sizes = tuple(len(part.angles) for part in coordinates)
+    rows_of_parts = [split(row, sizes) for row in r]
+    return tuple(Target(*rows) for rows in zip(*rows_of_parts, strict=True))
 
 
 class CompositeCoordinates(AbstractCoordinates):
@@ -70,26 +71,32 @@ class CompositeCoordinates(AbstractCoordinates):
         return Measurement(position, velocity, actuator)
 
     def tracking_error(self, y: Measurement, r: Target) -> TrackingError:
-        each = zip(self.parts, split_measurement(self.parts, y), split_target(self.parts, r), strict=True)
-        found = [part.tracking_error(own, target) for part, own, target in each]
-        return TrackingError(*(jnp.concatenate(rows) for rows in zip(*found, strict=True)))
+        subsystems = zip(self.parts, split_measurement(self.parts, y), split_target(self.parts, r), strict=True)
+        errors = [part.tracking_error(measurement, target) for part, measurement, target in subsystems]
+        return TrackingError(*(jnp.concatenate(rows) for rows in zip(*errors, strict=True)))
 
     def velocity(self, y: Measurement):
-        each = zip(self.parts, split_measurement(self.parts, y), strict=True)
-        return jnp.concatenate([part.velocity(own) for part, own in each])
+        subsystems = zip(self.parts, split_measurement(self.parts, y), strict=True)
+        return jnp.concatenate([part.velocity(measurement) for part, measurement in subsystems])
 
     def with_velocity(self, y: Measurement, velocity):
-        each = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
-        rates = [part.with_velocity(own, given).velocity for part, own, given in each]
+        subsystems = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
+        rates = [
+            part.with_velocity(measurement, part_velocity).velocity for part, measurement, part_velocity in subsystems
+        ]
         return y._replace(velocity=jnp.concatenate(rates))
 
     def acceleration(self, y: Measurement, acceleration):
-        each = zip(self.parts, split_measurement(self.parts, y), self._split(acceleration), strict=True)
-        return jnp.concatenate([part.acceleration(own, given) for part, own, given in each])
+        subsystems = zip(self.parts, split_measurement(self.parts, y), self._split(acceleration), strict=True)
+        return jnp.concatenate(
+            [part.acceleration(measurement, part_acceleration) for part, measurement, part_acceleration in subsystems]
+        )
 
     def output_velocity(self, y: Measurement, velocity):
-        each = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
-        return jnp.concatenate([part.output_velocity(own, given) for part, own, given in each])
+        subsystems = zip(self.parts, split_measurement(self.parts, y), self._split(velocity), strict=True)
+        return jnp.concatenate(
+            [part.output_velocity(measurement, part_velocity) for part, measurement, part_velocity in subsystems]
+        )
 
     def in_body_axes(self, dynamics: "CompositeDynamics") -> Model | None:
         """Every subsystem in its body axes; None where none has any."""
@@ -103,13 +110,13 @@ class CompositeCoordinates(AbstractCoordinates):
 
 def _side_by_side(parts: tuple[AbstractCoordinates, ...]) -> CompositeCoordinates:
     """Coordinates of all; names of axes have the number of the subsystem, and there are none where one has none."""
-    first, *others = (part.tolerated_status for part in parts)
-    named = [f"{name}_{i + 1}" for i, part in enumerate(parts) for name in part.axes]
+    first, *other_flags = (part.tolerated_status for part in parts)
+    axis_names = [f"{name}_{i + 1}" for i, part in enumerate(parts) for name in part.axes]
     return CompositeCoordinates(
         parts=parts,
         angles=tuple(angle for part in parts for angle in part.angles),
-        tolerated_status=tuple(one for one in first if all(one in other for other in others)),
-        axes=tuple(named) if all(part.axes for part in parts) else (),
+        tolerated_status=tuple(flag for flag in first if all(flag in flags for flags in other_flags)),
+        axes=tuple(axis_names) if all(part.axes for part in parts) else (),
     )
 
 
@@ -120,12 +127,12 @@ class CompositeDynamics(AbstractDynamics):
     inputs: tuple[int, ...] = eqx.field(static=True)
 
     def drift(self, y: Measurement):
-        return jnp.concatenate([part.dynamics.drift(own) for part, own in self._each(y)])
+        return jnp.concatenate([part.dynamics.drift(measurement) for part, measurement in self._each(y)])
 
     def gain(self, y: Measurement):
         rows, before = [], 0
-        for (part, own), count in zip(self._each(y), self.inputs, strict=True):
-            block = part.dynamics.gain(own)
+        for (part, measurement), count in zip(self._each(y), self.inputs, strict=True):
+            block = part.dynamics.gain(measurement)
             after = sum(self.inputs) - before - count
             rows.append(jnp.pad(block, ((0, 0), (before, after))))
             before += count
@@ -133,8 +140,10 @@ class CompositeDynamics(AbstractDynamics):
 
     def invert(self, y: Measurement, acceleration):
         sizes = tuple(len(part.coordinates.angles) for part in self.parts)
-        each = zip(self._each(y), split(acceleration, sizes), strict=True)
-        return jnp.concatenate([part.dynamics.invert(own, demanded) for (part, own), demanded in each])
+        subsystems = zip(self._each(y), split(acceleration, sizes), strict=True)
+        return jnp.concatenate(
+            [part.dynamics.invert(measurement, demanded) for (part, measurement), demanded in subsystems]
+        )
 
     def _each(self, y: Measurement) -> list[tuple[Model, Measurement]]:
         coordinates = tuple(part.coordinates for part in self.parts)
@@ -152,33 +161,39 @@ class CompositeActuators(AbstractActuatorModel):
 
     def time_constant(self):
         """That of the slowest; None where one is unknown."""
-        each = [part.time_constant() for part in self.parts]
-        known = [jnp.max(one) for one in each if one is not None]
-        return jnp.stack(known).max() if len(known) == len(each) else None
+        time_constants = [part.time_constant() for part in self.parts]
+        maxima = [jnp.max(time_constant) for time_constant in time_constants if time_constant is not None]
+        return jnp.stack(maxima).max() if len(maxima) == len(time_constants) else None
 
     def init(self) -> tuple[Any, ...]:
         return tuple(part.init() for part in self.parts)
 
     def update_from_report(self, state, report) -> tuple[Any, ...]:
         reports = (None,) * len(self.parts) if report is None else report
-        each = zip(self.parts, state, reports, strict=True)
-        return tuple(part.update_from_report(own, given) for part, own, given in each)
+        subsystems = zip(self.parts, state, reports, strict=True)
+        return tuple(part.update_from_report(part_state, part_report) for part, part_state, part_report in subsystems)
 
     def range(self, state, rate):
-        each = [part.range(own, rate) for part, own in zip(self.parts, state, strict=True)]
-        return self._joined([low for low, _ in each]), self._joined([high for _, high in each])
+        ranges = [part.range(part_state, rate) for part, part_state in zip(self.parts, state, strict=True)]
+        return self._joined([low for low, _ in ranges]), self._joined([high for _, high in ranges])
 
     def force(self, state, u):
-        return self._joined([part.force(own, given) for part, own, given in self._each(state, u)])
+        return self._joined(
+            [part.force(part_state, part_input) for part, part_state, part_input in self._each(state, u)]
+        )
 
     def command(self, state, force, rate):
-        return self._joined([part.command(own, given, rate) for part, own, given in self._each(state, force)])
+        return self._joined(
+            [part.command(part_state, part_force, rate) for part, part_state, part_force in self._each(state, force)]
+        )
 
     def target_of(self, state, u, rate):
-        return self._joined([part.target_of(own, given, rate) for part, own, given in self._each(state, u)])
+        return self._joined(
+            [part.target_of(part_state, part_input, rate) for part, part_state, part_input in self._each(state, u)]
+        )
 
     def advance(self, state, u, dt) -> tuple[Any, ...]:
-        return tuple(part.advance(own, given, dt) for part, own, given in self._each(state, u))
+        return tuple(part.advance(part_state, part_input, dt) for part, part_state, part_input in self._each(state, u))
 
     def dead_zone(self):
         """That of the subsystem with the largest."""
@@ -192,5 +207,5 @@ class CompositeActuators(AbstractActuatorModel):
 
     def _joined(self, values) -> Array:
         """One entry per actuator, of values that hold for each or for one."""
-        each = zip(values, self.inputs, strict=True)
-        return jnp.concatenate([jnp.broadcast_to(jnp.asarray(value), (count,)) for value, count in each])
+        values_and_counts = zip(values, self.inputs, strict=True)
+        return jnp.concatenate([jnp.broadcast_to(jnp.asarray(value), (count,)) for value, count in values_and_counts])

@@ -54,10 +54,10 @@ def within(
 
 def _placed(name: str, where: str) -> tuple[str, str]:
     """Key path of a name from the outermost place that the code stands within, and its location."""
-    for place in reversed(_PLACES.get()):
-        where = where or place.location(name)
-        where = ", ".join(filter(None, (where, place.note)))
-        name = ".".join(filter(None, (place.key, place.written(name)))).replace(".[", "[")
+    for scope in reversed(_PLACES.get()):
+        where = where or scope.location(name)
+        where = ", ".join(filter(None, (where, scope.note)))
+        name = ".".join(filter(None, (scope.key, scope.written(name)))).replace(".[", "[")
     return name, where
 
 
@@ -97,22 +97,22 @@ class BadInput(ValueError):
 
     def __str__(self) -> str:
         got = "" if self.got is None else f", but is {_one_line(self.got)}"
-        says = f"`{_one_line(self.name)}` must {self.must}{got}"
+        message = f"`{_one_line(self.name)}` must {self.must}{got}"
         if not self.must:
             failed = _one_line(self.got)
-            says = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
-        return _sentence(says, self.where, self.hint)
+            message = f"`{_one_line(self.name)}`: {failed}" if self.name else failed[:1].upper() + failed[1:]
+        return _sentence(message, self.where, self.hint)
 
 
-def _sentence(says: str, where: str, hint: str) -> str:
-    place = f" ({where})" if where else ""
-    return printable(f"{says}{place}{f'. {hint}' if hint else ''}")
+def _sentence(message: str, where: str, hint: str) -> str:
+    location = f" ({where})" if where else ""
+    return printable(f"{message}{location}{f'. {hint}' if hint else ''}")
 
 
-def known_key(key: str, known: Iterable[str]) -> str:
+def known_key(key: str, candidates: Iterable[str]) -> str:
     """As `did_you_mean`, for a key; digits are what follows the decimal comma of `{supply: 16,5}`."""
     comma = "Write a decimal point: in braces, a comma starts a new key"
-    return comma if key.isdecimal() else did_you_mean(key, known)
+    return comma if key.isdecimal() else did_you_mean(key, candidates)
 
 
 def joined(*hints: str) -> str:
@@ -120,15 +120,15 @@ def joined(*hints: str) -> str:
     return ". ".join(filter(None, hints)).replace("?. ", "? ")
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str:
+def did_you_mean(word: str, candidates: Iterable[str]) -> str:
     """Sentence naming the nearest known word, or all of them when none is near."""
-    known = sorted(set(known))
-    return nearest(word, known) or f"Known: {', '.join(known)}"
+    candidates = sorted(set(candidates))
+    return nearest(word, candidates) or f"Known: {', '.join(candidates)}"
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
+def nearest(word: str, candidates: Iterable[str]) -> str:
     """Sentence naming the nearest known word, capital letters aside; empty when none is near."""
-    by_small = {one.lower(): one for one in known}
+    by_small = {candidate.lower(): candidate for candidate in candidates}
     near = difflib.get_close_matches(str(word).lower(), list(by_small), n=1, cutoff=0.6)
     return f"Did you mean `{by_small[near[0]]}`?" if near else ""
 
@@ -136,8 +136,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def printable(text: str) -> str:
     """Text in one line of words that can be shown: characters that act on a terminal are written as escapes."""
     words = (word if len(word) <= _LONGEST else f"{word[: _LONGEST - 3]}..." for word in text.split())
-    shown = (one if one.isprintable() else one.encode("unicode_escape").decode() for one in " ".join(words))
-    return "".join(shown)
+    characters = (
+        character if character.isprintable() else character.encode("unicode_escape").decode()
+        for character in " ".join(words)
+    )
+    return "".join(characters)
 
 
 def _one_line(value: object) -> str:

@@ -36,25 +36,25 @@ class Expected(NamedTuple):
 
     def repaired(self, coordinates: AbstractCoordinates, y: Measurement) -> tuple[Measurement, "Expected"]:
         """Measurement with expected values in place of entries that are not finite, and the state with the count."""
-        own = lambda read, expected: jnp.where(is_finite(read), read, expected)
-        actuator = jax.tree.map(own, y.actuator, self.actuator)
+        finite_or_expected = lambda read, expected: jnp.where(is_finite(read), read, expected)
+        actuator = jax.tree.map(finite_or_expected, y.actuator, self.actuator)
 
         def repaired():
             still = coordinates.measurement(self.position, jnp.zeros_like(self.position))
             velocity = coordinates.output_velocity(still, self.rates)
-            outputs = own(y.position, self.position), own(y.velocity, velocity)
+            outputs = finite_or_expected(y.position, self.position), finite_or_expected(y.velocity, velocity)
             return with_outputs(y, *outputs)._replace(actuator=actuator)
 
         finite = all_finite((y.position, y.velocity))
-        whole = jax.lax.cond(finite, lambda: y._replace(actuator=actuator), repaired)
-        return whole, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
+        measurement = jax.lax.cond(finite, lambda: y._replace(actuator=actuator), repaired)
+        return measurement, self._replace(replaced=self.replaced + jnp.where(all_finite(y), 0, 1))
 
     def after(
         self, law: AbstractController, z: Any, y: Measurement, estimate: Outputs | None, applied: Inputs, dt: Time
     ) -> "Expected":
         """One sampling time later, with an input applied; `estimate` is d_hat of a law that has one."""
-        known = law.known_acceleration(z, y, applied)
-        acceleration = known if estimate is None else known + estimate
+        modelled = law.known_acceleration(z, y, applied)
+        acceleration = modelled if estimate is None else modelled + estimate
         rates = law.model.coordinates.velocity(y) + dt * acceleration
         return Expected(y.position + dt * y.velocity, rates, y.actuator, self.replaced)
 

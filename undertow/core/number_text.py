@@ -17,7 +17,7 @@ def number_in(text: str) -> float:
         return float(text)
     if not _NUMBER.fullmatch(text):
         raise ValueError(f"not a number: {text}")
-    found = float(text)
-    if math.isinf(found):
+    number = float(text)
+    if math.isinf(number):
         raise ValueError(f"too large: {text}")
-    return found
+    return number

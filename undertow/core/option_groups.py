@@ -27,21 +27,26 @@ def flat_options(*without: str) -> Callable[[Callable[..., Part]], Callable[...,
 
     def decorate(function: Callable[..., Part]) -> Callable[..., Part]:
         parameters = list(inspect.signature(function).parameters.values())
-        groups = {one.name: one.default for one in parameters if isinstance(one.default, OptionGroup)}
+        groups = {
+            parameter.name: parameter.default for parameter in parameters if isinstance(parameter.default, OptionGroup)
+        }
         options = {name: _options_of(group, without) for name, group in groups.items()}
 
         @functools.wraps(function)
-        def flat(*arguments: Any, **given: Any) -> Part:
+        def flat(*arguments: Any, **keywords: Any) -> Part:
             for name, group in groups.items():
-                chosen = {option: given.pop(option) for option in options[name] if option in given}
-                given[name] = dataclasses.replace(given.get(name, group), **chosen)
-            return function(*arguments, **given)
+                group_options = {option: keywords.pop(option) for option in options[name] if option in keywords}
+                keywords[name] = dataclasses.replace(keywords.get(name, group), **group_options)
+            return function(*arguments, **keywords)
 
-        hints, shown = get_type_hints(function, include_extras=True), []
+        hints = get_type_hints(function, include_extras=True)
+        flat_parameters: list[inspect.Parameter] = []
         for parameter in parameters:
-            own = [parameter.replace(annotation=hints.get(parameter.name, parameter.annotation))]
-            shown += options[parameter.name].values() if parameter.name in groups else own
-        set_signature(flat, inspect.Signature(shown, return_annotation=hints.get("return", inspect.Signature.empty)))
+            annotated = parameter.replace(annotation=hints.get(parameter.name, parameter.annotation))
+            flat_parameters += options[parameter.name].values() if parameter.name in groups else [annotated]
+        set_signature(
+            flat, inspect.Signature(flat_parameters, return_annotation=hints.get("return", inspect.Signature.empty))
+        )
         for name, group in groups.items():
             flat.__doc__ = _explained(flat.__doc__ or "", group, options[name])
         return flat
@@ -52,9 +57,11 @@ def flat_options(*without: str) -> Callable[[Callable[..., Part]], Callable[...,
 def set_signature(function: Callable[..., Any], signature: inspect.Signature) -> None:
     """Let a function have a signature, also for those who read its annotations."""
     function.__signature__ = signature  # type: ignore[attr-defined] - `inspect` reads it where it is there
-    annotations = {one.name: one.annotation for one in signature.parameters.values()}
+    annotations = {parameter.name: parameter.annotation for parameter in signature.parameters.values()}
     annotations["return"] = signature.return_annotation
-    function.__annotations__ = {name: one for name, one in annotations.items() if one is not inspect.Signature.empty}
+    function.__annotations__ = {
+        name: annotation for name, annotation in annotations.items() if annotation is not inspect.Signature.empty
+    }
 
 
 def _options_of(group: OptionGroup, without: tuple[str, ...]) -> dict[str, inspect.Parameter]:
@@ -75,6 +82,6 @@ def _explained(text: str, group: OptionGroup, options: dict[str, inspect.Paramet
         for line, (name, _) in zip(lines, entries, strict=True)
         if name in options and not re.search(rf"^ +{name}: ", text, re.MULTILINE)
     ]
-    head, section, rest = text.partition("    Args:\n")
-    arguments, gap, after = rest.partition("\n\n")
+    head, section, following = text.partition("    Args:\n")
+    arguments, gap, after = following.partition("\n\n")
     return "\n".join([head + section + arguments, *missing]) + gap + after

@@ -87,9 +87,9 @@ def parameters(part: eqx.Module | type, prefix: str = "") -> Iterator[Parameter]
             continue
         if "unit" in field.metadata:
             meta = field.metadata
-            own = sources.get(field.name, sources.get("*", "")) or meta["source"]
-            shown = value if isinstance(value, str) else np.asarray(value).tolist()
-            yield Parameter(name, shown, meta["unit"], meta["meaning"], meta["symbol"], own)
+            source = sources.get(field.name, sources.get("*", "")) or meta["source"]
+            plain_value = value if isinstance(value, str) else np.asarray(value).tolist()
+            yield Parameter(name, plain_value, meta["unit"], meta["meaning"], meta["symbol"], source)
         elif isinstance(value, eqx.Module):
             yield from parameters(value, f"{name}.")
         elif isinstance(value, tuple):

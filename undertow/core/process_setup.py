@@ -95,32 +95,33 @@ def remove_damaged(folder: Path, limit: float = _LONGEST_CHECK) -> None:
     Raises:
         OSError: nothing can be read or written there.
     """
-    known, end = _noted(folder / _CHECKSUMS), time.monotonic() + limit
+    recorded = _noted(folder / _CHECKSUMS)
+    end = time.monotonic() + limit
     entries = [entry.path for entry in os.scandir(folder) if entry.name.endswith(_ENTRY)]
     random.shuffle(entries)
-    found = dict(known)
+    checksums = dict(recorded)
     for path in entries:
         if time.monotonic() > end:
             break
         name = os.path.basename(path)
         with contextlib.suppress(FileNotFoundError):  # another process has removed it
             digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-            if known.get(name, digest) != digest:
+            if recorded.get(name, digest) != digest:
                 os.unlink(path)
-                del found[name]
+                del checksums[name]
             else:
-                found[name] = digest
-    if found != known:
-        _note(found, folder / _CHECKSUMS)
+                checksums[name] = digest
+    if checksums != recorded:
+        _note(checksums, folder / _CHECKSUMS)
 
 
 def _noted(path: Path) -> dict[str, str]:
     """Checksums of entries by their names; none where the file is missing or damaged."""
     try:
-        found = json.loads(path.read_bytes())
+        checksums = json.loads(path.read_bytes())
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return checksums if isinstance(checksums, dict) else {}
 
 
 def _note(checksums: dict[str, str], path: Path) -> None:
@@ -132,8 +133,8 @@ def _note(checksums: dict[str, str], path: Path) -> None:
 
 def cache_folder() -> Path:
     """UNDERTOW_CACHE, or `undertow` in the user's folder of caches."""
-    given = os.environ.get("UNDERTOW_CACHE")
-    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "undertow"
+    folder = os.environ.get("UNDERTOW_CACHE")
+    return Path(folder) if folder else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "undertow"
 
 
 def _private_folder(name: str) -> Path:
@@ -146,9 +147,9 @@ def _private_folder(name: str) -> Path:
     folder.parent.mkdir(parents=True, exist_ok=True)
     with contextlib.suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-    found = os.lstat(folder)
-    open_to_others = hasattr(os, "geteuid") and (found.st_uid != os.geteuid() or found.st_mode & _OTHERS_MAY_WRITE)
-    if open_to_others or not stat.S_ISDIR(found.st_mode):
+    status = os.lstat(folder)
+    open_to_others = hasattr(os, "geteuid") and (status.st_uid != os.geteuid() or status.st_mode & _OTHERS_MAY_WRITE)
+    if open_to_others or not stat.S_ISDIR(status.st_mode):
         raise OSError(f"somebody else may write to {folder}")
     return folder
 

@@ -39,15 +39,15 @@ def difference(value: Any, model: Any, types: bool = False) -> str:
     """How a value differs from the tree `model`, or from its shapes (and types if `types`); "" where it does not."""
     if type(value) is not type(model) and not (_is_array(value) and _is_array(model)):
         return f"{_kind(value)}, not {_kind(model)}"
-    (found, tree), (due, model_tree) = map(jax.tree_util.tree_flatten_with_path, (value, model))
+    (leaves, tree), (model_leaves, model_tree) = map(jax.tree_util.tree_flatten_with_path, (value, model))
     if tree != model_tree:
-        return f"a tree of {len(found)} arrays, not of {len(due)}, or with other names"
-    for (path, one), (_, other) in zip(found, due, strict=True):
+        return f"a tree of {len(leaves)} arrays, not of {len(model_leaves)}, or with other names"
+    for (path, leaf), (_, model_leaf) in zip(leaves, model_leaves, strict=True):
         at = f" in `{jax.tree_util.keystr(path).lstrip('.')}`" if path else ""
-        if jnp.shape(one) != jnp.shape(other):
-            return f"of shape {jnp.shape(one)} instead of {jnp.shape(other)}{at}"
-        if types and jnp.result_type(one) != jnp.result_type(other):
-            return f"of type {jnp.result_type(one)} instead of {jnp.result_type(other)}{at}"
+        if jnp.shape(leaf) != jnp.shape(model_leaf):
+            return f"of shape {jnp.shape(leaf)} instead of {jnp.shape(model_leaf)}{at}"
+        if types and jnp.result_type(leaf) != jnp.result_type(model_leaf):
+            return f"of type {jnp.result_type(leaf)} instead of {jnp.result_type(model_leaf)}{at}"
     return ""
 
 
@@ -58,14 +58,14 @@ def check_command(controller: Any, answer: Any, inputs: int) -> None:
         BadInput: it did not.
     """
     method = f"{type(controller).__name__}.command"
-    says = not_two(method, answer, PAIR)
-    if not says and jnp.shape(answer[0]) != (inputs,):
+    message = not_two(method, answer, PAIR)
+    if not message and jnp.shape(answer[0]) != (inputs,):
         due = f"must return an input of shape {(inputs,)}, one entry per input of the plant"
-        says = f"`{method}` {due}, but returns {form(answer[0])}"
-    if not says and not isinstance(answer[1], Mapping):
-        says = f"`{method}` must return its signals as a mapping, {{}} for none, but returns {form(answer[1])}"
-    if says:
-        raise BadInput("", "", says, where=place_of(controller, "command"))
+        message = f"`{method}` {due}, but returns {form(answer[0])}"
+    if not message and not isinstance(answer[1], Mapping):
+        message = f"`{method}` must return its signals as a mapping, {{}} for none, but returns {form(answer[1])}"
+    if message:
+        raise BadInput("", "", message, where=place_of(controller, "command"))
 
 
 def check_state(controller: Any, after: Any, before: Any) -> None:
@@ -75,8 +75,8 @@ def check_state(controller: Any, after: Any, before: Any) -> None:
         BadInput: it did not.
     """
     if got := difference(after, before, types=True):
-        says = f"`{type(controller).__name__}.advance` must {STATE}, but is {got}"
-        raise BadInput("", "", says, where=place_of(controller, "advance"))
+        message = f"`{type(controller).__name__}.advance` must {STATE}, but is {got}"
+        raise BadInput("", "", message, where=place_of(controller, "advance"))
 
 
 def _kind(value: Any) -> str:

@@ -72,11 +72,11 @@ def current_precision() -> str:
 
 def workers(count: int) -> ThreadPoolExecutor:
     """Threads that compute in the precision of the calling thread."""
-    precision, kept = current_precision(), threading.local()
+    precision, of_thread = current_precision(), threading.local()
 
     def begin() -> None:
-        kept.context = in_precision(precision)  # which ends when nothing refers to it
-        kept.context.__enter__()
+        of_thread.context = in_precision(precision)  # which ends when nothing refers to it
+        of_thread.context.__enter__()
 
     return ThreadPoolExecutor(count, initializer=begin)
 

@@ -39,16 +39,16 @@ def check_declared(part: Any, values: Mapping[str, Any], method: str) -> None:
         BadInput: a signal is undeclared, or a declared one is missing, or the declarations are none.
     """
     declared, who = part.signals(), type(part).__name__
-    if not (isinstance(declared, Mapping) and all(isinstance(one, Signal) for one in declared.values())):
-        says = f"`{who}.signals` must return a mapping of names to `Signal`, but returns {declared!r}"
-        raise BadInput("", "", says, hint="Return {} where there are none", where=place_of(part, "signals"))
+    if not (isinstance(declared, Mapping) and all(isinstance(signal, Signal) for signal in declared.values())):
+        message = f"`{who}.signals` must return a mapping of names to `Signal`, but returns {declared!r}"
+        raise BadInput("", "", message, hint="Return {} where there are none", where=place_of(part, "signals"))
     for name in values:
         if name not in declared:
-            says = f"`{who}.{method}` gives a signal `{name}`, which `{who}.signals` does not declare"
+            message = f"`{who}.{method}` gives a signal `{name}`, which `{who}.signals` does not declare"
             hint = f"Declare it: `signals` returns {{{name!r}: Signal(dimensions, unit, meaning), ...}}"
-            raise BadInput("", "", says, hint=hint, where=place_of(part, "signals"))
+            raise BadInput("", "", message, hint=hint, where=place_of(part, "signals"))
     for name in declared:
         if name not in values:
-            says = f"`{who}.signals` declares a signal `{name}`, which `{who}.{method}` does not give"
+            message = f"`{who}.signals` declares a signal `{name}`, which `{who}.{method}` does not give"
             hint = f"Give it among the signals of `{method}`, as {{{name!r}: value}}, or remove its declaration"
-            raise BadInput("", "", says, hint=hint, where=place_of(part, "signals"))
+            raise BadInput("", "", message, hint=hint, where=place_of(part, "signals"))

@@ -65,8 +65,8 @@ def fault_of(error: BaseException) -> UserCodeFailure:
 
 def python_says(error: BaseException) -> str:
     """Cause and remedy in one line."""
-    says, hint = fault_of(error)
-    return f"{says}. {hint}" if hint else says
+    message, hint = fault_of(error)
+    return f"{message}. {hint}" if hint else message
 
 
 def said_by(error: BaseException) -> str:
@@ -112,15 +112,17 @@ def _reason(error: BaseException, text: str) -> tuple[str, str]:
     if isinstance(error, ModuleNotFoundError) and error.name:
         hint = f"Install `{error.name}` beside undertow; if it is a file of yours, add its folder to PYTHONPATH"
         return f"{type(error).__name__}: {text}", hint
-    shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
-    return f"{type(error).__name__}: {shown}", _meant(error, text)
+    shortened = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    return f"{type(error).__name__}: {shortened}", _meant(error, text)
 
 
 def _meant(error: BaseException, text: str) -> str:
     """What was meant by an attribute that an object lacks, or by arithmetic with a tuple; "" where that is unknown."""
     if isinstance(error, AttributeError) and error.name and error.obj is not None:
-        inner = [one for one in dir(error.obj) if not one.startswith("_")]
-        if outer := next((one for one in inner if hasattr(getattr(error.obj, one, None), error.name)), ""):
+        inner = [attribute for attribute in dir(error.obj) if not attribute.startswith("_")]
+        if outer := next(
+            (attribute for attribute in inner if hasattr(getattr(error.obj, attribute, None), error.name)), ""
+        ):
             return f"Did you mean `.{outer}.{error.name}`?"
         return nearest(error.name, inner)
     if isinstance(error, TypeError) and _OF_TUPLES.search(text):
@@ -131,14 +133,14 @@ def _meant(error: BaseException, text: str) -> str:
     return ""
 
 
-def _abstract(found: re.Match[str], frames: list[tuple[FrameType, int]]) -> UserCodeFailure:
+def _abstract(match: re.Match[str], frames: list[tuple[FrameType, int]]) -> UserCodeFailure:
     """A class that lacks methods or attributes of its contract."""
-    name, what, lacking = found.groups()
+    name, member_kind, lacking = match.groups()
     names = re.findall(r"\w+", lacking)
-    listed = " and ".join(f"`{one}`" for one in names)
+    listed = " and ".join(f"`{member}`" for member in names)
     many, verb = ("s", "are") if len(names) > 1 else ("", "is")
-    missing = "implemented" if what == "method" else "declared"
+    missing = "implemented" if member_kind == "method" else "declared"
     kind = next((f.f_globals[name] for f, _ in reversed(frames) if isinstance(f.f_globals.get(name), type)), None)
-    place = place_of(kind) if kind is not None else ""
-    at = f" ({place})" if place else ""
-    return UserCodeFailure(f"cannot instantiate `{name}`: {what}{many} {listed} {verb} not {missing}{at}", "")
+    location = place_of(kind) if kind is not None else ""
+    at = f" ({location})" if location else ""
+    return UserCodeFailure(f"cannot instantiate `{name}`: {member_kind}{many} {listed} {verb} not {missing}{at}", "")

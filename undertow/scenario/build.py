@@ -67,8 +67,8 @@ def in_its_precision(function: Callable[Arguments, Result]) -> Callable[Argument
 
     @functools.wraps(function)
     def computed(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
-        given: Any = arguments[0]
-        scenario = given.scenario if isinstance(given, Built) else validate(given)
+        source: Any = arguments[0]
+        scenario = source.scenario if isinstance(source, Built) else validate(source)
         with runtime.in_precision(scenario.precision):
             return function(*arguments, **options)
 
@@ -112,22 +112,23 @@ class Built(NamedTuple):
         if isinstance(navigation, SensorNavigation):
             yield from (advice("navigation", sentence) for sentence in navigation.advice(end))
         if self.resolved["model"].get("speed_sensor") is False:
-            for place, entry in enumerate(self.resolved.get("faults", ())):
+            for index, entry in enumerate(self.resolved.get("faults", ())):
                 if entry["target"].endswith("propeller_speed"):
-                    says = f"`faults[{place}]` has no effect: the controller does not use measured propeller speeds"
-                    yield advice(f"faults[{place}]", says, hint="Write `model: {speed_sensor: true}`")
-        for place, entry in enumerate(self.resolved.get("faults", ())):
+                    message = f"`faults[{index}]` has no effect: the controller does not use measured propeller speeds"
+                    yield advice(f"faults[{index}]", message, hint="Write `model: {speed_sensor: true}`")
+        for index, entry in enumerate(self.resolved.get("faults", ())):
             first = min(entry["onset"]) if isinstance(entry["onset"], list) else entry["onset"]
             if first >= end:
-                says = f"the fault begins at {first:g} s, and the run ends at {end:g} s: it has no effect"
-                yield advice(f"faults[{place}].onset", says)
+                message = f"the fault begins at {first:g} s, and the run ends at {end:g} s: it has no effect"
+                yield advice(f"faults[{index}].onset", message)
         yield from plausibility(self.closed_loop, end, self.scenario.initial.position)
 
     def of_the_law(self) -> "Built":
         """The same without faults and supervision, for what concerns the law by itself: prediction, tuning."""
-        found, loop = self.without_faults(), self.without_faults().closed_loop
+        faultless = self.without_faults()
+        loop = faultless.closed_loop
         law = unsupervised(loop.controller)
-        return found._replace(closed_loop=dataclasses.replace(loop, controller=law))
+        return faultless._replace(closed_loop=dataclasses.replace(loop, controller=law))
 
     def without_faults(self) -> "Built":
         """The same scenario before any fault: predictions, tuning and exports are about that."""
@@ -191,48 +192,54 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
 
     context: dict[str, Any] = {"sampling_time": scenario.loop.dt}
 
-    def make(key: str, given: tuple = ()) -> Any:
-        part, resolved[key] = one(key, key, getattr(scenario, key), given)
+    def make(key: str, leading_arguments: tuple = ()) -> Any:
+        part, resolved[key] = make_part(key, key, getattr(scenario, key), leading_arguments)
         return part
 
-    def one(key: str, where: str, part: Part, given: tuple = ()) -> tuple[Any, dict[str, Any]]:
+    def make_part(key: str, where: str, part: Part, leading_arguments: tuple = ()) -> tuple[Any, dict[str, Any]]:
         described = {"part": part.model_dump(), "context": context}
-        new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, given, context)
+        new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, leading_arguments, context)
         with within(where):
-            return part_cache.part(where, described, given, new)
+            return part_cache.part(where, described, leading_arguments, new)
 
     def disturbance() -> AbstractDisturbance:
         if isinstance(scenario.disturbance, Part):
             return make("disturbance")
-        pairs = [one("disturbance", f"disturbance[{i}]", part) for i, part in enumerate(scenario.disturbance)]
+        pairs = [make_part("disturbance", f"disturbance[{i}]", part) for i, part in enumerate(scenario.disturbance)]
         resolved["disturbance"] = [description for _, description in pairs]
         return SumOfDisturbances(tuple(member for member, _ in pairs))
 
     def supervised(part: Part, law: AbstractController) -> AbstractController:
         """The law under supervision, with the fallback that takes its place."""
         options, fallback, described = part.model_dump(), None, {}
-        given = options.pop("fallback", None)
-        given = {"kind": given} if isinstance(given, str) else given
-        if given not in (None, {"kind": "none"}):
-            if not (isinstance(given, Mapping) and isinstance(given.get("kind"), str)):
-                raise BadInput("supervisor.fallback", "be a controller by name, or a mapping with `kind`", given)
-            fallback, found = one("controller", "supervisor.fallback", Part(**given), (model,))
-            described = {"fallback": found}
-        made, resolved["supervisor"] = one("supervisor", "supervisor", Part(**options), (law, plant, fallback))
+        fallback_options = options.pop("fallback", None)
+        fallback_options = {"kind": fallback_options} if isinstance(fallback_options, str) else fallback_options
+        if fallback_options not in (None, {"kind": "none"}):
+            if not (isinstance(fallback_options, Mapping) and isinstance(fallback_options.get("kind"), str)):
+                raise BadInput(
+                    "supervisor.fallback", "be a controller by name, or a mapping with `kind`", fallback_options
+                )
+            fallback, fallback_description = make_part(
+                "controller", "supervisor.fallback", Part(**fallback_options), (model,)
+            )
+            described = {"fallback": fallback_description}
+        supervisor, resolved["supervisor"] = make_part(
+            "supervisor", "supervisor", Part(**options), (law, plant, fallback)
+        )
         resolved["supervisor"] |= described
-        return made
+        return supervisor
 
     plant = make("plant")
     nominal, described = plant, {}
     if scenario.model.plant is not None:
-        nominal, described["plant"] = one("plant", "model.plant", scenario.model.plant)
+        nominal, described["plant"] = make_part("plant", "model.plant", scenario.model.plant)
         check_nominal_plant(nominal, plant)
     if scenario.model.follow:
         described["follow"] = True
     options = scenario.model.options
-    known = lambda: factory.call(nominal.model, options, folder=text.folder)
+    make_model = lambda: factory.call(nominal.model, options, folder=text.folder)
     with within("model"):
-        model, of_model = part_cache.part("model", options, (nominal,), known)
+        model, of_model = part_cache.part("model", options, (nominal,), make_model)
     resolved["model"] = of_model | described
     if "sensors" in (scenario.navigation.model_extra or {}):  # a filter of readings
         context["authority"] = _authority(nominal, model)
@@ -258,10 +265,10 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with within("initial"):
         check_start(loop, scenario.initial)
     part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))
-    several = [one("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
-    if several:
-        resolved["metrics"] = [description for _, description in several]
-    metrics = tuple(part for part, _ in several)
+    described_metrics = [make_part("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
+    if described_metrics:
+        resolved["metrics"] = [description for _, description in described_metrics]
+    metrics = tuple(part for part, _ in described_metrics)
     placed = loop.starting_at(scenario.initial.position)
     code = code_hashes(resolved, Path())  # its paths are absolute
     built = Built(placed, scenario, resolved, metrics, text, loop.reference, code)
@@ -272,18 +279,22 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved["success"] = criterion
     if not scenario.requirements:
         return built
-    resolved["requirements"] = {name: one.model_dump(exclude_none=True) for name, one in scenario.requirements.items()}
+    resolved["requirements"] = {
+        name: requirement.model_dump(exclude_none=True) for name, requirement in scenario.requirements.items()
+    }
     with within("requirements"):
         return built._replace(requirements=_required(built))
 
 
 def _required(built: Built) -> tuple[Requirement, ...]:
     """The requirements of a scenario."""
-    given = built.scenario.requirements
-    formulas = {name: one.formula for name, one in given.items() if one.formula is not None}
-    bounds = {name: one.below for name, one in given.items() if one.below is not None}
-    found = requirements_of(formulas, bounds, built.closed_loop, built.known_metrics(), built.scenario.loop.duration)
-    return tuple(sorted(found, key=lambda one: list(given).index(one.name)))
+    declared = built.scenario.requirements
+    formulas = {name: requirement.formula for name, requirement in declared.items() if requirement.formula is not None}
+    bounds = {name: requirement.below for name, requirement in declared.items() if requirement.below is not None}
+    requirements = requirements_of(
+        formulas, bounds, built.closed_loop, built.known_metrics(), built.scenario.loop.duration
+    )
+    return tuple(sorted(requirements, key=lambda requirement: list(declared).index(requirement.name)))
 
 
 def _authority(plant: AbstractPlant, model: Model) -> Any:
@@ -293,10 +304,10 @@ def _authority(plant: AbstractPlant, model: Model) -> Any:
     precision; None for what is no vehicle.
     """
     with jax.ensure_compile_time_eval():  # a number even where a scenario is built inside a compiled function
-        found = _largest_acceleration(plant, model)
-    if not len(found):
+        acceleration = _largest_acceleration(plant, model)
+    if not len(acceleration):
         return None
-    return found if checks.traced(found) else [float(f"{value:.3g}") for value in found.tolist()]
+    return acceleration if checks.traced(acceleration) else [float(f"{value:.3g}") for value in acceleration.tolist()]
 
 
 @eqx.filter_jit
@@ -304,8 +315,8 @@ def _largest_acceleration(plant: AbstractPlant, model: Model):
     start = plant.output(jnp.zeros(()), plant.initial_state())
     if start.body is None:
         return jnp.zeros(0)
-    found = authority_of(model.in_body_axes(), plant)
-    return three_digits(jnp.where(jnp.isfinite(found), found, 0.0))
+    acceleration = authority_of(model.in_body_axes(), plant)
+    return three_digits(jnp.where(jnp.isfinite(acceleration), acceleration, 0.0))
 
 
 def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:

@@ -74,20 +74,21 @@ def check_window(window: Window, loop: ClosedLoopSettings) -> None:
 
 def rounded_times(loop: ClosedLoopSettings) -> tuple[Advice, ...]:
     """Advice where a run does not end at its duration, or its last record is not at its end."""
-    stepped, found = loop.method != "adaptive", []
+    stepped = loop.method != "adaptive"
+    all_advice: list[Advice] = []
     dt = loop.dt if loop.kind == "sampled" else loop.record / round(loop.record / loop.dt) if stepped else 0.0
     end = round(loop.duration / dt) * dt if stepped else loop.duration
     if abs(end - loop.duration) > _ROUNDING * loop.duration:
-        says = f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s"
-        found.append(advice("loop.duration", says))
+        message = f"the run lasts {end:.9g} s, a whole number of steps of {dt:g} s, not {loop.duration:.9g} s"
+        all_advice.append(advice("loop.duration", message))
     last = math.floor(end / loop.record * (1 + _ROUNDING)) * loop.record
     if end - last > _ROUNDING * end:
-        says = (
+        message = (
             f"the last record is at {last:.9g} s, {end - last:.3g} s before the end: `loop.duration` is not a multiple "
             f"of `loop.record` ({loop.record:g} s)"
         )
-        found.append(advice("loop.record", says))
-    return tuple(found)
+        all_advice.append(advice("loop.record", message))
+    return tuple(all_advice)
 
 
 def whole_steps(interval: float, step: float) -> bool:
@@ -108,14 +109,16 @@ def check_start(loop: ClosedLoop, start: Initial) -> None:
             checks.finite(key, value)
 
 
-def check_noise(navigation: AbstractNavigation, noise: ArrayLike, plant: AbstractPlant, own: Mapping[str, str]) -> None:
+def check_noise(
+    navigation: AbstractNavigation, noise: ArrayLike, plant: AbstractPlant, user_parts: Mapping[str, str]
+) -> None:
     """Check that the noise of measured velocities is one number or one per output, before a controller is made for it.
 
     Args:
         navigation: navigation filter.
         noise: its standard deviation of the velocities.
         plant: of the same loop.
-        own: as for `check_fit`.
+        user_parts: as for `check_fit`.
 
     Raises:
         BadInput: it is not; the error names the option that is wrong where the filter checks its options.
@@ -123,7 +126,7 @@ def check_noise(navigation: AbstractNavigation, noise: ArrayLike, plant: Abstrac
     axes = len(plant.outputs)
     if np.shape(noise) in ((), (axes,)):
         return
-    with _part("navigation", own) as traced:
+    with _part("navigation", user_parts) as traced:
         truth = traced(lambda: plant.output(jnp.zeros(()), plant.initial_state()))
         traced(navigation.init, traced(navigation.realize, jax.random.PRNGKey(0)), truth)
         checks.per_axis("velocity_noise", noise, axes)
@@ -135,24 +138,24 @@ def check_nominal_plant(nominal: AbstractPlant, plant: AbstractPlant) -> None:
     Raises:
         BadInput: it has others.
     """
-    size = lambda one: f"{len(one.outputs)} outputs and {one.inputs()} inputs"
+    size = lambda candidate: f"{len(candidate.outputs)} outputs and {candidate.inputs()} inputs"
     if size(nominal) != size(plant):
         hint = "Write `model: {follow: true}` where a study varies them"
         raise BadInput("model.plant", f"have {size(plant)}, as the simulated plant has", size(nominal), hint=hint)
 
 
-def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -> None:
+def check_fit(loop: ClosedLoop, user_parts: Mapping[str, str] = MappingProxyType({})) -> None:
     """Check that the parts agree on the number of outputs and can take a step together.
 
     Args:
         loop: closed loop.
-        own: key of the scenario -> ./file.py:function, for the parts that the user wrote.
+        user_parts: key of the scenario -> ./file.py:function, for the parts that the user wrote.
 
     Raises:
         BadInput: they do not fit together.
     """
     axes, zero = len(loop.plant.outputs), jnp.zeros(())
-    with _part("reference", own) as traced:
+    with _part("reference", user_parts) as traced:
         loop = loop.starting_at(None)  # as the run has it, which then need not be traced again
         target = traced(loop.reference.at, zero)
         if not isinstance(target, Target):
@@ -160,35 +163,35 @@ def check_fit(loop: ClosedLoop, own: Mapping[str, str] = MappingProxyType({})) -
         if target.position.shape != (axes,):
             got = f"{len(target.position)} long" if target.position.ndim == 1 else f"of shape {target.position.shape}"
             raise BadInput("position", f"have {axes} entries ({', '.join(loop.plant.outputs)})", got)
-    with _part("disturbance", own) as traced:
+    with _part("disturbance", user_parts) as traced:
         realization = traced(loop.realize, jax.random.PRNGKey(0))
-    with _part("navigation", own) as traced:
+    with _part("navigation", user_parts) as traced:
         x, y = traced(lambda realization: realization.measured_at_start(), realization)
-    with _part("disturbance", own) as traced:
+    with _part("disturbance", user_parts) as traced:
         load = traced(lambda realization, x: realization.load(zero, x), realization, x)
         if not isinstance(load, Load):
             raise BadInput("", "give a Load", "something else")
         if any(signal.shape != (axes,) for signal in load[:2]):
             raise BadInput("", f"have {axes} axes", f"of shapes {[signal.shape for signal in load[:2]]}")
-        rest = jnp.zeros(loop.plant.inputs())
-        traced(lambda realization, x: realization.motion(zero, x, rest), realization, x)
-    with _part("controller", own) as traced:
+        zero_input = jnp.zeros(loop.plant.inputs())
+        traced(lambda realization, x: realization.motion(zero, x, zero_input), realization, x)
+    with _part("controller", user_parts) as traced:
         z = traced(loop.controller.init, y, target)
         decided = lambda realization, x, z: realization.decide(zero, x, z, realization.initial_measuring(x))
         decision = traced(decided, realization, x, z)
         check_declared(loop.controller, decision.signals, "command")
-        if "controller" in own:  # that of the catalogue is tested
+        if "controller" in user_parts:  # that of the catalogue is tested
             after = traced(loop.controller.advance, z, decision.y, decision.r, decision.applied, zero)
             check_state(loop.controller, after, z)
 
 
 @contextlib.contextmanager
-def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
+def _part(key: str, user_parts: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
     """Inside are the errors of the part at a key; gives a function that traces one of it, for shapes of its result.
 
     Any exception there means that the part does not fit the others.
     """
-    remedy = f"Try: undertow check {own[key]}" if key in own else ""
+    remedy = f"Try: undertow check {user_parts[key]}" if key in user_parts else ""
 
     def traced(function: Callable[..., Any], *arguments: Any) -> Any:
         try:
@@ -197,8 +200,10 @@ def _part(key: str, own: Mapping[str, str]) -> Iterator[Callable[..., Any]]:
             raise
         except RAISED as error:
             fault = fault_of(error)
-            says = fault.says if fault.says.startswith("cannot") else f"it does not fit the other parts: {fault.says}"
-            raise BadInput("", "", says, hint=joined(fault.hint, remedy)) from error
+            message = (
+                fault.says if fault.says.startswith("cannot") else f"it does not fit the other parts: {fault.says}"
+            )
+            raise BadInput("", "", message, hint=joined(fault.hint, remedy)) from error
 
     with within(key):
         yield traced

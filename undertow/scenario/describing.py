@@ -52,23 +52,29 @@ def describe(name: str) -> tuple[Description, ...]:
         BadInput: no such part.
     """
     if is_vehicle_file(name):
-        found = read_vehicle(Path(name), what="")
-        return (Description("vehicle file", name, found.data.name, (), tuple(parameters(found.vehicle())), (), {}),)
+        vehicle_file = read_vehicle(Path(name), what="")
+        described = tuple(parameters(vehicle_file.vehicle()))
+        return (Description("vehicle file", name, vehicle_file.data.name, (), described, (), {}),)
     if ".py:" in name:
         part = catalogue.find("", name, what="NAME")
         return (_describe("controllers" if factory.takes_model(part) else "", name, part),)
-    given, _, short = name.rpartition("/")
-    kinds = [kind for kind in catalogue.KINDS if given in ("", kind)]
-    known = {kind: catalogue.names(kind) for kind in kinds}
-    named = [(kind, catalogue.presets(kind).get(short, short)) for kind in kinds]
-    named = [(kind, part) for kind, part in named if part in known[kind]]
-    found = tuple(one for kind, part in named for one in _presets(kind, part, known[kind][part], short))
-    if not found:
-        every = {name for kind in kinds for name in (*known[kind], *catalogue.presets(kind))}
+    prefix, _, short = name.rpartition("/")
+    kinds = [kind for kind in catalogue.KINDS if prefix in ("", kind)]
+    parts_by_kind = {kind: catalogue.names(kind) for kind in kinds}
+    matches = [(kind, catalogue.presets(kind).get(short, short)) for kind in kinds]
+    matches = [(kind, part) for kind, part in matches if part in parts_by_kind[kind]]
+    descriptions = tuple(
+        description for kind, part in matches for description in _presets(kind, part, parts_by_kind[kind][part], short)
+    )
+    if not descriptions:
+        part_names = {name for kind in kinds for name in (*parts_by_kind[kind], *catalogue.presets(kind))}
         raise BadInput(
-            "NAME", "be a part", name, hint=did_you_mean(short, {*every, "scenario", "campaign", "metrics", "signals"})
+            "NAME",
+            "be a part",
+            name,
+            hint=did_you_mean(short, {*part_names, "scenario", "campaign", "metrics", "signals"}),
         )
-    return found
+    return descriptions
 
 
 def summary(part: Any) -> str:
@@ -79,12 +85,12 @@ def summary(part: Any) -> str:
 def listed(kind: str) -> list[tuple[str, str]]:
     """Names of the parts of a kind and of their presets, each with a sentence, in alphabetical order."""
     parts = catalogue.names(kind)
-    found = [(name, summary(part)) for name, part in parts.items()]
+    rows = [(name, summary(part)) for name, part in parts.items()]
     for preset, name in catalogue.presets(kind).items():
         sentence = summary(catalogue.presets_of(parts[name])[preset])
         begin = sentence[:1] if sentence[1:2].isupper() else sentence[:1].lower()
-        found.append((preset, f"Preset of `{name}`: {begin}{sentence[1:]}"))
-    return sorted(found)
+        rows.append((preset, f"Preset of `{name}`: {begin}{sentence[1:]}"))
+    return sorted(rows)
 
 
 def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, ...]:
@@ -92,27 +98,29 @@ def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, 
     presets = catalogue.presets_of(part)
     if not presets:
         return (_describe(kind, name, part),)
-    each = []
+    descriptions = []
     for preset, function in presets.items():
         if short not in (name, preset):
             continue
-        found = _describe(kind, name, function, {"kind": name, "preset": preset})
-        chosen = Option("preset", preset, f"one of {', '.join(presets)}.")
-        each.append(found._replace(options=(chosen, *found.options)))
-    return tuple(each)
+        description = _describe(kind, name, function, {"kind": name, "preset": preset})
+        preset_option = Option("preset", preset, f"one of {', '.join(presets)}.")
+        descriptions.append(description._replace(options=(preset_option, *description.options)))
+    return tuple(descriptions)
 
 
 def _describe(kind: str, name: str, part: Any, description: Any = None) -> Description:
     instance = _instance(kind, description or name, part)
-    shown: Any = instance if instance is not None else typing.get_type_hints(part).get("return")
-    described = isinstance(shown, eqx.Module) or (isinstance(shown, type) and issubclass(shown, eqx.Module))
+    described: Any = instance if instance is not None else typing.get_type_hints(part).get("return")
+    has_parameters = isinstance(described, eqx.Module) or (
+        isinstance(described, type) and issubclass(described, eqx.Module)
+    )
     advise = getattr(instance, "advice", tuple)
     return Description(
         kind=kind,
         name=name,
         summary=_prose(part),
         options=options_of(kind, part),
-        parameters=tuple(map(_depending, parameters(shown))) if described else (),
+        parameters=tuple(map(_depending, parameters(described))) if has_parameters else (),
         advice=advise(),
         signals=_signals(kind, description or name, instance),
     )
@@ -162,15 +170,15 @@ def options_of(kind: str, part: Any) -> tuple[Option, ...]:
 def _meanings(text: str) -> dict[str, str]:
     """Argument -> its text in the `Args:` section of a docstring; `a, b: ...` describes both."""
     section = re.search(r"^Args:\n((?:[ \t]+.*\n?|\n)*)", text, re.MULTILINE)
-    found: dict[str, str] = {}
+    meanings: dict[str, str] = {}
     names: list[str] = []
     for line in (section.group(1) if section else "").splitlines():
         entry = re.match(r"^ {4}(\w+(?:, \w+)*): (.*)$", line)
         names = entry.group(1).split(", ") if entry else names
         more = entry.group(2) if entry else line.strip()
         for name in names:
-            found[name] = f"{found.get(name, '')} {more}".strip()
-    return found
+            meanings[name] = f"{meanings.get(name, '')} {more}".strip()
+    return meanings
 
 
 def text_of(value: Any) -> str:

@@ -69,7 +69,7 @@ def make(
     kind: str,
     description: str | Mapping[str, Any],
     folder: Path,
-    given: tuple[Any, ...] = (),
+    leading_arguments: tuple[Any, ...] = (),
     context: Mapping[str, Any] | None = None,
 ) -> tuple[Any, dict[str, Any]]:
     """A part, and its description with every default filled in.
@@ -78,7 +78,7 @@ def make(
         kind: folder of the catalogue.
         description: name, or mapping of `kind` (the name) and options; a vehicle's name may be that of a YAML file.
         folder: folder of relative file names.
-        given: leading arguments that do not come from the user.
+        leading_arguments: those that do not come from the user.
         context: defaults of options that follow from the rest of a scenario.
 
     Raises:
@@ -89,18 +89,21 @@ def make(
     if not isinstance(name, str):
         raise BadInput("kind", f"name one of the {kind}", name)
     if kind == "vehicles" and is_vehicle_file(name):
-        found = read_vehicle(folder / name, options)
-        return found.vehicle(), {"kind": Path(name).name, "contents": found.contents}  # independent of the file
+        vehicle_file = read_vehicle(folder / name, options)
+        return vehicle_file.vehicle(), {
+            "kind": Path(name).name,
+            "contents": vehicle_file.contents,
+        }  # independent of the file
     function, preset = _preset(catalogue.find(kind, name, folder, "kind"), options)
-    own = inspect.signature(function).parameters
-    options = {key: value for key, value in (context or {}).items() if key in own} | options
+    parameters = inspect.signature(function).parameters
+    options = {key: value for key, value in (context or {}).items() if key in parameters} | options
     changes, table = {}, {}
     if kind in _ADJUSTABLE:
-        changes = {key: options.pop(key) for key in list(options) if key not in own}
-    if argument := next((name for name in _TABLES if name in own), ""):
+        changes = {key: options.pop(key) for key in list(options) if key not in parameters}
+    if argument := next((name for name in _TABLES if name in parameters), ""):
         rows_of_log = getattr(function, "rows_of_log", None)
-        table = _samples(options, folder, argument, rows_of_log and (lambda log: rows_of_log(log, *given)))
-    part, resolved = call(function, options, given, folder, context)
+        table = _samples(options, folder, argument, rows_of_log and (lambda log: rows_of_log(log, *leading_arguments)))
+    part, resolved = call(function, options, leading_arguments, folder, context)
     if not isinstance(part, _CONTRACTS[kind]):
         must = f"name a function that returns {_title(_CONTRACTS[kind])}"
         if part is None:
@@ -109,14 +112,14 @@ def make(
         raise BadInput("kind", must, got, hint=derive_hint(part, kind) if place_of(part) else "")
     if table:
         del resolved[argument]
-    part = adjust(part, changes, tuple(own)) if changes else part
+    part = adjust(part, changes, tuple(parameters)) if changes else part
     return part, {"kind": portable_name(name, folder), **preset, **resolved, **changes, **table}
 
 
 def call(
     function: Callable[..., Any],
     options: Mapping[str, Any],
-    given: tuple[Any, ...] = (),
+    leading_arguments: tuple[Any, ...] = (),
     folder: Path | None = None,
     context: Mapping[str, Any] | None = None,
 ) -> tuple[Any, dict[str, Any]]:
@@ -125,7 +128,7 @@ def call(
     Args:
         function: that makes the part, or another one.
         options: from the user.
-        given: leading arguments that do not come from the user.
+        leading_arguments: those that do not come from the user.
         folder: folder of relative file names.
         context: defaults of options of an inner law, as of `make`.
 
@@ -134,30 +137,34 @@ def call(
     """
     declared = _declared_once if inspect.isfunction(function) else _declared
     signature, hints = declared(function)
-    known = {name: option for name, option in signature[len(given) :] if option.kind not in _VARIABLE}
-    if unknown := [str(key) for key in options if key not in known]:
-        hint = known_key(unknown[0], known) if known else "There are none: remove it"
+    parameters = {name: option for name, option in signature[len(leading_arguments) :] if option.kind not in _VARIABLE}
+    if unknown := [str(key) for key in options if key not in parameters]:
+        hint = known_key(unknown[0], parameters) if parameters else "There are none: remove it"
         also = f"Also unknown: {', '.join(f'`{key}`' for key in unknown[1:])}" if unknown[1:] else ""
         raise BadInput(unknown[0], "be an option here", "unknown", hint=joined(hint, also))
     arguments, resolved = {}, {}
-    for name, parameter in known.items():
+    for name, parameter in parameters.items():
         if name == _LAW:
             description = options.get(name, INNER[_LAW][1])
-            arguments[name], resolved[name] = _law_of_each(description, given, folder or Path(), context or {})
+            arguments[name], resolved[name] = _law_of_each(
+                description, leading_arguments, folder or Path(), context or {}
+            )
         elif name in INNER:
             description = options.get(name, inner_default(name, parameter))
-            made = (None, None) if description is parameter.default is None else _inner(name, description, folder)
-            arguments[name], resolved[name] = made
+            if description is parameter.default is None:
+                arguments[name], resolved[name] = None, None
+            else:
+                arguments[name], resolved[name] = _inner(name, description, folder)
         elif name in options:
             value = checked(name, options[name], hints.get(name), parameter.default)
             if catalogue.FILE in getattr(parameter.annotation, "__metadata__", ()):
                 value = whole_name(value, folder or Path())
             arguments[name] = resolved[name] = value
         elif parameter.default is inspect.Parameter.empty:
-            raise _missing(function, name, given)
+            raise _missing(function, name, leading_arguments)
         else:
             arguments[name], resolved[name] = parameter.default, listed(parameter.default)
-    return _made(lambda: function(*given, **arguments)), resolved
+    return _made(lambda: function(*leading_arguments, **arguments)), resolved
 
 
 def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -> Any:
@@ -207,8 +214,8 @@ def is_part(thing: Any) -> bool:
 
 def _described(thing: Any) -> str:
     """An object that is no part, for messages: of a class of the user's own its name and place."""
-    place = place_of(thing)
-    return f"a `{type(thing).__name__}` ({place})" if place else repr(thing)
+    location = place_of(thing)
+    return f"a `{type(thing).__name__}` ({location})" if location else repr(thing)
 
 
 def derive_hint(thing: Any, kind: str = "") -> str:
@@ -219,30 +226,30 @@ def derive_hint(thing: Any, kind: str = "") -> str:
         kind: folder of the catalogue, where that is known.
     """
     contract, shared = contract_like(thing, kind)
-    own = type(thing).__name__
+    class_name = type(thing).__name__
     if not contract:
-        return f"Derive `{own}` from the contract of its kind, such as AbstractController"
-    has = f": it has {', '.join(f'`{one}`' for one in shared)}" if shared else ""
-    return f"Derive `{own}` from {contract}{has}"
+        return f"Derive `{class_name}` from the contract of its kind, such as AbstractController"
+    has = f": it has {', '.join(f'`{method}`' for method in shared)}" if shared else ""
+    return f"Derive `{class_name}` from {contract}{has}"
 
 
-def _missing(function: Callable[..., Any], name: str, given: tuple[Any, ...]) -> BadInput:
+def _missing(function: Callable[..., Any], name: str, leading_arguments: tuple[Any, ...]) -> BadInput:
     """The error for an option without a value; for a function of the user's own with its place and the remedy."""
-    place = place_of(function)
-    if not place:
+    location = place_of(function)
+    if not location:
         return BadInput(name, "be given")
     file = Path(inspect.getsourcefile(function) or "")
-    own = function.__name__
+    function_name = function.__name__
     if inspect.isclass(function):
-        must = f"be given: `{own}` ({place}) is a class, and a part is named by a function that makes it"
+        must = f"be given: `{function_name}` ({location}) is a class, and a part is named by a function that makes it"
         return BadInput(name, must, hint=catalogue.maker_in(file, file.name))
-    must = f"be given: `{own}` ({place}) has no default for it"
+    must = f"be given: `{function_name}` ({location}) has no default for it"
     first = next(iter(inspect.signature(function).parameters))
     if first == "model":
-        return BadInput(name, must, hint=f"Give it one: `def {own}(model, {name}=1.0)`, for example")
+        return BadInput(name, must, hint=f"Give it one: `def {function_name}(model, {name}=1.0)`, for example")
     hint = (
-        f"{'A' if given else 'Give it one. A'} function that makes a controller takes `model` first, and returns an "
-        "AbstractController: `undertow init --own-controller` writes one"
+        f"{'A' if leading_arguments else 'Give it one. A'} function that makes a controller takes `model` first, and "
+        "returns an AbstractController: `undertow init --own-controller` writes one"
     )
     return BadInput(name, must, hint=hint)
 
@@ -255,9 +262,12 @@ def contract_like(thing: Any, kind: str = "") -> tuple[str, list[str]]:
         kind: folder of the catalogue, whose contract is the one; "" where that is not known.
     """
     contracts = [_CONTRACTS[kind]] if kind else _CONTRACTS.values()
-    kinds = [one for contract in contracts for one in typing.get_args(contract) or (contract,)]
-    shared = {one: [name for name in getattr(one, "__abstractmethods__", ()) if hasattr(thing, name)] for one in kinds}
-    nearest = max(kinds, key=lambda one: len(shared[one]))
+    kinds = [candidate for contract in contracts for candidate in typing.get_args(contract) or (contract,)]
+    shared = {}
+    for candidate in kinds:
+        methods = getattr(candidate, "__abstractmethods__", ())
+        shared[candidate] = [name for name in methods if hasattr(thing, name)]
+    nearest = max(kinds, key=lambda candidate: len(shared[candidate]))
     return (nearest.__name__ if kind or shared[nearest] else ""), sorted(shared[nearest])
 
 
@@ -315,23 +325,23 @@ def _inner(name: str, description: Any, folder: Path | None) -> tuple[Any, dict[
 
 
 def _law_of_each(
-    description: Any, given: tuple[Any, ...], folder: Path, context: Mapping[str, Any]
+    description: Any, leading_arguments: tuple[Any, ...], folder: Path, context: Mapping[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """The described law for each subsystem of the given model, and its description with every default filled in."""
     if not isinstance(description, str | Mapping):
         raise BadInput(_LAW, "be a controller by name, or a mapping with `kind`", description)
-    made, before = [], 0
-    for part in parts_of(given[0])[0]:
+    described_laws, before = [], 0
+    for part in parts_of(leading_arguments[0])[0]:
         after = before + len(part.coordinates.angles)
-        alone = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
+        part_context = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
         with within(_LAW):
-            made.append(make("controllers", description, folder, (part,), alone))
+            described_laws.append(make("controllers", description, folder, (part,), part_context))
         before = after
     # What differs between the subsystems follows from the rest of the scenario each time that it is built.
-    own = {"kind": description} if isinstance(description, str) else description
-    per_axis = {key for key, value in context.items() if np.ndim(value) and key not in own}
-    resolved = {key: value for key, value in made[0][1].items() if key not in per_axis}
-    return tuple(law for law, _ in made), resolved
+    law_options = {"kind": description} if isinstance(description, str) else description
+    per_axis = {key for key, value in context.items() if np.ndim(value) and key not in law_options}
+    resolved = {key: value for key, value in described_laws[0][1].items() if key not in per_axis}
+    return tuple(law for law, _ in described_laws), resolved
 
 
 def _at(
@@ -357,10 +367,10 @@ def _samples(
         argument: of the part that takes the samples.
         rows_of_log: rows of a log, for a part whose `file` is one, with a `mapping` if need be; None for others.
     """
-    given = [key for key in ("file", "csv", argument) if key in options]
-    if len(given) > 1:
+    sources = [key for key in ("file", "csv", argument) if key in options]
+    if len(sources) > 1:
         must = "be left out when there is another source of samples"
-        raise BadInput(given[1], must, f"given together with `{given[0]}`")
+        raise BadInput(sources[1], must, f"given together with `{sources[0]}`")
     for key in ("file", "csv"):
         if key in options and not isinstance(options[key], str):
             raise BadInput(key, "be text", repr(options[key]))

@@ -28,11 +28,11 @@ def check_allowed(data: Mapping[str, Any], result: Path, recorded: str | None, w
     Raises:
         BadInput: there is such code, and the user has not allowed it.
     """
-    named = dict(_named(data))
-    if allowed or not named:
+    code_names = dict(_named(data))
+    if allowed or not code_names:
         return
-    known = changed(recorded, data, result.parent)
-    files = [_described(key, name, result.parent, known) for key, name in named.items()]
+    changed_files = changed(recorded, data, result.parent)
+    files = [_described(key, name, result.parent, changed_files) for key, name in code_names.items()]
     hint = f"{'. '.join(files)}. Read it; to run it, add --allow-code (in Python: allow_code=True)"
     raise BadInput(what, "not name Python code", f"{result}, a file of {_owner(result)}", hint=hint)
 
@@ -60,11 +60,11 @@ def changed(recorded: str | None, data: Mapping[str, Any], folder: Path) -> tupl
     return tuple(Path(path) for path in now if path in before and before[path] != now[path])
 
 
-def _described(key: str, name: str, folder: Path, known: tuple[Path, ...]) -> str:
+def _described(key: str, name: str, folder: Path, changed_files: tuple[Path, ...]) -> str:
     path = _file(name, folder)
     if not path.exists():
         return f"`{key}` names {name}, a file that does not exist"
-    since = ", changed since that run" if path in known else ""
+    since = ", changed since that run" if path in changed_files else ""
     return f"`{key}` names {path}:{name.rpartition(':')[2]}, a file of {_owner(path)}{since}"
 
 

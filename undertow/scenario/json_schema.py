@@ -20,13 +20,13 @@ def scenario_schema() -> dict[str, Any]:
     schema = Scenario.model_json_schema()
     for key, kind in catalogue.KIND_OF.items():
         part = _reference(kind)
-        several = {"type": "array", "items": part}
-        shapes = {"disturbance": {"anyOf": [part, several]}, "metrics": several}
-        found = schema["properties"][key]
-        schema["properties"][key] = {**shapes.get(key, part), "description": found["description"]}
+        list_of_parts = {"type": "array", "items": part}
+        shapes = {"disturbance": {"anyOf": [part, list_of_parts]}, "metrics": list_of_parts}
+        property_schema = schema["properties"][key]
+        schema["properties"][key] = {**shapes.get(key, part), "description": property_schema["description"]}
     mode = {name: schema["$defs"]["Fault"]["properties"]["mode"][name] for name in ("title", "description")}
     schema["$defs"]["Fault"]["properties"]["mode"] = {**mode, "anyOf": _names("faults")}
-    definitions = {name: one for name, one in schema["$defs"].items() if name != "Part"}
+    definitions = {name: definition for name, definition in schema["$defs"].items() if name != "Part"}
     definitions |= {kind: _kind(kind) for kind in (*catalogue.KINDS, "metrics")}
     return {**schema, "$schema": "http://json-schema.org/draft-07/schema#", "$defs": definitions}
 
@@ -38,11 +38,13 @@ def _reference(kind: str) -> dict[str, Any]:
 def _kind(kind: str) -> dict[str, Any]:
     """A part by name, or a mapping whose further keys depend on the name."""
     parts, names = catalogue.names(kind), _names(kind)
-    own = {preset: catalogue.presets_of(parts[name])[preset] for preset, name in catalogue.presets(kind).items()}
+    preset_parts = {
+        preset: catalogue.presets_of(parts[name])[preset] for preset, name in catalogue.presets(kind).items()
+    }
     mapping = {"type": "object", "properties": {"kind": {"anyOf": names}}}
     if kind not in _DEFAULTS and kind != "power":  # `battery` and `esc` have a default each
         mapping["required"] = ["kind"]
-    found = {"anyOf": [*names, mapping]}
+    schema = {"anyOf": [*names, mapping]}
     options = [
         {
             "if": {
@@ -51,32 +53,32 @@ def _kind(kind: str) -> dict[str, Any]:
             },
             "then": {"properties": _options(kind, part)},
         }
-        for name, part in sorted({**parts, **own}.items())
+        for name, part in sorted({**parts, **preset_parts}.items())
     ]
-    return {**found, "allOf": options} if options else found
+    return {**schema, "allOf": options} if options else schema
 
 
 def _names(kind: str) -> list[dict[str, Any]]:
     """What may stand where a part is named: the names of the catalogue, and files."""
-    known = [{"const": name, "description": sentence} for name, sentence in describing.listed(kind)]
-    return known + [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
+    catalogued = [{"const": name, "description": sentence} for name, sentence in describing.listed(kind)]
+    return catalogued + [{"type": "string", "pattern": pattern} for key, pattern in _FILES.items() if key in (kind, "")]
 
 
 def _options(kind: str, part: Any) -> dict[str, Any]:
     """Options of a part, those of all its presets."""
     presets = catalogue.presets_of(part)
-    found: dict[str, Any] = {"preset": {"enum": list(presets)}} if presets else {}
+    properties: dict[str, Any] = {"preset": {"enum": list(presets)}} if presets else {}
     for function in presets.values() or (part,):
         for option in describing.options_of(kind, function):
-            found.setdefault(option.name, _option(option))
-    return found
+            properties.setdefault(option.name, _option(option))
+    return properties
 
 
 def _option(option: describing.Option) -> dict[str, Any]:
     if option.name in factory.INNER:
         part = _reference(factory.INNER[option.name][0])
         return {"type": "array", "items": part} if option.name == "sensors" else part
-    known = isinstance(option.default, bool | int | float | str) and option.default != "required"
+    is_literal = isinstance(option.default, bool | int | float | str) and option.default != "required"
     kind = {"type": "boolean"} if isinstance(option.default, bool) else {}
-    default = {"default": option.default} if known and option.default not in (float("inf"), -float("inf")) else {}
+    default = {"default": option.default} if is_literal and option.default not in (float("inf"), -float("inf")) else {}
     return {"description": option.meaning, **kind, **default}

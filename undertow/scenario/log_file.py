@@ -39,8 +39,8 @@ def read_log(
 def _read(path: Path, mapping: Any, location: Callable[[str], str]) -> Log:
     """The log; errors about columns name the key of the mapping that names them."""
     with within("mapping", location):
-        made = mapping_of(mapping)
-    return read_mapped(path, made, location)
+        checked_mapping = mapping_of(mapping)
+    return read_mapped(path, checked_mapping, location)
 
 
 def _text(path: Path) -> Text:

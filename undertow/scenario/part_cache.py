@@ -18,28 +18,28 @@ class PartCache:
 
     def copy(self) -> "PartCache":
         """Another cache with the same parts, for parts that shall not be kept."""
-        other = PartCache()
-        other._made, other._checked = self._made.copy(), self._checked.copy()
-        return other
+        copied = PartCache()
+        copied._made, copied._checked = self._made.copy(), self._checked.copy()
+        return copied
 
-    def part(self, where: str, description: Mapping[str, Any], given: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+    def part(self, where: str, description: Mapping[str, Any], parts: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Result of `make`, cached by description and other parts.
 
         Args:
             where: key of the part.
             description: everything that `make` reads; plain data.
-            given: other parts that it is made from.
+            parts: others that it is made from.
             make: makes the part.
         """
         try:
             text = json.dumps(description, sort_keys=True)
         except (TypeError, ValueError):  # arrays in Python data
             return make()
-        key = (where, text, tuple(id(part) for part in given))
+        key = (where, text, tuple(id(part) for part in parts))
         if key not in self._made:
             if len(self._made) >= _MOST:
                 self._made.clear()
-            self._made[key] = (make(), given)  # keeps `given` alive, so that its id stays unique
+            self._made[key] = (make(), parts)  # keeps `parts` alive, so that their ids stay unique
         return self._made[key][0]
 
     def check_once(self, tree: Any, check: Callable[[], None]) -> None:

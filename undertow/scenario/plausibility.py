@@ -59,10 +59,10 @@ def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -
         start: initial position, one entry per output, m and rad; None for zero.
     """
     desired = _desired(loop, duration, start)
-    said = [*_angles(loop, desired), *_unfinished(loop.reference, desired)]
+    all_advice = [*_angles(loop, desired), *_unfinished(loop.reference, desired)]
     if isinstance(loop.plant, HybridVehicle):
-        said += [*_above(loop, desired), *_too_fast(loop, loop.plant, desired)]
-    return tuple(said)
+        all_advice += [*_above(loop, desired), *_too_fast(loop, loop.plant, desired)]
+    return tuple(all_advice)
 
 
 def angles_meant(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
@@ -85,7 +85,9 @@ def top_speed(plant: HybridVehicle) -> float:
     body = plant.body
     surplus = abs(float(body.weight) - float(body.buoyancy))
     force = np.maximum(low * shares, high * shares).sum(axis=1) + surplus
-    linear, quadratic = (np.asarray(one, dtype=float)[:3, :3] for one in (body.linear_damping, body.quadratic_damping))
+    linear, quadratic = (
+        np.asarray(damping, dtype=float)[:3, :3] for damping in (body.linear_damping, body.quadratic_damping)
+    )
     a = np.einsum("ki,ij,kj->k", along, linear, along)
     b = np.einsum("ki,ij,kj->k", along, quadratic, along * np.abs(along))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,25 +114,25 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
         return _size(flow)
     rotation = Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
     shares = np.linspace(0.0, 1.0, _SHARES)
-    through = np.concatenate([-rotation.T @ flow, np.zeros(3)])
+    relative_velocity = np.concatenate([-rotation.T @ flow, np.zeros(3)])
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
     down = np.broadcast_to(rotation[2], (_SHARES, 3))
-    needed = np.asarray(body_force(plant.body, np.outer(shares, through), down)) @ acting_directions(plant).T
-    held = 0.0
+    needed = np.asarray(body_force(plant.body, np.outer(shares, relative_velocity), down)) @ acting_directions(plant).T
+    speed = 0.0
     for share, force in zip(shares, needed, strict=True):
-        left = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
-        if _size(left) > _BALANCED * _size(force):
+        residual = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
+        if _size(residual) > _BALANCED * _size(force):
             break
-        held = float(share * _size(flow))
-    return held
+        speed = float(share * _size(flow))
+    return speed
 
 
 def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]] | None:
     """Lowest and highest steady thrusts, N; None where there is no limit, or none is known."""
-    found = _steady_range(plant)
-    if found is None:
+    limits = _steady_range(plant)
+    if limits is None:
         return None
-    low, high = (np.asarray(limit, dtype=float) for limit in found)
+    low, high = (np.asarray(limit, dtype=float) for limit in limits)
     return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
 
 
@@ -151,64 +153,67 @@ def _size(vector: Float[np.ndarray, " k"]) -> float:
 def _angles(loop: ClosedLoop, desired: ReferenceSamples):
     """Degrees where radians are due: whole numbers beyond a turn. A pitch beyond 90 degrees."""
     plant = loop.plant
-    places = {"reference": [desired.position[-1], desired.position[0]], "initial.position": [desired.start]}
-    for name, positions in places.items():
+    positions_of_key = {"reference": [desired.position[-1], desired.position[0]], "initial.position": [desired.start]}
+    for name, positions in positions_of_key.items():
         for axis in np.flatnonzero(loop.controller.model.coordinates.angles):
             values = [float(row[axis]) for row in positions]
-            whole = [value for value in values if abs(value) > _FULL_TURN and value % 1 == 0]
-            if whole:
-                output, value = plant.outputs[axis], whole[0]
-                says = f"`{name}` has {output} at {value:g} rad, which is {abs(value) / _FULL_TURN:.3g} turns"
-                yield advice(name, says, f"Angles are in radians: {value:g} degrees are {np.radians(value):.4g} rad")
+            in_degrees = [value for value in values if abs(value) > _FULL_TURN and value % 1 == 0]
+            if in_degrees:
+                output, value = plant.outputs[axis], in_degrees[0]
+                message = f"`{name}` has {output} at {value:g} rad, which is {abs(value) / _FULL_TURN:.3g} turns"
+                yield advice(name, message, f"Angles are in radians: {value:g} degrees are {np.radians(value):.4g} rad")
     if isinstance(plant, HybridVehicle):
         steepest = float(np.abs(desired.position[:, 4]).max())
         if np.pi / 2 < steepest < _FULL_TURN:
-            says = f"`reference` has a pitch of up to {steepest:.4g} rad ({np.degrees(steepest):.4g} degrees)"
+            message = f"`reference` has a pitch of up to {steepest:.4g} rad ({np.degrees(steepest):.4g} degrees)"
             yield advice(
-                "reference", f"{says}, beyond 90 degrees, where roll and yaw turn over", "Angles are in radians"
+                "reference", f"{message}, beyond 90 degrees, where roll and yaw turn over", "Angles are in radians"
             )
 
 
 def _unfinished(reference: AbstractReference, desired: ReferenceSamples):
     """A reference that comes to rest after the end of the run."""
     duration = float(desired.time[-1])
-    late = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
-    if not np.isfinite(late.position).all():
+    late_samples = _sampled(reference, np.geomspace(duration, max(_LONG, 2 * duration), _SAMPLES), desired.start)
+    if not np.isfinite(late_samples.position).all():
         return
-    goal, size = late.position[-1], 1e-9 * np.ptp(late.position, axis=0).max()
-    there = np.abs(late.position - goal).max(axis=1) <= size
-    if there.all() or not there[-2:].all() or late.velocity[-2:].any() or size == 0:
+    goal = late_samples.position[-1]
+    size = 1e-9 * np.ptp(late_samples.position, axis=0).max()
+    arrived = np.abs(late_samples.position - goal).max(axis=1) <= size
+    if arrived.all() or not arrived[-2:].all() or late_samples.velocity[-2:].any() or size == 0:
         return
-    last = int(np.flatnonzero(~there)[-1])
-    between = _sampled(reference, np.linspace(late.time[last], late.time[last + 1], _SAMPLES), desired.start)
-    ends = between.time[np.abs(between.position - goal).max(axis=1) <= size][0]
-    says = f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s"
-    yield advice("loop.duration", says, f"Give `loop.duration` at least {ends:.3g} s, unless a part is enough")
+    last = int(np.flatnonzero(~arrived)[-1])
+    times = np.linspace(late_samples.time[last], late_samples.time[last + 1], _SAMPLES)
+    samples_between = _sampled(reference, times, desired.start)
+    ends = samples_between.time[np.abs(samples_between.position - goal).max(axis=1) <= size][0]
+    message = f"the run ends at {duration:g} s, before the reference reaches its end at {ends:.3g} s"
+    yield advice("loop.duration", message, f"Give `loop.duration` at least {ends:.3g} s, unless a part is enough")
 
 
 def _above(loop: ClosedLoop, desired: ReferenceSamples):
     """Positions above the surface, or above the start where a depth was meant."""
-    down, start = desired.position[:, 2], float(desired.start[2])
+    down = desired.position[:, 2]
+    start = float(desired.start[2])
     highest = float(down.min())
     depths = stated_depths(loop.disturbance)
     if depths:
         surface = -depths[0]
         for name, value in (("reference", highest), ("initial.position", start)):
             if value < surface:
-                says = f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m"
-                yield advice(name, says, _SURFACE)
+                message = f"`{name}` is at down = {value:.4g} m, above the surface at down = {surface:.4g} m"
+                yield advice(name, message, _SURFACE)
         if start >= surface:
             yield from _out_of_water(loop, desired.start, depths[0])
         if len(set(depths)) > 1:
-            says = f"`disturbance` states the depth of the world's origin as {depths[0]:g} m and as {depths[-1]:g} m"
+            message = f"`disturbance` states the depth of the world's origin as {depths[0]:g} m and as {depths[-1]:g} m"
             yield advice(
-                "disturbance", says, "Give all of them the same `depth`: the first one is where the surface is"
+                "disturbance", message, "Give all of them the same `depth`: the first one is where the surface is"
             )
         return
     if highest < -_RISES and down.max() <= 0 <= start:
-        says = f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
+        message = f"`reference` leads to down = {highest:.4g} m, {start - highest:.4g} m above the start at down = "
         hint = f"Down is positive downward: a depth of {-highest:.4g} m is {-highest:.4g}"
-        yield advice("reference", f"{says}{start:.4g} m", hint)
+        yield advice("reference", f"{message}{start:.4g} m", hint)
 
 
 def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float):
@@ -220,11 +225,11 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
     submerged = 1 - float(plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry)
     floats = min(1.0, float(plant.body.weight) / float(plant.body.buoyancy))
     if submerged < floats - _HIGHER:
-        says = (
+        message = (
             f"`initial.position` puts the vehicle into the water with {100 * submerged:.0f} % of its hull, but it "
             f"floats with {100 * floats:.0f} %: it falls into the water"
         )
-        yield advice("initial.position", says, _SURFACE)
+        yield advice("initial.position", message, _SURFACE)
 
 
 def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples):
@@ -233,39 +238,43 @@ def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples)
     if not np.isfinite(top):
         yield from _begins_elsewhere(desired)
         return
-    flows = [one.velocity for one in _members(loop, Current)] + [one.mean for one in _members(loop, GaussMarkovCurrent)]
-    flow = np.sum([np.asarray(one, dtype=float) for one in flows], axis=0) if flows else np.zeros(3)
-    drift = _size(flow)
+    flows = [current.velocity for current in _members(loop, Current)] + [
+        current.mean for current in _members(loop, GaussMarkovCurrent)
+    ]
+    flow = np.sum([np.asarray(velocity, dtype=float) for velocity in flows], axis=0) if flows else np.zeros(3)
+    current_speed = _size(flow)
     most = f"the thrusters give the vehicle at most {top:.3g} m/s through the water"
-    if drift > _SPARE * top:
-        says = f"the current is {drift:.3g} m/s, but {most}: it drifts away"
-        yield advice("disturbance", says, "1 knot is 0.514 m/s")
+    if current_speed > _SPARE * top:
+        message = f"the current is {current_speed:.3g} m/s, but {most}: it drifts away"
+        yield advice("disturbance", message, "1 knot is 0.514 m/s")
         return
-    held = held_speed(plant, desired.position[-1], flow) if _size(desired.velocity[-1, :3]) < _AT_REST else drift
-    if held < drift:
-        says = (
-            f"the current is {drift:.3g} m/s, but at the attitude of `reference` the thrusters hold the vehicle "
-            f"against at most {held:.3g} m/s of it: it drifts away"
+    ends_at_rest = _size(desired.velocity[-1, :3]) < _AT_REST
+    held = held_speed(plant, desired.position[-1], flow) if ends_at_rest else current_speed
+    if held < current_speed:
+        message = (
+            f"the current is {current_speed:.3g} m/s, but at the attitude of `reference` the thrusters hold the "
+            f"vehicle against at most {held:.3g} m/s of it: it drifts away"
         )
-        yield advice("disturbance", says, "1 knot is 0.514 m/s")
+        yield advice("disturbance", message, "1 knot is 0.514 m/s")
         return
     speed = float(np.hypot.reduce(desired.velocity[:, :3], axis=1).max())
-    duration, way = float(desired.time[-1]), desired.position[:, :3] - desired.start[:3]
-    far, step = _size(way[-1]), _size(way[0])
-    if speed > _SPARE * (top + drift):
+    duration = float(desired.time[-1])
+    displacements = desired.position[:, :3] - desired.start[:3]
+    final_distance, initial_distance = _size(displacements[-1]), _size(displacements[0])
+    if speed > _SPARE * (top + current_speed):
         yield advice("reference", f"`reference` moves at up to {speed:.3g} m/s, but {most}", "Make it slower")
-    elif far > _SPARE * (top + drift) * duration:
-        says = f"`reference` is {far:.4g} m from the start at the end of the run, but {most}"
-        hint = f"That takes {far / top:.3g} s: give `loop.duration` more than {duration:g} s"
-        yield advice("reference", says, hint)
-    elif step > _FAR * top:
-        says = f"`reference` begins {step:.4g} m from the vehicle, but {most}"
+    elif final_distance > _SPARE * (top + current_speed) * duration:
+        message = f"`reference` is {final_distance:.4g} m from the start at the end of the run, but {most}"
+        hint = f"That takes {final_distance / top:.3g} s: give `loop.duration` more than {duration:g} s"
+        yield advice("reference", message, hint)
+    elif initial_distance > _FAR * top:
+        message = f"`reference` begins {initial_distance:.4g} m from the vehicle, but {most}"
         hint = "Set `initial.position`, or approach smoothly (`settling` of a setpoint)"
-        at_limits = f"the thrusters are at their limits for {step / top:.3g} s or more"
-        yield advice("reference", f"{says}: {at_limits}", hint)
+        at_limits = f"the thrusters are at their limits for {initial_distance / top:.3g} s or more"
+        yield advice("reference", f"{message}: {at_limits}", hint)
     else:
         yield from _begins_elsewhere(desired)
-        yield from _too_demanding(loop, plant, duration, flow, (speed + drift) / top)
+        yield from _too_demanding(loop, plant, duration, flow, (speed + current_speed) / top)
         yield from _leans(plant, desired, flow)
 
 
@@ -275,27 +284,28 @@ def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow
         return
     reserve = reference_reserve(plant.model(), loop.reference, duration, flow, samples=_LOOKS)
     if reserve.share < 1:
-        says = (
+        message = (
             f"the thrusters have {100 * reserve.share:.0f} % of what `reference` takes in this current at "
             f"{reserve.time:.3g} s: the vehicle falls behind"
         )
-        yield advice("reference", says, "Make it slower")
+        yield advice("reference", message, "Make it slower")
 
 
 def _leans(plant: HybridVehicle, desired: ReferenceSamples, flow: np.ndarray):
     """A vehicle that the water turns over about an axis that its thrusters cannot turn it about."""
-    through = desired.velocity[:, :3] - flow
-    if not through.any():
+    relative_velocity = desired.velocity[:, :3] - flow
+    if not relative_velocity.any():
         return
-    lean = largest_lean(plant, desired.position[:, 3:], through)
+    lean = largest_lean(plant, desired.position[:, 3:], relative_velocity)
     if lean is None or lean.angle <= _LEANS:
         return
     angle = f"by {np.degrees(lean.angle):.0f} degrees" if np.isfinite(lean.angle) else "until it turns over"
-    says = (
+    message = (
         f"the thrusters cannot {lean.axis} the vehicle, and its weight and buoyancy right it too little: at "
-        f"{desired.time[lean.row]:.3g} s, at {_size(through[lean.row]):.2g} m/s through the water, it leans {angle}"
+        f"{desired.time[lean.row]:.3g} s, at {_size(relative_velocity[lean.row]):.2g} m/s through the water, it leans "
+        f"{angle}"
     )
-    yield advice("reference", says, "Make it slower, or lower the centre of gravity")
+    yield advice("reference", message, "Make it slower, or lower the centre of gravity")
 
 
 def _begins_elsewhere(desired: ReferenceSamples):
@@ -305,18 +315,18 @@ def _begins_elsewhere(desired: ReferenceSamples):
     if distance <= _JUMP or not np.ptp(desired.position[:, :3], axis=0).any():
         return
     listed = lambda values: f"[{', '.join(f'{value:.4g}' for value in values)}]"
-    says = (
+    message = (
         f"`reference` begins {distance:.4g} m from the vehicle: at {listed(first[:3])} m (north, east, down), but the "
         f"vehicle starts at {listed(start[:3])} m"
     )
     hint = f"Begin the path where the vehicle is, or write `initial: {{position: {listed(first)}}}`"
-    yield advice("reference", says, hint)
+    yield advice("reference", message, hint)
 
 
 def _members(loop: ClosedLoop, kind: type) -> list:
     """The disturbances of a kind."""
-    every = loop.disturbance.members if isinstance(loop.disturbance, SumOfDisturbances) else (loop.disturbance,)
-    return [one for one in every if isinstance(one, kind)]
+    members = loop.disturbance.members if isinstance(loop.disturbance, SumOfDisturbances) else (loop.disturbance,)
+    return [disturbance for disturbance in members if isinstance(disturbance, kind)]
 
 
 def _desired(loop: ClosedLoop, duration: float, start: list[float] | None) -> ReferenceSamples:

@@ -24,9 +24,9 @@ _PART = 2**22  # bytes that are read and hashed at once
 
 def versions() -> dict[str, str]:
     """Versions of the software, and the class of the machine."""
-    found = {f"version_{name}": importlib.metadata.version(name) for name in _PACKAGES}
+    packages = {f"version_{name}": importlib.metadata.version(name) for name in _PACKAGES}
     device = jax.devices()[0]
-    return found | {
+    return packages | {
         "version_python": ".".join(map(str, sys.version_info[:3])),
         "machine": f"{platform.system()} {platform.machine()}, {device.platform} ({device.device_kind})",
     }
@@ -42,10 +42,10 @@ def claims(dataset: xr.Dataset) -> dict[str, str]:
 
     They are equal if and only if the runs are identical bit for bit. Versions, machine and texts are not included.
     """
-    found = {str(name): _of_values(dataset[name].variable) for name in dataset.variables}
-    found |= {name: _of_words(dataset.attrs[name]) for name in _CLAIMED if name in dataset.attrs}
-    each = _leaves(json.loads(dataset.attrs.get(_CLAIMED_EACH, "{}")), _CLAIMED_EACH)
-    return found | {name: _of_words(value) for name, value in each}
+    hashes = {str(name): _of_values(dataset[name].variable) for name in dataset.variables}
+    hashes |= {name: _of_words(dataset.attrs[name]) for name in _CLAIMED if name in dataset.attrs}
+    leaves = _leaves(json.loads(dataset.attrs.get(_CLAIMED_EACH, "{}")), _CLAIMED_EACH)
+    return hashes | {name: _of_words(value) for name, value in leaves}
 
 
 def content_hash(dataset: xr.Dataset) -> str:
@@ -60,7 +60,9 @@ def checksum(dataset: xr.Dataset) -> str:
     """
     attributes = {"": {key: value for key, value in dataset.attrs.items() if key != "checksum"}}
     attributes |= {str(name): dict(variable.attrs) for name, variable in dataset.variables.items()}
-    words = {name: {key: _plain(value) for key, value in each.items()} for name, each in attributes.items()}
+    words = {}
+    for name, attributes_of_one in attributes.items():
+        words[name] = {key: _plain(value) for key, value in attributes_of_one.items()}
     return text_hash(json.dumps([claims(dataset), words], sort_keys=True))
 
 

@@ -120,21 +120,21 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
     if not folder.is_dir():
         return wrong_file(path, what, must, hint=f"The folder {folder} does not exist")
     files = _files_in(folder)
-    there = f"Files there: {_listed(files)}" if files and not what else ""
-    return wrong_file(path, what, must, "" if what else "not", hint=nearest_file(path) or there)
+    listing = f"Files there: {_listed(files)}" if files and not what else ""
+    return wrong_file(path, what, must, "" if what else "not", hint=nearest_file(path) or listing)
 
 
 def nearest_file(path: Path) -> str:
     """Sentence that names the YAML or result file beside a path that may be meant by it; "" where there is none."""
-    known = [
+    candidates = [
         name for name in _files_in(path.parent) if nearest(path.stem, [Path(name).stem])
     ]  # not by its ending alone
-    return nearest(path.name, known)
+    return nearest(path.name, candidates)
 
 
 def _files_in(folder: Path) -> list[str]:
     """Names of the YAML and result files in a folder."""
-    return sorted(one.name for one in folder.iterdir() if one.suffix in (*_YAML, _RESULT)) if folder.is_dir() else []
+    return sorted(file.name for file in folder.iterdir() if file.suffix in (*_YAML, _RESULT)) if folder.is_dir() else []
 
 
 def _listed(files: Sequence[str]) -> str:
@@ -175,9 +175,9 @@ def _from_result(path: Path, what: str, allow_code: bool) -> Text:
         hint = "Take its scenario.yaml instead, if that can be trusted"
         got = "changed or damaged since: its checksum does not hold"
         raise wrong_file(path, what, "be as it was written", got, hint=hint)
-    found = parse(text, path.name, path.resolve().parent, what)
-    check_allowed(found.data, path, attributes.get("code"), what or str(path), allow_code)
-    return found
+    scenario = parse(text, path.name, path.resolve().parent, what)
+    check_allowed(scenario.data, path, attributes.get("code"), what or str(path), allow_code)
+    return scenario
 
 
 def parse(text: str, name: str, folder: Path, what: str = "", file: str = "scenario") -> Text:

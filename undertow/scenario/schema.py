@@ -61,7 +61,7 @@ NamedPart = Annotated[Part, _named()]
 _ONE, _SEVERAL = "(one part)", "(several parts)"
 OneOrMore = Annotated[
     Annotated[NamedPart, Tag(_ONE)] | Annotated[list[NamedPart], Tag(_SEVERAL)],
-    Discriminator(lambda given: _SEVERAL if isinstance(given, list) else _ONE),
+    Discriminator(lambda value: _SEVERAL if isinstance(value, list) else _ONE),
 ]
 Numbers = list[float]
 _LISTED = 5  # further wrong keys that a message names
@@ -123,11 +123,11 @@ class Window(Strict):
 
 Range = Annotated[
     Annotated[float | None, Tag(_ONE)] | Annotated[list[float], Tag(_SEVERAL)],
-    Discriminator(lambda given: _SEVERAL if isinstance(given, list) else _ONE),
+    Discriminator(lambda value: _SEVERAL if isinstance(value, list) else _ONE),
 ]
 NumberOrRandom = Annotated[
     Annotated[int | None, Tag(_ONE)] | Annotated[Literal["random"], Tag(_SEVERAL)],
-    Discriminator(lambda given: _SEVERAL if isinstance(given, str) else _ONE),
+    Discriminator(lambda value: _SEVERAL if isinstance(value, str) else _ONE),
 ]
 
 
@@ -227,11 +227,11 @@ class Bounds(Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _mapping(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            low, high = given if isinstance(given, list) and len(given) == 2 else ("low", "high")
+    def _mapping(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            low, high = value if isinstance(value, list) and len(value) == 2 else ("low", "high")
             raise ValueError(f"be bounds, such as {{between: [{low}, {high}]}}")
-        return given
+        return value
 
     @model_validator(mode="after")
     def _ordered(self) -> "Bounds":
@@ -330,7 +330,8 @@ def kind_of(data: Mapping[str, Any]) -> str:
     """What a file is by its keys: `campaign`, `vehicle file` or `scenario`; "" where it has no key of any."""
     if "scenario" in data:
         return "campaign"
-    vehicle, scenario = (sum(key in known for key in data) for known in (VEHICLE_KEYS, Scenario.model_fields))
+    vehicle = sum(key in VEHICLE_KEYS for key in data)
+    scenario = sum(key in Scenario.model_fields for key in data)
     return "vehicle file" if vehicle > scenario else "scenario" if scenario else ""
 
 
@@ -362,17 +363,17 @@ def check_kind(text: Text, key: str = "", where: str = "") -> None:
 def complaint(errors: ValidationError, text: Text, model: type[BaseModel] = Scenario) -> BadInput:
     """The first of pydantic's errors as BadInput, misspelt keys before others, and the names of the other keys."""
     first: Any
-    line = lambda one: text.lines.get(_path_of(one), 0)
-    first, *others = sorted(errors.errors(), key=lambda one: (one["type"] != "extra_forbidden", line(one)))
+    line = lambda error: text.lines.get(_path_of(error), 0)
+    first, *other_errors = sorted(errors.errors(), key=lambda error: (error["type"] != "extra_forbidden", line(error)))
     what, path, name = model.__name__.lower(), _path_of(first), _name_of(first)
-    where, also = text.where(path), _also(first, others, text)
+    where, also = text.where(path), _also(first, other_errors, text)
     if first["type"] == "extra_forbidden":
         hint = _section_of(path, model) or hint_for(path, what) or known_key(str(path[-1]), _keys_beside(path, model))
         return BadInput(name, f"be a key of the {what}", "unknown", hint=joined(hint, also), where=where)
     if first["type"] == "missing":
         section, _, key = name.rpartition(".")
-        place = f"`{section}`" if section else f"the {what}"
-        return BadInput(name, "be given", hint=joined(f"Add `{key}:` to {place}", also), where=where)
+        parent = f"`{section}`" if section else f"the {what}"
+        return BadInput(name, "be given", hint=joined(f"Add `{key}:` to {parent}", also), where=where)
     got = "empty" if first["input"] is None else _as_yaml(first["input"])
     return BadInput(name, _must(first), got, hint=joined(_remedy(first), also), where=where)
 
@@ -395,14 +396,18 @@ def _name_of(error: Any) -> str:
     return " ".join(name.split())
 
 
-def _also(first: Any, others: Sequence[Any], text: Text) -> str:
+def _also(first: Any, other_errors: Sequence[Any], text: Text) -> str:
     """Sentence with the other keys that are wrong; without those that a misspelt key leaves missing."""
-    misspelt = {_path_of(one)[:-1] for one in (first, *others) if one["type"] == "extra_forbidden"}
-    others = [one for one in others if one["type"] != "missing" or _path_of(one)[:-1] not in misspelt]
-    lines = {_name_of(one): text.lines.get(_path_of(one)) for one in others}
-    named = [f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)]
-    more = f" and {len(named) - _LISTED} more" if len(named) > _LISTED else ""
-    return f"Also wrong: {', '.join(named[:_LISTED])}{more}" if named else ""
+    misspelt = {_path_of(error)[:-1] for error in (first, *other_errors) if error["type"] == "extra_forbidden"}
+    other_errors = [
+        error for error in other_errors if error["type"] != "missing" or _path_of(error)[:-1] not in misspelt
+    ]
+    lines = {_name_of(error): text.lines.get(_path_of(error)) for error in other_errors}
+    named_keys = [
+        f"`{name}`{f' (line {line})' if line else ''}" for name, line in lines.items() if name != _name_of(first)
+    ]
+    more = f" and {len(named_keys) - _LISTED} more" if len(named_keys) > _LISTED else ""
+    return f"Also wrong: {', '.join(named_keys[:_LISTED])}{more}" if named_keys else ""
 
 
 def _must(error: Any) -> str:
@@ -452,8 +457,8 @@ def _keys_beside(path: tuple, model: Any) -> list[str]:
 def _beside_none(annotation: Any) -> Any:
     """The type of an optional value without None."""
     members = typing.get_args(annotation)
-    others = [one for one in members if one is not type(None)]
-    return others[0] if len(others) == 1 < len(members) else annotation
+    types = [member for member in members if member is not type(None)]
+    return types[0] if len(types) == 1 < len(members) else annotation
 
 
 class Key(NamedTuple):
@@ -475,14 +480,14 @@ def keys(model: type[BaseModel] = Scenario, prefix: str = "", defaults: BaseMode
     """
     for name, field in model.model_fields.items():
         inner = field.annotation if isinstance(field.annotation, type) else None
-        meaning, _, said = (field.description or "").partition("; default: ")
+        meaning, _, stated_default = (field.description or "").partition("; default: ")
         default = getattr(defaults, name) if defaults else field.get_default(call_default_factory=True)
         if inner is not None and issubclass(inner, Strict):
             yield Key(f"{prefix}{name}", "mapping", "see below", meaning)
             yield from keys(inner, f"{prefix}{name}.", default)
         else:
-            shown = default.kind if isinstance(default, Part) else "required" if field.is_required() else default
-            yield Key(f"{prefix}{name}", _type_name(field.annotation), said or shown, meaning)
+            default_text = default.kind if isinstance(default, Part) else "required" if field.is_required() else default
+            yield Key(f"{prefix}{name}", _type_name(field.annotation), stated_default or default_text, meaning)
 
 
 def _type_name(annotation: Any) -> str:

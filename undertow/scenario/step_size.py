@@ -35,12 +35,12 @@ def step_advice(plant: HybridVehicle, loop: ClosedLoopSettings) -> tuple[Advice,
     longest = _LIMITS[loop.method] / rate if rate else np.inf
     if step <= longest:
         return ()
-    says = (
+    message = (
         f"the {name} a time constant of {1e3 / rate:.3g} ms, for which integration steps above {1e3 * longest:.3g} ms "
         f"are unstable, but the step is {1e3 * step:g} ms: the run will diverge numerically"
     )
-    other = ", or another fidelity level" if name.startswith("thrusters") else ""
-    return (advice("loop.dt", says, f"Use {_remedy(loop, longest)}{other}"),)
+    alternative = ", or another fidelity level" if name.startswith("thrusters") else ""
+    return (advice("loop.dt", message, f"Use {_remedy(loop, longest)}{alternative}"),)
 
 
 def _hull_decay(body: Body) -> float:
@@ -58,11 +58,11 @@ def _remedy(loop: ClosedLoopSettings, longest: float) -> str:
 
 def fastest_decay(thruster: AbstractThruster) -> float:
     """Fastest decay of a thruster at rest, 1/s; 0 for one without a state."""
-    rest, tree = ravel_pytree(thruster.initial_state(1))
-    if not rest.size:
+    state, tree = ravel_pytree(thruster.initial_state(1))
+    if not state.size:
         return 0.0
     rates = lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0]
-    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(rest)))).max())
+    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(state)))).max())
 
 
 def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome) -> str:
@@ -75,7 +75,8 @@ def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Out
     if not failed or loop.method not in _LIMITS:
         return ""
     rate = max(_decays(closed_loop, loop, outcome), default=0.0)
-    step, longest = loop.dt / loop.substeps, _LIMITS[loop.method] / rate if rate else np.inf
+    step = loop.dt / loop.substeps
+    longest = _LIMITS[loop.method] / rate if rate else np.inf
     if loop.kind == "continuous":
         step = loop.dt
     if step <= longest:
@@ -93,7 +94,7 @@ def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome)
     plant, samples = closed_loop.plant, outcome.signals
     ordinary = np.abs(np.asarray(samples["velocity"])).max(axis=1) <= _ordinary(closed_loop, outcome)
     rows = np.flatnonzero(ordinary & (np.asarray(outcome.time) <= float(outcome.ended)))
-    chosen = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
+    sampled_rows = rows[np.unique(np.linspace(0, len(rows) - 1, _LOOKS).round().astype(int))] if len(rows) else []
     first = plant.initial_state(samples["position"][0], samples["velocity"][0])
     if loop.kind == "continuous":
         realization = closed_loop.realize(jax.random.PRNGKey(0))
@@ -101,10 +102,12 @@ def _decays(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome)
         rates = lambda state: ravel_pytree(flow(jnp.zeros(()), tree(state), realization))[0]
         return _fastest(rates, [(flat,)])
     _, tree = ravel_pytree(first)
-    still = plant.no_load()
-    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, still))[0]
-    states = [ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in chosen]
-    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, chosen, strict=True)])
+    no_load = plant.no_load()
+    rates = lambda state, u: ravel_pytree(plant.dynamics(jnp.zeros(()), tree(state), u, no_load))[0]
+    states = [
+        ravel_pytree(plant.initial_state(samples["position"][i], samples["velocity"][i]))[0] for i in sampled_rows
+    ]
+    return _fastest(rates, [(state, samples["input"][i]) for state, i in zip(states, sampled_rows, strict=True)])
 
 
 def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
@@ -116,11 +119,11 @@ def _ordinary(closed_loop: ClosedLoop, outcome: Outcome) -> float:
 
 def _fastest(rates: Callable[..., Any], points: list[tuple[Any, ...]]) -> list[float]:
     """Fastest decay rate at each point, without points where the fastest mode grows."""
-    slopes, found = jax.jit(jax.jacfwd(rates)), []
+    slopes, rates_of_decay = jax.jit(jax.jacfwd(rates)), []
     for point in points:
         matrix = np.asarray(slopes(*map(jnp.asarray, point)))
         if np.isfinite(matrix).all():
             poles = np.linalg.eigvals(matrix)
             fastest = poles[np.abs(poles).argmax()]
-            found += [float(abs(fastest))] if fastest.real < 0 else []
-    return found
+            rates_of_decay += [float(abs(fastest))] if fastest.real < 0 else []
+    return rates_of_decay

@@ -70,12 +70,15 @@ def hint_for(path: tuple[str | int, ...], file: str) -> str:
         path: of the unknown key.
         file: `scenario`, `campaign` or `vehicle file`.
     """
-    word, beside = str(path[-1]).lower().replace("-", "_"), path[:-1]
+    word = str(path[-1]).lower().replace("-", "_")
+    beside = path[:-1]
     for key, words in WORDS.get(file, {}).items():
         *section, name = key.split(".")
         if word not in words.split():
             continue
-        if len(section) == len(beside) and all(one in ("*", other) for one, other in zip(section, beside, strict=True)):
+        if len(section) == len(beside) and all(
+            expected in ("*", actual) for expected, actual in zip(section, beside, strict=True)
+        ):
             return f"Did you mean `{name}`?"
         if section and not beside and "*" not in section:
             kind = "kind: ..., " if section[0] in catalogue.KIND_OF and section[0] != "plant" else ""

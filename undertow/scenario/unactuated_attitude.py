@@ -31,7 +31,7 @@ class Lean(NamedTuple):
 
 @double_outside_runs
 def largest_lean(
-    plant: HybridVehicle, angles: Float[np.ndarray, "k 3"], through: Float[np.ndarray, "k 3"]
+    plant: HybridVehicle, angles: Float[np.ndarray, "k 3"], relative_velocity: Float[np.ndarray, "k 3"]
 ) -> Lean | None:
     """The largest lean at which a vehicle is at rest about an axis that is not actuated; None where all are.
 
@@ -42,15 +42,19 @@ def largest_lean(
     Args:
         plant: vehicle with thrusters, which act along surge, sway and heave; otherwise None is returned.
         angles: of the target: roll, pitch, yaw, rad.
-        through: velocities of the target through the water, world axes, m/s.
+        relative_velocity: velocities of the target through the water, world axes, m/s.
     """
-    free = np.eye(6) - acting_directions(plant)
-    if (np.diagonal(free)[:3] > _UNACTUATED).any():
+    unactuated = np.eye(6) - acting_directions(plant)
+    if (np.diagonal(unactuated)[:3] > _UNACTUATED).any():
         return None
     roll, pitch, yaw = angles.T
     rotation = _turns(2, yaw) @ _turns(1, pitch) @ _turns(0, roll)
-    leans = [_lean_about(plant.body, axis, free, rotation, through) for axis in _AXES if free[axis, axis] > _UNACTUATED]
-    return max(leans, key=lambda one: one.angle, default=None)
+    leans = [
+        _lean_about(plant.body, axis, unactuated, rotation, relative_velocity)
+        for axis in _AXES
+        if unactuated[axis, axis] > _UNACTUATED
+    ]
+    return max(leans, key=lambda lean: lean.angle, default=None)
 
 
 def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
@@ -59,12 +63,14 @@ def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
     return matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
 
 
-def _lean_about(body: Body, axis: int, free: np.ndarray, rotation: np.ndarray, through: np.ndarray) -> Lean:
+def _lean_about(
+    body: Body, axis: int, unactuated: np.ndarray, rotation: np.ndarray, relative_velocity: np.ndarray
+) -> Lean:
     angles = np.linspace(-_STEEPEST, _STEEPEST, _ANGLES)
     turned = rotation[:, None] @ _turns(axis - 3, angles)
-    flow = np.einsum("kaij,ki->kaj", turned, through)
+    flow = np.einsum("kaij,ki->kaj", turned, relative_velocity)
     nu = np.concatenate([flow, np.zeros_like(flow)], axis=-1)
-    moment = np.asarray(body_force(body, nu.reshape(-1, 6), turned[:, :, 2].reshape(-1, 3))) @ free[:, axis]
+    moment = np.asarray(body_force(body, nu.reshape(-1, 6), turned[:, :, 2].reshape(-1, 3))) @ unactuated[:, axis]
     leans = [_at_rest(angles, row) for row in moment.reshape(len(rotation), -1)]
     worst = int(np.argmax(leans))
     return Lean(_AXES[axis], leans[worst], worst)
@@ -73,8 +79,8 @@ def _lean_about(body: Body, axis: int, free: np.ndarray, rotation: np.ndarray, t
 @eqx.filter_jit
 def body_force(body: Body, nu: Float[ArrayLike, "k 6"], down: Float[ArrayLike, "k 3"]) -> Float[jax.Array, "k 6"]:
     """C(nu) nu + D(nu) + g at body velocities through the water and directions of gravity, N and N m."""
-    one = lambda velocity, gravity: body.coriolis(velocity) + body.damping(velocity) + body.restoring(gravity)
-    return jax.vmap(one)(nu, down)
+    force = lambda velocity, gravity: body.coriolis(velocity) + body.damping(velocity) + body.restoring(gravity)
+    return jax.vmap(force)(nu, down)
 
 
 def _at_rest(angles: np.ndarray, moment: np.ndarray) -> float:

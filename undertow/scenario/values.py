@@ -85,9 +85,9 @@ def _listed(value: Any) -> str:
     """How to write a list that lacks its square brackets; "" where it is none."""
     inner = value.strip().strip("()") if isinstance(value, str) else ""
     entries = re.split(r",\s*|\s+", inner)
-    several = len(entries) > 2 or (len(entries) == 2 and (" " in inner or inner != value.strip()))
-    whole = several and all(map(_NUMBER.fullmatch, entries))
-    return f"Write it in square brackets, with commas: [{', '.join(entries)}]" if whole else ""
+    has_several = len(entries) > 2 or (len(entries) == 2 and (" " in inner or inner != value.strip()))
+    is_list_of_numbers = has_several and all(map(_NUMBER.fullmatch, entries))
+    return f"Write it in square brackets, with commas: [{', '.join(entries)}]" if is_list_of_numbers else ""
 
 
 def _is(value: Any, kind: type) -> bool:
@@ -98,5 +98,5 @@ def _is(value: Any, kind: type) -> bool:
 def _numbers(value: Any, depth: int = 3) -> bool:
     """Whether a value is a number, or lists of numbers to a depth."""
     if isinstance(value, list):
-        return depth > 0 and all(_numbers(one, depth - 1) for one in value)
+        return depth > 0 and all(_numbers(entry, depth - 1) for entry in value)
     return _is(value, float)

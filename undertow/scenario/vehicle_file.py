@@ -55,14 +55,14 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
         BadInput: anything wrong, with the line in the file unless it is among the changes.
     """
     changes = dict(changes or {})
-    kept = changes.pop("contents", None)
-    if kept is not None and not isinstance(kept, Mapping):
-        raise BadInput("contents", "be a mapping, as in a vehicle file", kept)
-    text = read(path, what) if kept is None else from_data(kept)
-    if kept is None and (kind := kind_of(text.data)) in ("scenario", "campaign"):
+    stored_contents = changes.pop("contents", None)
+    if stored_contents is not None and not isinstance(stored_contents, Mapping):
+        raise BadInput("contents", "be a mapping, as in a vehicle file", stored_contents)
+    text = read(path, what) if stored_contents is None else from_data(stored_contents)
+    if stored_contents is None and (kind := kind_of(text.data)) in ("scenario", "campaign"):
         hint = "A vehicle file has the keys mass, inertia, thrusters, ..., as in examples/my_rov.yaml"
         raise wrong_file(path, what, "be a vehicle file", f"a {kind}", hint=hint)
-    forgotten = {other for key in changes for other in INSTEAD.get(key, ())} - set(changes)
+    forgotten = {alternative for key in changes for alternative in INSTEAD.get(key, ())} - set(changes)
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}
     changed = frozenset(changes)
@@ -73,8 +73,8 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
 def vehicle_location(scenario: Text) -> Callable[[str], str]:
     """Location of a key of a scenario's vehicle: a line of the vehicle file, or of the scenario where that sets it."""
     plant = scenario.data.get("plant")
-    given = plant.get("vehicle") if isinstance(plant, Mapping) else None
-    options = {"kind": given} if isinstance(given, str) else dict(given or {})
+    vehicle = plant.get("vehicle") if isinstance(plant, Mapping) else None
+    options = {"kind": vehicle} if isinstance(vehicle, str) else dict(vehicle or {})
     name = options.pop("kind", "")
     in_scenario = lambda key: scenario.location(f"plant.vehicle.{key}")
     if not is_vehicle_file(name) or "contents" in options or not (scenario.folder / name).is_file():
@@ -87,7 +87,7 @@ def _location(text: Text, changed: frozenset[str]) -> Callable[[str], str]:
     """Location of a key in the file, or of the key from which it follows; none where it has been changed."""
 
     def location(name: str) -> str:
-        given = name if name in text.data else _FROM.get(name, name)
-        return "" if set(key_path(given)[:1]) & changed else text.location(given)
+        source_key = name if name in text.data else _FROM.get(name, name)
+        return "" if set(key_path(source_key)[:1]) & changed else text.location(source_key)
 
     return location

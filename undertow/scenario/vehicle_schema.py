@@ -17,7 +17,8 @@ from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.synonyms import hint_for
 from undertow.scenario.values import checked
 
-_AXES, _SIX = "forward, starboard, down", ", ".join(BODY_AXES)
+_AXES = "forward, starboard, down"
+_SIX = ", ".join(BODY_AXES)
 SCALARS = {"mass": "kg", "weight": "N", "gravity": "m/s^2", "buoyancy": "N", "volume": "m^3", "water_density": "kg/m^3"}
 VECTORS = {"r_g": _AXES, "r_b": _AXES, "size": "length, width, height"}
 MATRICES = {"inertia": (3, "about forward, starboard, down")} | {
@@ -54,9 +55,9 @@ def check_keys(contents: Mapping[str, Any]) -> None:
         hint = joined(hint, _listed("Also unknown", unknown[1:]))
         raise BadInput(unknown[0], "be a key of a vehicle file", "unknown", hint=hint)
     for key in contents:
-        for other in INSTEAD.get(key, ()):
-            if other in contents:
-                raise BadInput(key, f"be left out when there is `{other}`", contents[key])
+        for alternative in INSTEAD.get(key, ()):
+            if alternative in contents:
+                raise BadInput(key, f"be left out when there is `{alternative}`", contents[key])
     if missing := [key for key in _IN_WORDS if key not in contents]:
         must = f"be given: {_IN_WORDS[missing[0]]}"
         raise BadInput(missing[0], must, hint=_listed("Also missing", missing[1:]))
@@ -246,7 +247,8 @@ class VehicleData(NamedTuple):
         directions = np.asarray(self.layout.directions)
         lengths = np.linalg.norm(directions, axis=1)
         for j in np.flatnonzero(~(np.abs(lengths - 1) < _ROUNDING)):
-            name, hint = f"thrusters[{j}].direction", "Divide it by its length"
+            name = f"thrusters[{j}].direction"
+            hint = "Divide it by its length"
             raise BadInput(name, "have length 1", f"{lengths[j]:.6g} long", hint=hint)
         return assemble(self.name, self.hull, self.layout._replace(directions=directions / lengths[:, None]))
 
@@ -284,7 +286,8 @@ def parse(contents: Mapping[str, Any]) -> VehicleData:
     matrices = {key: matrix_at(contents, key) for key in MATRICES}
     positions, directions = poses(contents["thrusters"])
     source, gravity = text_at(contents, "source", "not said"), numbers.get("gravity", _GRAVITY)
-    weight, notes = numbers.get("weight", numbers["mass"] * gravity), {}
+    weight = numbers.get("weight", numbers["mass"] * gravity)
+    notes = {}
     if "weight" not in numbers:
         notes["weight"] = f"derived: m g with g = {gravity:g} m/s^2"
     if "volume" in numbers:

@@ -23,8 +23,9 @@ class Mistake(NamedTuple):
 def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
     """The mistake behind an error of the parser in a text."""
     problem = " ".join((error.problem or "malformed").split())
-    found, begun = _line(error.problem_mark), _line(error.context_mark)
-    line, lines = found or begun, text.splitlines()
+    problem_line, context_line = _line(error.problem_mark), _line(error.context_mark)
+    line = problem_line or context_line
+    lines = text.splitlines()
     if r"character '\t'" in problem:
         return Mistake("it has a tab", line, "Indent with spaces")
     if "character" in problem and "cannot start any token" in problem:
@@ -39,16 +40,16 @@ def mistake_of(error: MarkedYAMLError, text: str) -> Mistake:
     if "expected <block end>" in problem or "entries are not allowed" in problem:
         return Mistake("the indentation does not fit the lines above", line, _ALIGN)
     if "could not find expected ':'" in problem:
-        return Mistake("a key has no colon", begun or line, "Write `key: value`, with a space after the colon")
+        return Mistake("a key has no colon", context_line or line, "Write `key: value`, with a space after the colon")
     if "expected ',' or '}'" in problem and line and (key := _BRACKETED.search(_uncommented(_at(lines, line)))):
         hint = f'Inside braces, quote a key that has brackets: {{"{key[1]}":{key[2]}}}'
         return Mistake(f"the key {key[1]} has brackets, but no quotes", line, hint)
     if opened := re.match(r"expected ',' or '([\]}])'", problem):
         closing = opened[1]
-        says = f"a `{'[' if closing == ']' else '{'}` is not closed, or lacks a comma"
-        return Mistake(says, begun or line, f"Add `{closing}`, and commas between the entries")
+        message = f"a `{'[' if closing == ']' else '{'}` is not closed, or lacks a comma"
+        return Mistake(message, context_line or line, f"Add `{closing}`, and commas between the entries")
     if "quoted scalar" in str(error.context) and "escape" not in problem:
-        return Mistake("a quotation mark is not closed", begun or line, "Close it in the same line")
+        return Mistake("a quotation mark is not closed", context_line or line, "Close it in the same line")
     if "escape" in problem:
         return Mistake(problem, line, "Put text with a backslash in single quotes")
     return Mistake(problem, line, "")
@@ -60,7 +61,7 @@ def _line(mark) -> int | None:
 
 def _last(lines: list[str]) -> int:
     """Number of the last line with more than a comment; 0 where there is none."""
-    return max((number for number, each in enumerate(lines, start=1) if _uncommented(each).strip()), default=0)
+    return max((number for number, line in enumerate(lines, start=1) if _uncommented(line).strip()), default=0)
 
 
 def _at(lines: list[str], line: int) -> str:

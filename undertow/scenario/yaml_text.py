@@ -90,13 +90,13 @@ class _Composer:
 
     def document(self) -> _Node:
         """The first document, which must be the only one."""
-        nothing, documents = _Node(None, {}, 1, 0), []
+        empty, documents = _Node(None, {}, 1, 0), []
         for event in self._events:
             if isinstance(event, DocumentStartEvent):
                 if documents:
                     raise Malformed("be one YAML document", "several", event.start_mark.line + 1)
                 documents.append(self._node(next(self._events), 0))
-        return documents[0] if documents else nothing
+        return documents[0] if documents else empty
 
     def _parsed(self, text: str) -> Iterator[Any]:
         try:
@@ -111,9 +111,9 @@ class _Composer:
         if isinstance(event, AliasEvent):
             if event.anchor not in self._anchors:
                 raise _invalid(f"found undefined alias {event.anchor!r}", line)
-            found = self._anchors[event.anchor]
-            self._counted(found.size, depth + found.depth, line)
-            return found
+            anchored = self._anchors[event.anchor]
+            self._counted(anchored.size, depth + anchored.depth, line)
+            return anchored
         if event.tag is not None and not (isinstance(event, ScalarEvent) and str(event.tag) == "!"):
             raise Malformed("be YAML without tags", f"tagged {event.tag}", line, "Leave the tag out")
         self._counted(1, depth, line)
@@ -148,7 +148,7 @@ class _Composer:
         return entries, lines
 
     def _mapping(self, depth: int) -> tuple[dict[str, _Node], dict[str | int, int]]:
-        own: dict[str, _Node] = {}
+        entries: dict[str, _Node] = {}
         lines: dict[str | int, int] = {}
         merged: dict[str, _Node] = {}
         while not isinstance(event := next(self._events), MappingEndEvent):
@@ -159,11 +159,11 @@ class _Composer:
             if merge:
                 merged = {**_mergeable(node, line), **merged}
                 continue
-            if key in own:
-                says = f"the key `{key}` is given twice, first in line {lines[key]}"
-                raise _invalid(says, line, "Remove one of them")
-            own[key], lines[key] = node, line
-        return {**own, **{key: node for key, node in merged.items() if key not in own}}, lines
+            if key in entries:
+                message = f"the key `{key}` is given twice, first in line {lines[key]}"
+                raise _invalid(message, line, "Remove one of them")
+            entries[key], lines[key] = node, line
+        return {**entries, **{key: node for key, node in merged.items() if key not in entries}}, lines
 
     def _key(self, event: Any, depth: int) -> str:
         node = self._node(event, depth + 1)
@@ -200,10 +200,10 @@ class _Composer:
 
 def _mergeable(node: _Node, line: int) -> dict[str, _Node]:
     """The keys that `<<` merges from a mapping, or from several, of which the first has precedence."""
-    several = node.value if isinstance(node.value, list) else [node]
-    if not all(isinstance(one.value, dict) for one in several):
+    mappings = node.value if isinstance(node.value, list) else [node]
+    if not all(isinstance(mapping.value, dict) for mapping in mappings):
         raise _invalid("`<<` takes a mapping, or a list of them", line)
-    return {key: value for one in reversed(several) for key, value in one.value.items()}
+    return {key: value for mapping in reversed(mappings) for key, value in mapping.value.items()}
 
 
 def _invalid(problem: str, line: int | None, hint: str = "") -> Malformed:

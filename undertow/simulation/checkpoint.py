@@ -84,9 +84,9 @@ class Checkpoint:
             OutOfTime: the budget is used up before it is done.
         """
         elapsed = lambda: self._clock() - self._started
-        while not work.done() and (left := self._budget - elapsed()) > 0:
+        while not work.done() and (remaining := self._budget - elapsed()) > 0:
             with contextlib.suppress(TimeoutError):
-                return work.result(timeout=min(_BETWEEN_WORDS, left))
+                return work.result(timeout=min(_BETWEEN_WORDS, remaining))
             if not work.done():
                 say(f"{what}: {elapsed():.0f} s so far")
         if not work.done():
@@ -105,19 +105,20 @@ class Checkpoint:
         Raises:
             OutOfTime: it would exceed the budget.
         """
-        place = np.asarray(at, dtype=float).tolist()
+        arguments = np.asarray(at, dtype=float).tolist()
         if self._asked < len(self._known):
-            found = self._known[self._asked]
-            if (found["what"], found["at"]) != (what, place):
+            entry = self._known[self._asked]
+            if (entry["what"], entry["at"]) != (what, arguments):
                 raise BadInput("--resume", "repeat the same steps as before", f"a run with other steps from {what} on")
             self._asked += 1
-            return found["answer"]
-        begun = self.elapsed
-        if not must and begun + self._longest.get(what, 0.0) > self._budget:
+            return entry["answer"]
+        elapsed_before = self.elapsed
+        if not must and elapsed_before + self._longest.get(what, 0.0) > self._budget:
             raise OutOfTime
         answer = compute()
-        self._longest[what] = self.elapsed - begun if what in self._longest else 0.0  # the first one is compiled
-        line = {"what": what, "at": place, "answer": answer, "elapsed": self.elapsed}
+        # The first evaluation of a kind is compiled, and says nothing of how long the next one takes.
+        self._longest[what] = self.elapsed - elapsed_before if what in self._longest else 0.0
+        line = {"what": what, "at": arguments, "answer": answer, "elapsed": self.elapsed}
         with self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
             file.flush()
@@ -145,7 +146,7 @@ def _read(path: Path, about: str, resume: bool, what: str) -> list[dict[str, Any
     try:
         lines = path.read_bytes().decode().splitlines(keepends=True)
         entries = [json.loads(line) for line in lines if line.endswith("\n")]  # the last one may be incomplete
-        known = [{key: entry[key] for key in _KEYS} for entry in entries[1:]]
+        evaluations = [{key: entry[key] for key in _KEYS} for entry in entries[1:]]
     except (ValueError, KeyError, TypeError) as error:
         hint = "Remove it to start again"
         raise BadInput("--resume", "find a checkpoint that can be read", f"{path}: {error!r}", hint=hint) from None
@@ -153,4 +154,4 @@ def _read(path: Path, about: str, resume: bool, what: str) -> list[dict[str, Any
         raise BadInput("--resume", "continue with the same scenario and method", "given with others")
     if lines and not lines[-1].endswith("\n"):
         write_whole(path, "".join(lines[:-1]))
-    return known
+    return evaluations

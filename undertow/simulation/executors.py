@@ -45,14 +45,14 @@ def in_threads(function: Callable[..., Columns], work: Sequence[Work], threads: 
     """Number and result of each piece of work as it is completed, by threads of this process."""
     with _taking_turns(), ThreadPoolExecutor(threads) as pool:
         waiting = enumerate(work)
-        going = {pool.submit(function, *one): i for i, one in itertools.islice(waiting, _AHEAD * threads)}
+        futures = {pool.submit(function, *arguments): i for i, arguments in itertools.islice(waiting, _AHEAD * threads)}
         try:
-            while going:
-                done, _ = wait(going, return_when=FIRST_COMPLETED)
+            while futures:
+                done, _ = wait(futures, return_when=FIRST_COMPLETED)
                 for future in done:
-                    number = going.pop(future)
-                    for i, one in itertools.islice(waiting, 1):
-                        going[pool.submit(function, *one)] = i
+                    number = futures.pop(future)
+                    for i, arguments in itertools.islice(waiting, 1):
+                        futures[pool.submit(function, *arguments)] = i
                     yield number, future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -84,17 +84,17 @@ def by_dask(function: Callable[..., Columns], work: Sequence[Work], client: Any)
 
     waiting = enumerate(work)
     ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-    start = lambda one: client.submit(function, *one, pure=False, retries=3)
-    numbers = {start(one): i for i, one in itertools.islice(waiting, ahead)}
+    start = lambda arguments: client.submit(function, *arguments, pure=False, retries=3)
+    numbers = {start(arguments): i for i, arguments in itertools.islice(waiting, ahead)}
     done = as_completed(list(numbers), raise_errors=False)
     try:
         for future in done:
             number, result = numbers.pop(future), future.result()
             future.release()
-            for i, one in itertools.islice(waiting, 1):
-                further = start(one)
-                numbers[further] = i
-                done.add(further)
+            for i, arguments in itertools.islice(waiting, 1):
+                next_future = start(arguments)
+                numbers[next_future] = i
+                done.add(next_future)
             yield number, result
     except (FutureCancelledError, CommClosedError, TimeoutError) as error:
         raise OSError(f"the connection to the Dask cluster is lost ({error})") from error
@@ -211,8 +211,8 @@ def _check_slurm() -> None:
     except OSError as error:
         raise BadInput("--cluster", "find SLURM on this machine", str(error)) from None
     except subprocess.CalledProcessError as error:
-        said = error.stderr.strip().splitlines() or ["sinfo fails"]
-        raise BadInput("--cluster", "find a SLURM that answers", said[-1]) from None
+        error_lines = error.stderr.strip().splitlines() or ["sinfo fails"]
+        raise BadInput("--cluster", "find a SLURM that answers", error_lines[-1]) from None
 
 
 def _in_slurm(workers: int) -> Any:
@@ -220,11 +220,11 @@ def _in_slurm(workers: int) -> Any:
     from dask_jobqueue.slurm import SLURMCluster
 
     setting = lambda key, usual: config.get(f"jobqueue.slurm.{key}", None) or usual
-    found = SLURMCluster(
+    cluster = SLURMCluster(
         cores=setting("cores", 1),
         memory=setting("memory", "2 GB"),
         scheduler_options={"dashboard_address": _PAGE, **(setting("scheduler-options", {}))},
         worker_extra_args=["--dashboard-address", _PAGE, *setting("worker-extra-args", [])],
     )
-    found.scale(jobs=workers)
-    return found
+    cluster.scale(jobs=workers)
+    return cluster

@@ -45,17 +45,17 @@ class _Process:
 
     def result(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Result of a function there; its exception is raised here."""
-        asked, answer = self._process.stdin, self._process.stdout
-        assert asked is not None and answer is not None
+        request, answer = self._process.stdin, self._process.stdout
+        assert request is not None and answer is not None
         try:
-            asked.write(pickle.dumps((function, arguments)))
-            asked.flush()
-            error, found = pickle.load(answer)  # written by our own process
+            request.write(pickle.dumps((function, arguments)))
+            request.flush()
+            error, value = pickle.load(answer)  # written by our own process
         except (OSError, EOFError) as lost:
             raise CancelledError if self._ended else _Lost from lost
         if error is not None:
             raise error
-        return found
+        return value
 
     def end(self) -> None:
         """End it, whatever it does."""
@@ -73,10 +73,10 @@ class _Pool(ThreadPoolExecutor):
     """
 
     def __init__(self, processes: list[_Process]):
-        places: queue.SimpleQueue[_Process | None] = queue.SimpleQueue()
-        for place in (*processes, None):
-            places.put(place)
-        super().__init__(1 + len(processes), initializer=lambda: setattr(_own, "process", places.get()))
+        free_processes: queue.SimpleQueue[_Process | None] = queue.SimpleQueue()
+        for process in (*processes, None):
+            free_processes.put(process)
+        super().__init__(1 + len(processes), initializer=lambda: setattr(_own, "process", free_processes.get()))
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         assert not kwargs, "arguments are positional"
@@ -175,8 +175,8 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
         return pickle.dumps((None, function(*arguments)))
     except Exception as error:
         try:
-            written = pickle.dumps((error, None))
-            pickle.loads(written)
+            pickled = pickle.dumps((error, None))
+            pickle.loads(pickled)
         except Exception:  # one that cannot be pickled is passed on as text
-            written = pickle.dumps((RuntimeError("".join(traceback.format_exception(error))), None))
-        return written
+            pickled = pickle.dumps((RuntimeError("".join(traceback.format_exception(error))), None))
+        return pickled

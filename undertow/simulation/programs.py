@@ -64,15 +64,15 @@ class _Collector:
     def add(self, batch: RunBatch, first_place: int) -> None:
         """Add runs whose places begin at a number."""
         pairs = zip(numbers_of(batch.first.run), batch.numbers, strict=True)
-        for number, (leaf, own) in enumerate(pairs):
+        for number, (leaf, varying) in enumerate(pairs):
             shared, column = self.shared[number], self._columns[number]
-            if shared is not None and not _equal(shared, leaf, own):
+            if shared is not None and not _equal(shared, leaf, varying):
                 # The runs so far have it, these do not.
                 column.append(np.broadcast_to(np.array(shared), (self.count, *np.shape(shared))))
                 self.shared[number] = shared = None
             if shared is None:
                 # Copies: views would keep JAX's arrays, and those ten times the memory.
-                column.append(np.repeat(np.array(leaf)[None], batch.size, axis=0) if own is None else own)
+                column.append(np.repeat(np.array(leaf)[None], batch.size, axis=0) if varying is None else varying)
         self._places.append(np.arange(first_place, first_place + batch.size))
         self._steps.append(np.full(batch.size, batch.first.plan.steps))
         self.count += batch.size
@@ -148,7 +148,8 @@ class ProgramCache:
         count = len(group.places)
         # For one run a program of width one is faster than one of width eight.
         width = min(simd_width(64), 1 << (count - 1).bit_length()) if group.narrow else 0
-        first, options = group.first, {"xla_width": self._xla_width, "gpu": self._gpu}
+        first = group.first
+        options = {"xla_width": self._xla_width, "gpu": self._gpu}
         return BatchRunner(first.run, first.plan, constant, backend=first.backend, runs=count, width=width, **options)
 
     def _expected_constants(self, batch: RunBatch) -> list[Any]:
@@ -162,7 +163,7 @@ class ProgramCache:
         with self._lock:
             if self._shared is None:
                 collectors = _collected(self._probes(), lambda first: structure(first.run), _numbers_of_first)
-                self._shared = {form: one.shared for form, one in collectors.items() if one.count > 1}
+                self._shared = {form: collector.shared for form, collector in collectors.items() if collector.count > 1}
             return self._shared
 
     def _correct(self, collectors: dict[ProgramKey, _Collector]) -> None:
@@ -198,13 +199,13 @@ def _key_of(first: PreparedRun) -> ProgramKey:
 def _numbers_of_first(batch: RunBatch) -> list[Any]:
     """Numbers of the first run of a batch."""
     pairs = zip(numbers_of(batch.first.run), batch.numbers, strict=True)
-    return [leaf if own is None else own[0] for leaf, own in pairs]
+    return [leaf if varying is None else varying[0] for leaf, varying in pairs]
 
 
-def _equal(shared: Any, leaf: Any, own: np.ndarray | None) -> bool:
+def _equal(shared: Any, leaf: Any, varying: np.ndarray | None) -> bool:
     """Whether all runs of a batch have a number."""
-    if own is not None:
-        return bool((own == np.asarray(shared)).all())
+    if varying is not None:
+        return bool((varying == np.asarray(shared)).all())
     return leaf is shared or np.array_equal(leaf, shared)
 
 

@@ -39,8 +39,8 @@ class BatchResult(NamedTuple):
 
     def each(self) -> Iterator[tuple[int, Outcome]]:
         """Place and outcome of every run."""
-        for row, place in enumerate(self.places.tolist()):
-            yield place, outcome_of(self.outcome, row)
+        for row, index in enumerate(self.places.tolist()):
+            yield index, outcome_of(self.outcome, row)
 
 
 def run_many(
@@ -84,15 +84,17 @@ def run_group(
         rows: which of them; all unless given.
         programs: programs of earlier calls, to use and to add to.
     """
-    found = []
+    results = []
     rows = np.arange(len(group.places)) if rows is None else rows
     with runtime.in_precision(group.first.precision), runtime.on_processor():
         runner = (ProgramCache() if programs is None else programs).runner(group)
         for steps in dict.fromkeys(group.steps[rows].tolist()):
-            chosen = rows[group.steps[rows] == steps]
-            outcome = runner.run(group.numbers_of_runs(chosen), steps)
-            found.append(BatchResult(group.places[chosen], group.first, outcome, runner.backend, runner.left_to_xla))
-    return found
+            rows_of_length = rows[group.steps[rows] == steps]
+            outcome = runner.run(group.numbers_of_runs(rows_of_length), steps)
+            results.append(
+                BatchResult(group.places[rows_of_length], group.first, outcome, runner.backend, runner.left_to_xla)
+            )
+    return results
 
 
 def run_together(runs: Sequence[PreparedRun], workers: int = 1) -> Outcome:

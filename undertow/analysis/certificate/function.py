@@ -30,15 +30,16 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Lyapunov:
     """V_f = 1/2 E^T P E + gamma_eps/2 eps^2 + |theta - theta*|^2 / (2 gamma), Eq. (46). No gamma, no third part."""
     adaptation = np.broadcast_to(law.adaptation, run.sizes["axis"])
     per_weight = np.divide(1.0, adaptation, out=np.zeros(adaptation.shape), where=adaptation > 0)
-    own = np.asarray(law.composite) * run["modelling_error"].values ** 2 + per_weight * _departure(run)
-    estimation = own.sum(-1) / 2
+    terms = np.asarray(law.composite) * run["modelling_error"].values ** 2 + per_weight * _departure(run)
+    estimation = terms.sum(-1) / 2
     return Lyapunov("V_f of Eq. (46)", run["lyapunov_tracking"].values + estimation, estimation)
 
 
 def of_set_point(law: RCAF, run: xr.Dataset) -> np.ndarray:
     """V_f of Eq. (46), one column per axis, along a run towards a set-point, with `minimax_weight`: (time, axis)."""
     error = np.stack([run["error"].values, -run["velocity"].values], axis=-1)
-    p, eps = np.asarray(law.lyapunov()), run["modelling_error"].values
+    p = np.asarray(law.lyapunov())
+    eps = run["modelling_error"].values
     departure = run["weights"].values - minimax_weight(run)[..., None]
     tracking = 0.5 * np.einsum("...i,...ij,...j", error, p, error)
     composite, adaptation = np.asarray(law.composite), np.asarray(law.adaptation)
@@ -66,7 +67,8 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
     """
     matrix = gramian(law.estimator, dt, run.sizes["axis"])
     d_til = run["estimate"].values - run["uncertainty"].values
-    eps, rho = run["modelling_error"].values, float(law.estimator.fuzzy.basis_norm_squared())
+    eps = run["modelling_error"].values
+    rho = float(law.estimator.fuzzy.basis_norm_squared())
     per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
     share = np.broadcast_to(law.tracking_share, eps.shape[1:])
     if not (share > 0).all():
@@ -79,8 +81,8 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
 def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
     """Matrix of (eps, d_hat - d) from one step to the next, per axis, for constant d and basis: poles at exp(p T)."""
     of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(as_array(dt)))
-    one = np.ones(axes)
-    return np.stack([np.stack([1 - of_rates, dt * one], -1), np.stack([-of_estimate, one], -1)], -2)
+    ones = np.ones(axes)
+    return np.stack([np.stack([1 - of_rates, dt * ones], -1), np.stack([-of_estimate, ones], -1)], -2)
 
 
 def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
@@ -92,9 +94,9 @@ def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
     step = transition(estimator, dt, axes)
     start = np.zeros((2, 2))
     start[0, 0] = 1.0
-    kept = np.einsum("nji,nlk->nikjl", step, step).reshape(axes, 4, 4)  # vec(A^T W A) = kept vec(W)
+    propagation = np.einsum("nji,nlk->nikjl", step, step).reshape(axes, 4, 4)  # vec(A^T W A) = propagation vec(W)
     fall = (1 - step[:, 0, 0])[:, None] * start.ravel()
-    return np.linalg.solve(np.eye(4) - kept, fall[..., None]).reshape(axes, 2, 2)
+    return np.linalg.solve(np.eye(4) - propagation, fall[..., None]).reshape(axes, 2, 2)
 
 
 def _departure(run: xr.Dataset) -> np.ndarray:
@@ -111,10 +113,12 @@ _FORGOTTEN, _STEPS = 1e-12, 20_000
 
 def lyapunov_residual(law: RCAF, axes: int) -> float:
     """What tanh adds to Vf_dot at most, all axes together: U9, I22. Zero with sign. m^2/s^3 and rad^2/s^3."""
-    own = _layer(law.switching, law.robust_gain, law.layer)
+    robust_share = _layer(law.switching, law.robust_gain, law.layer)
     compensation = law.identification
-    other = _layer(compensation.switching, compensation.compensation_gain, compensation.compensation_layer)
-    return float(np.broadcast_to(own + np.asarray(law.composite) * other, axes).sum())
+    identification_share = _layer(
+        compensation.switching, compensation.compensation_gain, compensation.compensation_layer
+    )
+    return float(np.broadcast_to(robust_share + np.asarray(law.composite) * identification_share, axes).sum())
 
 
 def _layer(switching: str, amplitude, layer):

@@ -48,9 +48,9 @@ def of_any(law: RCAF | RobustRCAF, bound: np.ndarray, run: xr.Dataset) -> Iterat
 def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """The two amplitudes: omega is what no constant theta* explains, at best half the range of d."""
     omega = np.abs(minimax_weight(run) - run["uncertainty"].values)
-    whole = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - ROUNDING)
+    unsaturated = (run["saturated"].values == 0).all(-1) & (run["attained_share"].values >= 1 - ROUNDING)
     sentence = "w_bar >= |omega + sigma|, Eq. (43), with sigma = 0 (else it is not recorded)"
-    yield Hypothesis("robust_gain", sentence, whole & (omega <= np.asarray(law.robust_gain)).all(-1))
+    yield Hypothesis("robust_gain", sentence, unsaturated & (omega <= np.asarray(law.robust_gain)).all(-1))
     amplitude = np.asarray(law.identification.compensation_gain)
     if law.modification is not None or law.identification_input != "applied":
         sentence = "the weights follow Eq. (44), Eq. (32) is driven by the applied input"
@@ -62,15 +62,15 @@ def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
     rho = (np.asarray(fuzzy.basis(as_array(eps.reshape(-1, 1)))) ** 2).sum(-1).reshape(eps.shape)
-    still = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
-    yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", still)
+    basis_is_constant = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
+    yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", basis_is_constant)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records is not recorded")
 
 
 def _constant(d: np.ndarray) -> np.ndarray:
     """Whether d is at each record what it was at the one before."""
-    still = (np.abs(np.diff(d, axis=0)) <= ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
-    return np.concatenate([still[:1], still]) if len(still) else np.ones(len(d), bool)
+    unchanged = (np.abs(np.diff(d, axis=0)) <= ROUNDING * np.maximum(np.abs(d).max(axis=0), 1.0)).all(-1)
+    return np.concatenate([unchanged[:1], unchanged]) if len(unchanged) else np.ones(len(d), bool)
 
 
 def _full_rank(model: Model, run: xr.Dataset) -> np.ndarray | None:

@@ -39,9 +39,9 @@ class ActuatorAuthority(NamedTuple):
 def actuator_authority(loop: ClosedLoop, at: Equilibrium, loads: np.ndarray) -> ActuatorAuthority:
     """What the loads (accelerations of the outputs, one per row) ask of the actuators where the loop rests."""
     x, _ = at.parts.states(at.at)
-    chosen = loads[np.unique(np.linspace(0, len(loads) - 1, _LOOKED_AT).round().astype(int))]
-    found = _reach(loop, x, jnp.asarray(chosen))
-    return ActuatorAuthority(*map(np.asarray, found))
+    sampled_loads = loads[np.unique(np.linspace(0, len(loads) - 1, _LOOKED_AT).round().astype(int))]
+    authority = _reach(loop, x, jnp.asarray(sampled_loads))
+    return ActuatorAuthority(*map(np.asarray, authority))
 
 
 @eqx.filter_jit
@@ -63,10 +63,10 @@ def _reach(loop: ClosedLoop, x, loads):
     low, high = at_limit(-1.0), at_limit(1.0)
 
     def required(load):
-        pushed = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
-        return dynamics.invert(y, -dynamics.drift(y) - pushed)
+        load_acceleration = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
+        return dynamics.invert(y, -dynamics.drift(y) - load_acceleration)
 
     forces = jax.vmap(required)(loads)
-    given = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)
-    share = jax.vmap(lambda force, given: attained(effect, force, given))(forces, given)
+    allocated = jax.vmap(lambda force: allocate(effect, force, low, high, jnp.asarray(_WHOLE)))(forces)
+    share = jax.vmap(lambda force, allocated: attained(effect, force, allocated))(forces, allocated)
     return low, high, jnp.abs(forces).max(axis=0), share

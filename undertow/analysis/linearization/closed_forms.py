@@ -29,15 +29,15 @@ def closed_form_poles(law: AbstractController, poles: np.ndarray, names: tuple[s
         poles: of the whole loop, 1/s.
         names: of the axes.
     """
-    found: dict[tuple[str, complex], list[str]] = {}
+    axes_of_pole: dict[tuple[str, complex], list[str]] = {}
     for axis, name in enumerate(names):
         for meaning, pole in theory_of(law).poles(axis):
             key = (meaning, complex(round(pole.real, 9), round(abs(pole.imag), 9)))
-            axes = found.setdefault(key, [])
+            axes = axes_of_pole.setdefault(key, [])
             if name not in axes:
                 axes.append(name)
     rows = []
-    for (meaning, pole), axes in found.items():
+    for (meaning, pole), axes in axes_of_pole.items():
         distance = np.abs(poles - pole)
         where = "" if len(axes) == len(names) else f" ({', '.join(axes)})"
         rows.append(ClosedForm(meaning + where, pole, complex(poles[distance.argmin()])))

@@ -76,7 +76,9 @@ def disturbance_profile(
 
 @eqx.filter_jit
 def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
-    realization, plant, zero = loop.realize(key), loop.plant, jnp.zeros(())
+    realization = loop.realize(key)
+    plant = loop.plant
+    zero = jnp.zeros(())
     dynamics, coordinates, actuators = loop.controller.model
     held = actuators.quasi_static()
     forces = held.force(held.init(), u)
@@ -87,12 +89,14 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
         return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
 
     y_rest = plant.output(zero, x_rest)
-    still = jnp.zeros_like(y_rest.position)
+    zero_outputs = jnp.zeros_like(y_rest.position)
     # With actuators as they are along the reference, where they begin to turn: their thrust is no part of the load.
-    at_rest = unknown(zero, plant.initial_state(y_rest.position, still), plant.no_load())
-    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)  # outputs -> axes of the law, at rest
+    at_rest = unknown(zero, plant.initial_state(y_rest.position, zero_outputs), plant.no_load())
+    # From accelerations of the outputs to those along the axes of the law, at rest.
+    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(zero_outputs)
 
-    times, resting = jnp.arange(steps, dtype=float) * dt, plant.pose(x_rest)
+    times = jnp.arange(steps, dtype=float) * dt
+    resting = plant.pose(x_rest)
 
     def along(t):
         r = loop.reference.at(t)
@@ -106,11 +110,12 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
 
     outputs, loads, flow = jax.vmap(along)(times)
 
-    def look(measuring, now):
-        t, truth = now
+    def look(measuring, instant):
+        t, truth = instant
         y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
-        wrong = jnp.concatenate([coordinates.difference(y.position, truth.position), y.velocity - truth.velocity])
-        return measuring, jnp.where(jnp.isfinite(wrong), wrong, 0.0)  # the law is given what it expects
+        position_error = coordinates.difference(y.position, truth.position)
+        errors = jnp.concatenate([position_error, y.velocity - truth.velocity])
+        return measuring, jnp.where(jnp.isfinite(errors), errors, 0.0)  # the law is given what it expects
 
     start = loop.reference.at(zero)
     measuring = loop.navigation.init(

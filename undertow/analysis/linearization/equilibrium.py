@@ -40,15 +40,15 @@ class Balance(NamedTuple):
     def residual(self, local: Local, at: dict, unknown: Names, still: Names) -> tuple[np.ndarray, np.ndarray]:
         """What must vanish (plant, outputs, law, command), and its slopes with respect to the unknown."""
         values, slopes = local.values, local.slopes
-        own = lambda name, by: np.eye(len(at[name])) if name == by else 0
+        identity = lambda name, by: np.eye(len(at[name])) if name == by else 0
         equations = {
             "plant": lambda: (values["plant"][self.acting], [slopes["plant"][by][self.acting] for by in unknown]),
             "outputs": lambda: (self.steered @ values["error"], [self.steered @ slopes["error"][by] for by in unknown]),
             "law": lambda: (
                 (values["law"] - at["law"]) / self.dt,
-                [(slopes["law"][by] - own("law", by)) / self.dt for by in unknown],
+                [(slopes["law"][by] - identity("law", by)) / self.dt for by in unknown],
             ),
-            "command": lambda: (values["u"] - at["u"], [slopes["u"][by] - own("u", by) for by in unknown]),
+            "command": lambda: (values["u"] - at["u"], [slopes["u"][by] - identity("u", by) for by in unknown]),
         }
         residuals, rows = zip(*(equations[name]() for name in still), strict=True)
         return np.concatenate(residuals), np.block(list(rows))
@@ -69,25 +69,26 @@ class Balance(NamedTuple):
             scale = np.abs(jacobian).max(axis=1, keepdims=True)
             scale[scale < _ROUNDING * scale.max()] = 1.0  # scaled up, rounding errors would decide the step
             step = np.split(-_smallest_solution(jacobian / scale, residual / scale[:, 0]), ends)
-            found, trial = (residual, jacobian, np.inf), at
+            best = (residual, jacobian, np.inf)
+            trial = at
             for length in _LENGTHS:
-                there = at | {name: at[name] + length * part for name, part in zip(unknown, step, strict=True)}
-                looked = look(there)
-                if looked[2] < found[2]:
-                    found, trial = looked, there
-                if found[2] < size:
+                candidate = at | {name: at[name] + length * part for name, part in zip(unknown, step, strict=True)}
+                evaluation = look(candidate)
+                if evaluation[2] < best[2]:
+                    best, trial = evaluation, candidate
+                if best[2] < size:
                     break
-            if not found[2] < _WORSE * size:  # far from rest a larger residual may still be the way
+            if not best[2] < _WORSE * size:  # far from rest a larger residual may still be the way
                 break
-            at, (residual, jacobian, size) = trial, found
+            at, (residual, jacobian, size) = trial, best
         return at
 
 
 def _smallest_solution(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Least squares, by orthogonal factors: several times as fast as by singular values."""
-    found = scipy.linalg.lstsq(matrix, right, cond=1e-11, lapack_driver="gelsy", check_finite=False)
-    assert found is not None
-    return np.asarray(found[0])
+    solution = scipy.linalg.lstsq(matrix, right, cond=1e-11, lapack_driver="gelsy", check_finite=False)
+    assert solution is not None
+    return np.asarray(solution[0])
 
 
 class Equilibrium(NamedTuple):
@@ -138,18 +139,18 @@ def equilibrium(
             return held
     holding = lambda load: np.asarray(_settled_input(model, y, jnp.asarray(load)))
     from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": holding(load)})
-    found = from_afar(load)
+    at_full_load = from_afar(load)
     # Where that fails, the load is put on little by little, from a share that can be held.
     share, step = 0.0, _FIRST_SHARE
-    held = found if found.found else from_afar(share * load)
-    while not found.found and held.found and step > _SMALLEST_SHARE:
+    held = at_full_load if at_full_load.found else from_afar(share * load)
+    while not at_full_load.found and held.found and step > _SMALLEST_SHARE:
         further = _together(balance, held.at | {"load": min(1.0, share + step) * load})
         if further.found:
             share, held = min(1.0, share + step), further
-            found = held if share == 1.0 else found
+            at_full_load = held if share == 1.0 else at_full_load
         else:
             step /= 2
-    return found
+    return at_full_load
 
 
 @eqx.filter_jit
@@ -196,8 +197,8 @@ def _reach(model: Model, y: Measurement):
 def _settled_input(model: Model, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
     dynamics, coordinates, drive = model
-    pushed = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
-    forces = dynamics.invert(y, -dynamics.drift(y) - pushed)
+    load_acceleration = coordinates.acceleration(y, load) - coordinates.acceleration(y, jnp.zeros_like(load))
+    forces = dynamics.invert(y, -dynamics.drift(y) - load_acceleration)
     rate, step = jnp.asarray(20.0), jnp.asarray(5e-3)
     settle = lambda _, state: drive.advance(state, drive.command(state, forces, rate), step)
     return drive.command(jax.lax.fori_loop(0, _SETTLING, settle, drive.init()), forces, rate)
@@ -206,13 +207,13 @@ def _settled_input(model: Model, y: Measurement, load):
 def _acting(local: Local) -> np.ndarray:
     """Entries of the plant's state that something else depends on."""
     acts = np.ones(len(local.values["plant"]), dtype=bool)
-    others = [slopes["plant"] for name, slopes in local.slopes.items() if name not in ("plant", "law", "flow")]
+    other_slopes = [slopes["plant"] for name, slopes in local.slopes.items() if name not in ("plant", "law", "flow")]
     while True:
-        rows = np.vstack([local.slopes["plant"]["plant"][acts], local.slopes["law"]["plant"], *others])
-        now = acts & (rows != 0).any(axis=0)
-        if (now == acts).all():
+        rows = np.vstack([local.slopes["plant"]["plant"][acts], local.slopes["law"]["plant"], *other_slopes])
+        extended = acts & (rows != 0).any(axis=0)
+        if (extended == acts).all():
             return acts
-        acts = now
+        acts = extended
 
 
 _STEPS = 30

@@ -76,21 +76,18 @@ class Parts(NamedTuple):
         values, slopes = _evaluated(self, tuple(map(as_array, point)), as_array(dt))
         ends = np.cumsum([0, *self.sizes])
         columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
-        return Local(
-            {name: np.asarray(value) for name, value in values.items()},
-            {
-                name: {by: np.asarray(slope)[:, column] for by, column in columns.items()}
-                for name, slope in slopes.items()
-            },
-        )
+        slopes_by_input = {}
+        for name, slope in slopes.items():
+            slopes_by_input[name] = {by: np.asarray(slope)[:, column] for by, column in columns.items()}
+        return Local({name: np.asarray(value) for name, value in values.items()}, slopes_by_input)
 
     def pushed(self, load: Array) -> Load:
         """A load as an acceleration of the outputs (m/s^2, rad/s^2), as far as the water does not cause it."""
         unloaded = self.loop.plant.no_load()
         if self.flow is None:
             return unloaded._replace(acceleration=unloaded.acceleration + load)
-        rest = unloaded.acceleration + load - self.flow.pushes
-        return _moved(unloaded, self.flow.velocity)._replace(acceleration=rest)
+        remaining = unloaded.acceleration + load - self.flow.pushes
+        return _moved(unloaded, self.flow.velocity)._replace(acceleration=remaining)
 
     def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
         """States of plant and law of a point."""
@@ -115,12 +112,12 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     position = jnp.asarray(position, dtype=float)
     still = jnp.zeros_like(position)
     target = Target(position, still, still)
-    x, z, found = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
+    x, z, flow_at_rest = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
     flat_x, plant_state = ravel_pytree(x)
     flat_z, law_state = ravel_pytree(z)
     axes, inputs = position.shape[0], loop.plant.inputs()
     sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
-    parts = Parts(loop, target, plant_state, law_state, sizes, found)
+    parts = Parts(loop, target, plant_state, law_state, sizes, flow_at_rest)
     return parts, {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
 
 
@@ -145,28 +142,30 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
 
     Dead zones and resolutions have no slope.
     """
-    named = lambda realization: getattr(realization[-1], "name", "") in parameters
+    is_listed = lambda key_path: getattr(key_path[-1], "name", "") in parameters
     return jax.tree_util.tree_map_with_path(
-        lambda realization, leaf: jnp.zeros_like(leaf) if named(realization) else leaf, part
+        lambda key_path, leaf: jnp.zeros_like(leaf) if is_listed(key_path) else leaf, part
     )
 
 
 @eqx.filter_jit
 def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
-    whole, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
+    stacked, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
 
     def both(vector):
         values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
         return values, values
 
-    slopes, values = jax.jacfwd(both, has_aux=True)(whole)
+    slopes, values = jax.jacfwd(both, has_aux=True)(stacked)
     return values, slopes
 
 
 def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array]:
     """What follows from states, input, load and noise."""
     (plant, law), zero = (parts.loop.plant, parts.loop.controller), jnp.zeros(())
-    x, z, r = parts.plant_state(flat_x), parts.law_state(flat_z), parts.target
+    x = parts.plant_state(flat_x)
+    z = parts.law_state(flat_z)
+    r = parts.target
     pushed = parts.pushed(load)
     truth, axes = plant.output(zero, x), load.shape[0]
     y = with_outputs(truth, truth.position + noise[:axes], truth.velocity + noise[axes:])

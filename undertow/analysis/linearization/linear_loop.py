@@ -43,17 +43,18 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
         gain: by which the input's effect differs from what the law takes it for.
     """
     slopes, acting = at.local.slopes, at.acting
-    own = slopes["plant"]["plant"][np.ix_(acting, acting)]
-    push, load = gain * slopes["plant"]["u"][acting], slopes["plant"]["load"][acting]
-    inputs, count = push.shape[1], len(own)
+    state_matrix = slopes["plant"]["plant"][np.ix_(acting, acting)]
+    push = gain * slopes["plant"]["u"][acting]
+    load = slopes["plant"]["load"][acting]
+    inputs, count = push.shape[1], len(state_matrix)
     if lag:
-        own = np.block([[own, push], [np.zeros((inputs, count)), -np.eye(inputs) / lag]])
+        state_matrix = np.block([[state_matrix, push], [np.zeros((inputs, count)), -np.eye(inputs) / lag]])
         load = np.vstack([load, np.zeros((inputs, load.shape[1]))])
         push = np.vstack([np.zeros((count, inputs)), np.eye(inputs) / lag])
-    whole, rest = divmod(delay / dt, 1.0)
-    buffered = int(whole) + 1 if delay else 0
-    step, early, late, loaded = _held(own, push, load, dt, rest * dt)
-    n, law = len(own), len(slopes["law"]["law"])
+    whole_steps, remainder = divmod(delay / dt, 1.0)
+    buffered = int(whole_steps) + 1 if delay else 0
+    step, early, late, loaded = _held(state_matrix, push, load, dt, remainder * dt)
+    n, law = len(state_matrix), len(slopes["law"]["law"])
     states = n + law + buffered * inputs
     x, z = slice(0, n), slice(n, n + law)
 
@@ -70,6 +71,8 @@ def close_sampled(at: Equilibrium, dt: float, delay: float = 0.0, lag: float = 0
     entries["input"][x] = early + late
     matrix[z] = of_state("law") + slopes["law"]["u"] @ u
     entries["noise"][z] = slopes["law"]["noise"] + slopes["law"]["u"] @ u_noise
+    # A shift register holds the inputs that still wait. Within a step the older of two acts until the remainder of the
+    # delay has passed (`early`), the newer one after it (`late`).
     slots = [slice(n + law + i * inputs, n + law + (i + 1) * inputs) for i in range(buffered)]  # newest first
     for share, steps in ((late, buffered - 1), (early, buffered)):
         if steps <= 0:
@@ -90,11 +93,11 @@ def close_continuous(at: Equilibrium, dt: float) -> LinearLoop:
     of_state = lambda name: np.hstack([slopes[name]["plant"][:, acting], slopes[name]["law"]])
     u, u_noise = of_state("u"), slopes["u"]["noise"]
     push = np.vstack([slopes["plant"]["u"][acting], slopes["flow"]["u"]])
-    own = np.vstack([of_state("plant")[acting], of_state("flow")])
+    state_matrix = np.vstack([of_state("plant")[acting], of_state("flow")])
     load = np.vstack([slopes["plant"]["load"][acting], slopes["flow"]["load"]])
     noise = np.vstack([slopes["plant"]["noise"][acting], slopes["flow"]["noise"]]) + push @ u_noise
     to_plant = np.vstack([slopes["plant"]["u"][acting], 0 * slopes["flow"]["u"]])
-    step, *entered = _followed(own + push @ u, (load, noise, to_plant), dt)
+    step, *entered = _followed(state_matrix + push @ u, (load, noise, to_plant), dt)
     return LinearLoop(step, dict(zip(ENTRIES, entered, strict=True)), *_shown(slopes, of_state), dt)
 
 
@@ -109,20 +112,20 @@ def _shown(slopes: Slopes, of_state: Callable[[str], np.ndarray]) -> tuple[dict[
     return signals, direct
 
 
-def _held(own, push, load, dt: float, wait: float):
+def _held(state_matrix, push, load, dt: float, wait: float):
     """Transition over dt, effect of the input held before `wait` (s), of that after it, and of a held load."""
-    step, whole, loaded = _followed(own, (push, load), dt)
+    step, held_effect, loaded = _followed(state_matrix, (push, load), dt)
     if not wait:
-        return step, np.zeros_like(whole), whole, loaded
-    _, late = _followed(own, (push,), dt - wait)
-    return step, whole - late, late, loaded
+        return step, np.zeros_like(held_effect), held_effect, loaded
+    _, late = _followed(state_matrix, (push,), dt - wait)
+    return step, held_effect - late, late, loaded
 
 
-def _followed(own: np.ndarray, entries: tuple[np.ndarray, ...], dt: float) -> list[np.ndarray]:
+def _followed(state_matrix: np.ndarray, entries: tuple[np.ndarray, ...], dt: float) -> list[np.ndarray]:
     """exp(A t), and the integrals of exp(A s) B from 0 to t, for each B."""
-    n, wide = len(own), sum(entry.shape[1] for entry in entries)
+    n, wide = len(state_matrix), sum(entry.shape[1] for entry in entries)
     block = np.zeros((n + wide, n + wide))
-    block[:n, :n], block[:n, n:] = own, np.hstack(entries)
+    block[:n, :n], block[:n, n:] = state_matrix, np.hstack(entries)
     power = expm(block * dt)
     ends = np.cumsum([entry.shape[1] for entry in entries])[:-1]
     return [power[:n, :n], *np.split(power[:n, n:], ends, axis=1)]

@@ -32,14 +32,14 @@ def closed(at: Equilibrium, dt: float, kind: str = "sampled", **between: float) 
     Raises:
         NoSlopes: they are not finite where it rests.
     """
-    found = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
-    if not all(np.isfinite(part).all() for part in (found.matrix, *found.entries.values(), *found.signals.values())):
+    loop = close_sampled(at, dt, **between) if kind == "sampled" else close_continuous(at, dt)
+    if not all(np.isfinite(part).all() for part in (loop.matrix, *loop.entries.values(), *loop.signals.values())):
         hint = (
             "`loop.dt` is too long for this plant, some number too large, or the slope of the law infinite where it "
             "rests, as that of sqrt(|e|)"
         )
         raise NoSlopes("", "", "the loop cannot be linearised: its slopes are not finite", hint=hint)
-    return found
+    return loop
 
 
 def poles(loop: LinearLoop) -> np.ndarray:
@@ -97,8 +97,8 @@ def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndar
     if np.abs(multipliers(loop, ("noise",), (signal,))).max(initial=0.0) >= 1:
         return np.full(len(loop.signals[signal]), np.inf)
     covariance = solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
-    shown = small.signals[signal]
-    return np.sqrt(np.einsum("ij,jk,ik->i", shown, covariance, shown) + (direct**2).sum(axis=1))
+    output = small.signals[signal]
+    return np.sqrt(np.einsum("ij,jk,ik->i", output, covariance, output) + (direct**2).sum(axis=1))
 
 
 def response(loop: LinearLoop, signal: str, frequency: np.ndarray) -> np.ndarray:
@@ -122,7 +122,10 @@ def equilibria(
         near: with another law of the same kind; see `equilibrium`.
     """
     begin = near or [None] * len(points)
-    return [equilibrium(loop, dt, position, one.load, one.flow, at) for one, at in zip(points, begin, strict=True)]
+    return [
+        equilibrium(loop, dt, position, conditions.load, conditions.flow, at)
+        for conditions, at in zip(points, begin, strict=True)
+    ]
 
 
 def certify(
@@ -134,8 +137,8 @@ def certify(
 
     For the arguments see `equilibria`.
     """
-    found = equilibria(loop, dt, position, points, near)
-    return [spectral_radius(closed(at, dt)) for at in found if at.found] or [float("inf")]
+    points_at_rest = equilibria(loop, dt, position, points, near)
+    return [spectral_radius(closed(at, dt)) for at in points_at_rest if at.found] or [float("inf")]
 
 
 def _largest(closed_at: Callable[[float], LinearLoop], least: float, most: float) -> float:

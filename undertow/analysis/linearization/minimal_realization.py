@@ -49,8 +49,8 @@ def multipliers(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, 
     out = np.vstack([small.signals[name] for name in signals])
     into, out = into / _sizes(into, 0), out / _sizes(out.T, 0)[:, None]
     overlap = np.abs((left.conj() * right).sum(axis=0))
-    shown = np.linalg.norm(out @ right, axis=0) * np.linalg.norm(left.conj().T @ into, axis=1)
-    return values[shown > _SEEN * shown.max(initial=0.0) * np.minimum(overlap, 1.0)]
+    visibility = np.linalg.norm(out @ right, axis=0) * np.linalg.norm(left.conj().T @ into, axis=1)
+    return values[visibility > _SEEN * visibility.max(initial=0.0) * np.minimum(overlap, 1.0)]
 
 
 def _sizes(matrix: np.ndarray, axis: int) -> np.ndarray:

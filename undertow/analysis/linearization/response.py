@@ -66,11 +66,11 @@ def metrics_of(signals: dict[str, np.ndarray], units: Sequence[str]) -> dict[str
     of_outputs = {metric: signals[name] for name, metric in named.items() if name in signals}
     if "estimate" in signals:
         of_outputs["estimation"] = signals["estimate"] - signals["uncertainty"]
-    found = {}
+    metrics = {}
     for group, (_, axes) in output_groups(units).items():
-        found |= {of_group(group, f"{name}_rms"): rms(values[:, axes]) for name, values in of_outputs.items()}
-        found[of_group(group, "error_max")] = _peak(signals["error"][:, axes])
-    return found | {"input_rms": rms(signals["u"]), "input_peak": _peak(signals["u"])}
+        metrics |= {of_group(group, f"{name}_rms"): rms(values[:, axes]) for name, values in of_outputs.items()}
+        metrics[of_group(group, "error_max")] = _peak(signals["error"][:, axes])
+    return metrics | {"input_rms": rms(signals["u"]), "input_peak": _peak(signals["u"])}
 
 
 def _peak(values: np.ndarray) -> float:

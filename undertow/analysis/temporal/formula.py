@@ -33,40 +33,40 @@ class Arithmetic:
     nothing: float
     backward: Callable[[Callable[[Any, Any, Any], Any], Series, Series, Any], Series]
 
-    def maximum(self, one: Any, other: Any) -> Any:
+    def maximum(self, first: Any, second: Any) -> Any:
         """Of two arrays, entry by entry."""
-        return -self.minimum(-one, -other)
+        return -self.minimum(-first, -second)
 
     def later(self, series: Series, steps: int) -> Series:
         """The series `steps` instants later; beyond its end, what is above all numbers."""
         size = series.shape[-1]
-        rest = self.numbers.full((*series.shape[:-1], min(steps, size)), self.nothing)
-        return self.numbers.concatenate([series[..., min(steps, size) :], rest], axis=-1)
+        padding = self.numbers.full((*series.shape[:-1], min(steps, size)), self.nothing)
+        return self.numbers.concatenate([series[..., min(steps, size) :], padding], axis=-1)
 
     def least(self, series: Series, first: int, count: int) -> Series:
         """Smallest of `count` entries from `first` instants after each; what is above all numbers where there are none.
 
         The window is composed of windows whose sizes are powers of two.
         """
-        found, offset, power, size = None, first, series, 1
-        left = min(count, series.shape[-1])
-        while left:
-            if left & 1:
+        smallest, offset, power, size = None, first, series, 1
+        remaining = min(count, series.shape[-1])
+        while remaining:
+            if remaining & 1:
                 part = self.later(power, offset)
-                found = part if found is None else self.minimum(found, part)
+                smallest = part if smallest is None else self.minimum(smallest, part)
                 offset += size
-            left >>= 1
-            if left:
+            remaining >>= 1
+            if remaining:
                 power, size = self.minimum(power, self.later(power, size)), 2 * size
-        return self.numbers.full(series.shape, self.nothing) if found is None else found
+        return self.numbers.full(series.shape, self.nothing) if smallest is None else smallest
 
 
 def _backward(step: Callable[[Any, Any, Any], Any], first: Series, second: Series, start: Any) -> Series:
     """`step` of the result one instant later and the two entries, from the end to the beginning."""
-    found, last = np.empty_like(first), np.full(first.shape[:-1], start)
+    results, last = np.empty_like(first), np.full(first.shape[:-1], start)
     for k in range(first.shape[-1] - 1, -1, -1):
-        found[..., k] = last = step(last, first[..., k], second[..., k])
-    return found
+        results[..., k] = last = step(last, first[..., k], second[..., k])
+    return results
 
 
 NUMPY = Arithmetic(np, np.minimum, np.inf, _backward)
@@ -86,14 +86,14 @@ def smooth(sharpness: float) -> Arithmetic:
 
     def backward(step, first, second, start):
         def body(last, at):
-            found = step(last, *at)
-            return found, found
+            value = step(last, *at)
+            return value, value
 
         pairs = (jnp.moveaxis(first, -1, 0), jnp.moveaxis(second, -1, 0))
-        found = jax.lax.scan(body, jnp.full(first.shape[:-1], start), pairs, reverse=True)[1]
-        return jnp.moveaxis(found, 0, -1)
+        values = jax.lax.scan(body, jnp.full(first.shape[:-1], start), pairs, reverse=True)[1]
+        return jnp.moveaxis(values, 0, -1)
 
-    least = lambda one, other: -jnp.logaddexp(-sharpness * one, -sharpness * other) / sharpness
+    least = lambda first, second: -jnp.logaddexp(-sharpness * first, -sharpness * second) / sharpness
     return Arithmetic(jnp, least, _FAR, backward)
 
 
@@ -145,8 +145,8 @@ class Below(Formula):
     sign: float = 1.0
 
     def robustness(self, signals, period, by=NUMPY):
-        left = self.sign * (self.limit - self.value.of(signals, period, by.numbers))
-        return left / (abs(self.limit) or 1.0)
+        margin = self.sign * (self.limit - self.value.of(signals, period, by.numbers))
+        return margin / (abs(self.limit) or 1.0)
 
     def horizon(self):
         return 0.0
@@ -219,13 +219,13 @@ class Until(Formula):
     interval: Interval = Interval()
 
     def robustness(self, signals, period, by=NUMPY):
-        first, second = (each.robustness(signals, period, by) for each in (self.first, self.second))
+        first, second = (formula.robustness(signals, period, by) for formula in (self.first, self.second))
         step = lambda later, holds, comes: by.minimum(holds, by.maximum(comes, later))
-        found = by.backward(step, first, second, -by.nothing)
+        unbounded = by.backward(step, first, second, -by.nothing)
         begin, count = self.interval.window(period, first.shape[-1])
         before = by.least(first, 0, begin + 1)
         comes = -by.least(-second, begin, count)
-        inside = by.later(-found, begin)  # beyond the end: not at all
+        inside = by.later(-unbounded, begin)  # beyond the end: not at all
         return by.minimum(by.minimum(before, comes), -inside)
 
     def horizon(self):
@@ -235,9 +235,9 @@ class Until(Formula):
         return self.first.names() | self.second.names()
 
 
-def either(one: Formula, other: Formula) -> Formula:
+def either(first: Formula, second: Formula) -> Formula:
     """One of the formulas holds: the larger robustness."""
-    return Not(Both(Not(one), Not(other)))
+    return Not(Both(Not(first), Not(second)))
 
 
 def eventually(inner: Formula, interval: Interval) -> Formula:
@@ -273,17 +273,17 @@ class Value:
 
     def of(self, signals: Signals, period: float, numbers: Any = np) -> Series:
         """Shape (time,)."""
-        given = numbers.asarray(signals[self.signal], dtype=float)
+        signal = numbers.asarray(signals[self.signal], dtype=float)
         if self.reduction:
-            chosen = given if self.entries is None else given[:, np.array(self.entries)]
-            found = REDUCTIONS[self.reduction](numbers, chosen)
+            selected = signal if self.entries is None else signal[:, np.array(self.entries)]
+            values = REDUCTIONS[self.reduction](numbers, selected)
         else:
-            found = given if self.entries is None else given[:, self.entries[0]]
-        found = numbers.abs(found) if self.absolute else found
+            values = signal if self.entries is None else signal[:, self.entries[0]]
+        values = numbers.abs(values) if self.absolute else values
         if not self.window:
-            return found
+            return values
         count = max(1, round(self.window / period))
-        sums = numbers.concatenate([numbers.zeros(count), numbers.cumsum(found)])
+        sums = numbers.concatenate([numbers.zeros(count), numbers.cumsum(values)])
         return (sums[count:] - sums[:-count]) / count
 
     def names(self) -> frozenset[str]:

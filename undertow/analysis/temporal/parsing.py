@@ -62,24 +62,24 @@ class FormulaNames(NamedTuple):
         return (*(name for name, unit in _GROUPS.items() if unit in self.units), *self.signals)
 
 
-def parse_formula(text: str, known: FormulaNames) -> Formula:
+def parse_formula(text: str, names: FormulaNames) -> Formula:
     """A formula from its text.
 
     Raises:
         BadInput: the text is no formula, or it names what is no signal; without a name, which `within` adds.
     """
-    reader = _Reader(text, known)
-    found = reader.formula()
+    reader = _Reader(text, names)
+    formula = reader.formula()
     if reader.left:
         raise reader.wrong("end, or go on with `and`, `or` or `until`")
-    return found
+    return formula
 
 
 class _Reader:
     """Reads a text from the left."""
 
-    def __init__(self, text: str, known: FormulaNames):
-        self._known, self._text, self._at, self._depth = known, text, 0, 0
+    def __init__(self, text: str, names: FormulaNames):
+        self._names, self._text, self._at, self._depth = names, text, 0, 0
         self._tokens: list[tuple[str, int]] = []
         at = 0
         while text[at:].strip():
@@ -97,9 +97,9 @@ class _Reader:
     def wrong(self, must: str) -> BadInput:
         """The error where the reader is."""
         before = self._text[: self._tokens[self._at - 1][1]].strip() if self._at else ""
-        place = f"after `{before}`" if before else "at the beginning"
+        location = f"after `{before}`" if before else "at the beginning"
         got = repr(self._tokens[self._at][0]) if self.left else "the end"
-        return BadInput("", f"{must}, {place}", got)
+        return BadInput("", f"{must}, {location}", got)
 
     def _next_is(self, *words: str) -> str:
         """The next word if it is one of these, which is then read; else ""."""
@@ -113,31 +113,31 @@ class _Reader:
             raise self.wrong(f"have `{word}`")
 
     def formula(self) -> Formula:
-        found = self._conjunction()
+        formula = self._conjunction()
         while self._next_is("or"):
-            found = either(found, self._conjunction())
-        return found
+            formula = either(formula, self._conjunction())
+        return formula
 
     def _conjunction(self) -> Formula:
-        found = self._bounded()
+        formula = self._bounded()
         while self._next_is("and"):
-            found = Both(found, self._bounded())
-        return found
+            formula = Both(formula, self._bounded())
+        return formula
 
     def _bounded(self) -> Formula:
-        found = self._unary()
+        formula = self._unary()
         if self._next_is("until"):
             interval = self._interval()
-            return Until(found, self._unary(), interval)
-        return found
+            return Until(formula, self._unary(), interval)
+        return formula
 
     def _unary(self) -> Formula:
         self._depth += 1
         if self._depth > _DEEPEST:
             raise BadInput("", f"have at most {_DEEPEST} formulas inside one another", "more deeply nested")
-        found = self._inner()
+        formula = self._inner()
         self._depth -= 1
-        return found
+        return formula
 
     def _inner(self) -> Formula:
         word = self._next_is("not", "always", "never", "eventually", "within", "(")
@@ -147,9 +147,9 @@ class _Reader:
             latest = self._seconds()
             return eventually(self._unary(), Interval(0.0, latest))
         if word == "(":
-            found = self.formula()
+            formula = self.formula()
             self._need(")")
-            return found
+            return formula
         if word:
             interval = self._interval()
             inner = self._unary()
@@ -171,20 +171,20 @@ class _Reader:
 
     def _number(self) -> float:
         try:
-            found = float(self._tokens[self._at][0]) if self.left else None
+            number = float(self._tokens[self._at][0]) if self.left else None
         except ValueError:
-            found = None
-        if found is None:
+            number = None
+        if number is None:
             raise self.wrong("have a number")
         self._at += 1
-        return found
+        return number
 
     def _seconds(self) -> float:
-        found = self._number()
+        seconds = self._number()
         self._need("s")
-        if not found > 0:
-            raise BadInput("", "have positive times", f"{found:g} s")
-        return found
+        if not seconds > 0:
+            raise BadInput("", "have positive times", f"{seconds:g} s")
+        return seconds
 
     def _comparison(self) -> Formula:
         value = self._value()
@@ -224,8 +224,8 @@ class _Reader:
         if not re.match(r"[A-Za-z_]", name) or name in _WORDS:
             raise self.wrong("name a signal")
         self._at += 1
-        if name not in self._known.words():
-            hint = did_you_mean(name, self._known.words())
+        if name not in self._names.words():
+            hint = did_you_mean(name, self._names.words())
             raise BadInput("", "name signals of the run", f"`{name}`", hint=hint)
         if not self._next_is("["):
             return name, None
@@ -237,23 +237,23 @@ class _Reader:
         return name, entry
 
     def _of_signal(self, function: str, name: str, entry: str | None) -> Value:
-        if name in _GROUPS and name not in self._known.signals:
-            entries = tuple(i for i, unit in enumerate(self._known.units) if unit == _GROUPS[name])
+        if name in _GROUPS and name not in self._names.signals:
+            entries = tuple(i for i, unit in enumerate(self._names.units) if unit == _GROUPS[name])
             if entry is not None or function:
                 raise BadInput("", f"use `{name}` by itself, because it is a number", f"`{name}` with more")
             return Value("error", entries, "norm")
-        names = self._known.signals[name].names
-        chosen = None if entry is None else self._place(name, names, entry)
+        names = self._names.signals[name].names
+        indices = None if entry is None else self._place(name, names, entry)
         if function in REDUCTIONS:
-            if chosen is not None or not names:
+            if indices is not None or not names:
                 raise BadInput("", f"use `{function}` for a signal with several entries", f"`{name}`")
             return Value(name, None, function)
-        if names and chosen is None:
+        if names and indices is None:
             if len(names) > 1:
                 hint = f"Its entries are {', '.join(names)}: write `{name}[{names[0]}]`, or `norm({name})`"
                 raise BadInput("", "compare a number", f"`{name}`, which has {len(names)} entries", hint=hint)
-            chosen = (0,)
-        return Value(name, chosen, absolute=function == "abs")
+            indices = (0,)
+        return Value(name, indices, absolute=function == "abs")
 
     def _place(self, name: str, names: Sequence[str], entry: str) -> tuple[int]:
         if entry in names:

@@ -47,13 +47,13 @@ def known_of(loop: ClosedLoop) -> FormulaNames:
     """Signals that a formula on a loop may name: numbers, and lists over outputs or inputs."""
     plant = loop.plant
     names = {"axis": tuple(plant.outputs), "actuator": tuple(map(str, range(plant.inputs())))}
-    found: dict[str, Entries] = {}
+    entries: dict[str, Entries] = {}
     for name, signal in loop.signals().items():
         if not signal.dimensions:
-            found[name] = Entries(())
+            entries[name] = Entries(())
         elif len(signal.dimensions) == 1 and signal.dimensions[0] in names:
-            found[name] = Entries(names[signal.dimensions[0]])
-    return FormulaNames(found, plant.output_units)
+            entries[name] = Entries(names[signal.dimensions[0]])
+    return FormulaNames(entries, plant.output_units)
 
 
 def requirements_of(
@@ -75,19 +75,19 @@ def requirements_of(
     Raises:
         BadInput: no formula, or about what is no signal or no metric, or about nothing before the end of the run.
     """
-    found = []
-    known = known_of(loop)
+    requirements = []
+    names = known_of(loop)
     for name, text in formulas.items():
         with within(f"{name}.formula"):
-            formula = parse_formula(text, known)
+            formula = parse_formula(text, names)
             if formula.horizon() > duration:
                 raise BadInput("", f"begin before the end of the run ({duration:g} s)", f"{formula.horizon():g} s")
-        found.append(Requirement(name, formula))
+        requirements.append(Requirement(name, formula))
     for name, below in bounds.items():
         if name not in metrics:
             raise BadInput(name, "be a metric of this plant, or have a `formula`", hint=did_you_mean(name, metrics))
-        found.append(Requirement(name, below=below))
-    return tuple(found)
+        requirements.append(Requirement(name, below=below))
+    return tuple(requirements)
 
 
 def judged(
@@ -112,18 +112,18 @@ def judged(
         ended: s.
         duration: asked for, s.
     """
-    found = {}
-    for one in requirements:
-        if one.formula is not None:
-            value = float(one.formula.robustness(signals, period)[0])
+    verdicts = {}
+    for requirement in requirements:
+        if requirement.formula is not None:
+            value = float(requirement.formula.robustness(signals, period)[0])
         else:
-            value = bound_robustness(float(metrics.get(one.name, math.nan)), one.below)
+            value = bound_robustness(float(metrics.get(requirement.name, math.nan)), requirement.below)
         if math.isnan(value):  # a signal that is not defined
             value = _FAILED
         if status != int(Status.OK):
             value = min(value, _FAILED - max(0.0, 1.0 - ended / duration))
-        found[one.name] = Verdict(value, value > 0)
-    return found
+        verdicts[requirement.name] = Verdict(value, value > 0)
+    return verdicts
 
 
 def bound_robustness(value: float, below: float) -> float:
@@ -133,7 +133,8 @@ def bound_robustness(value: float, below: float) -> float:
 
 def needed_signals(requirements: Sequence[Requirement]) -> tuple[str, ...]:
     """Signals that the formulas name."""
-    return tuple(sorted({name for one in requirements if one.formula is not None for name in one.formula.names()}))
+    formulas = [requirement.formula for requirement in requirements if requirement.formula is not None]
+    return tuple(sorted({name for formula in formulas for name in formula.names()}))
 
 
 def contiguous(signals: Mapping[str, Any], names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -145,15 +146,15 @@ def smooth_robustness(
     requirements: Sequence[Requirement], by: Arithmetic
 ) -> Callable[[Mapping[str, Any], float], Any] | None:
     """Function of signals and period that gives the smallest robustness of all formulas; None with other bounds."""
-    formulas = [one.formula for one in requirements]
-    if not formulas or any(one is None for one in formulas):
+    formulas = [requirement.formula for requirement in requirements]
+    if not formulas or any(formula is None for formula in formulas):
         return None
 
     def smallest(signals: Mapping[str, Any], period: float) -> Any:
-        found = by.nothing
-        for one in formulas:
-            if one is not None:
-                found = by.minimum(by.numbers.asarray(found), one.robustness(signals, period, by)[0])
-        return found
+        robustness = by.nothing
+        for formula in formulas:
+            if formula is not None:
+                robustness = by.minimum(by.numbers.asarray(robustness), formula.robustness(signals, period, by)[0])
+        return robustness
 
     return smallest

@@ -14,22 +14,24 @@ from undertow.control.controllers.composite_law import RCAF
 def theory(law: RCAF) -> Theory:
     """Closed forms where the law has slopes; a bound on drift where its basis depends on the modelling error alone."""
     bounds = {"robust_term": ("robust term", law.robust_gain), "estimate": ("estimate", law.weights_bound)}
-    known = Theory(
+    theory_of_law = Theory(
         limits=bounds,
         adapts=law.fuzzy.rules > 1,
         thinnest_layer=lambda dt: _layers(law, dt),
         certificate=lambda run, lived, window, dt: _certificate(law, run, lived, window),
     )
     if "sign" in (law.switching, law.identification.switching):
-        return known
-    known = known._replace(
+        return theory_of_law
+    theory_of_law = theory_of_law._replace(
         poles=lambda axis: [("Table 1's four states", complex(pole)) for pole in small_signal.poles(law, axis)],
         estimator=lambda axis: _estimator(law, axis),
         ramp_error=lambda axis: small_signal.ramp_error(law, axis)[1],
     )
     if law.fuzzy.inputs != 1 or (law.method, law.substeps) != ("euler", 1):
-        return known
-    return known._replace(drift_bound=lambda axis, dt: (drift.gain_bound(law, axis), drift.largest_gain(law, dt, axis)))
+        return theory_of_law
+    return theory_of_law._replace(
+        drift_bound=lambda axis, dt: (drift.gain_bound(law, axis), drift.largest_gain(law, dt, axis))
+    )
 
 
 def _estimator(law: RCAF, axis: int) -> tuple[float, float] | None:
@@ -46,11 +48,11 @@ def _layers(law: RCAF, dt: float) -> tuple[float, float]:
 def _certificate(law: RCAF, run: xr.Dataset, lived: xr.Dataset, window: SteadyWindow) -> RunCertificate:
     """U9: on average 1/2 E^T Q E ends below the residual, while all hypotheses hold."""
     bound = np.broadcast_to(law.weights_bound, run.sizes["axis"])
-    late = lived["lyapunov_decay"].values[window.inside(lived["time"].values)]
+    steady_decay = lived["lyapunov_decay"].values[window.inside(lived["time"].values)]
     numbers = {
         "residual": lyapunov_residual(law, run.sizes["axis"]),
-        "decay": float(late.mean()) if late.size else None,
+        "decay": float(steady_decay.mean()) if steady_decay.size else None,
         "weights_bound": bound.tolist(),
     }
-    asked = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_paper(law, lived)]
-    return RunCertificate(of_paper(law, run), asked, numbers)
+    conditions = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_paper(law, lived)]
+    return RunCertificate(of_paper(law, run), conditions, numbers)

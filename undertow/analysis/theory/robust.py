@@ -48,17 +48,17 @@ def _certificate(
     rate = fastest_uncertainty(lived)
     allowed = estimation_bound(law.estimator, dt, rate)
     error = np.abs(lived["estimate"].values - lived["uncertainty"].values)
-    kept = np.all(error <= allowed + hypotheses.ROUNDING, axis=-1)
+    within_bound = np.all(error <= allowed + hypotheses.ROUNDING, axis=-1)
     numbers = {
         "uncertainty_rate": rate.tolist(),
         "estimation_bound": allowed.tolist(),
-        "estimation_within": window.shares(kept, lived["time"].values),
+        "estimation_within": window.shares(within_bound, lived["time"].values),
         "weights_bound": bound.tolist(),
     }
     if law.memory is not None:
         numbers |= _learnt(law, lived)
-    asked = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_robust(law, lived)]
-    return RunCertificate(of_robust(law, run, dt), asked, numbers)
+    conditions = [*hypotheses.of_any(law, bound, lived), *hypotheses.of_robust(law, lived)]
+    return RunCertificate(of_robust(law, run, dt), conditions, numbers)
 
 
 def _learnt(law: RobustRCAF, lived: xr.Dataset) -> dict[str, Any]:
@@ -68,9 +68,9 @@ def _learnt(law: RobustRCAF, lived: xr.Dataset) -> dict[str, Any]:
     axes = list(coordinates.axes) or [str(name) for name in lived["axis"].values]
     names = regressor_names(axes, memory.fuzzy.rules, memory.regressor, bool(coordinates.axes))
     weights, variance = (lived[f"memory_{name}"].values[-1] for name in ("weights", "variance"))
-    found = {name: lived[name].values[-1].tolist() for name in INERTIA if name in lived}
-    return found | {
-        "memory": [one._asdict() for one in strongest(weights, variance, names, axes)],
+    inertia = {name: lived[name].values[-1].tolist() for name in INERTIA if name in lived}
+    return inertia | {
+        "memory": [weight._asdict() for weight in strongest(weights, variance, names, axes)],
         "memory_trust": lived["memory_trust"].values.min(0).tolist(),
         "memory_bound": float(memory.bound),
     }

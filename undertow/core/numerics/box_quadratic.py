@@ -80,8 +80,8 @@ def box_minimum(diagonal: Vector, factor: Float[Array, "k n"], linear: Vector, l
     programme = _Programme(diagonal, factor, linear)
     start, _ = programme.minimum(jnp.ones_like(linear, dtype=bool), jnp.zeros_like(linear))
     x = jnp.clip(start, low, high)
-    nothing = jnp.zeros((), dtype=int)
-    first = _Search(x, (start > low) & (start < high), nothing, (x == start).all())
+    zero = jnp.zeros((), dtype=int)
+    first = _Search(x, (start > low) & (start < high), zero, (x == start).all())
     most = _STEPS * linear.shape[0]
     step = lambda search: _step(programme, low, high, search)
     return jax.lax.while_loop(lambda search: ~search.done & (search.step < most), step, first).x
@@ -89,9 +89,9 @@ def box_minimum(diagonal: Vector, factor: Float[Array, "k n"], linear: Vector, l
 
 @box_minimum.defjvp
 def _derivative(primals, tangents):
-    *given, low, high = primals
+    *problem, low, high = primals
     diagonal_dot, factor_dot, linear_dot, low_dot, high_dot = tangents
-    programme, x = _Programme(*given), box_minimum(*primals)
+    programme, x = _Programme(*problem), box_minimum(*primals)
     free = (x > low) & (x < high)
     held_dot = jnp.where(free, 0.0, jnp.where(x >= high, high_dot, low_dot))
     factor = programme.factor

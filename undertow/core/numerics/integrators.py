@@ -41,7 +41,7 @@ def rk4_compact(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
     A `while_loop`, which both compilers keep as a loop (a scan of four rounds the batch compiler would write out). It
     has no reverse derivative, which is why `rk4` remains.
     """
-    when = jnp.stack([jnp.asarray(each, dtype=float) for each in _stage_times(t, dt)])
+    when = jnp.stack([jnp.asarray(stage_time, dtype=float) for stage_time in _stage_times(t, dt)])
     reach, weight = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0])
 
     def stage(carry):
@@ -49,8 +49,10 @@ def rk4_compact(field: Field, t: Number, y: PyTree, dt: Number) -> PyTree:
         slope = field(when[i], _move(y, slope, reach[i] * dt))
         return i + 1, slope, jax.tree.map(lambda sums, k: sums + weight[i] * k, total, slope)
 
-    none = jax.tree.map(lambda leaf: jnp.full_like(leaf, -0.0), y)  # which changes no number it is added to, not even 0
-    _, _, total = jax.lax.while_loop(lambda carry: carry[0] < 4, stage, (jnp.zeros((), int), none, none))
+    # The sum starts from -0.0, which changes no number it is added to, not even 0.
+    negative_zeros = jax.tree.map(lambda leaf: jnp.full_like(leaf, -0.0), y)
+    start = (jnp.zeros((), int), negative_zeros, negative_zeros)
+    _, _, total = jax.lax.while_loop(lambda carry: carry[0] < 4, stage, start)
     return _move(y, total, dt / 6)
 
 

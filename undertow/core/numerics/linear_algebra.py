@@ -66,10 +66,10 @@ def partial_inverse(gain: Gain, scale: Float[Array, " n"], rank: int) -> Inverse
     if rank == gain.shape[0]:
         return inverse
     lost = jnp.eye(gain.shape[0]) - gain @ inverse
-    left, rows = lost * scale[:, None] * scale[None, :], []
+    remaining, rows = lost * scale[:, None] * scale[None, :], []
     for _ in range(gain.shape[0] - rank):
-        row = jnp.argmax(jnp.diagonal(left))
-        left = left - jnp.outer(left[:, row], left[row]) / left[row, row]
+        row = jnp.argmax(jnp.diagonal(remaining))
+        remaining = remaining - jnp.outer(remaining[:, row], remaining[row]) / remaining[row, row]
         rows.append(row)
     rows = jnp.stack(rows)
     given_up = jnp.linalg.solve(lost[rows][:, rows], lost[rows])

@@ -47,6 +47,6 @@ def rounded_ramp(
 def with_rates(curve: Curve, t: Number) -> tuple[Array, Array, Array]:
     """Value, first and second derivative of a curve at t, exact: forward-mode differentiation, twice."""
     t = jnp.asarray(t, dtype=float)
-    one = jnp.ones_like(t)
-    (value, rate), (_, second) = jax.jvp(lambda t: jax.jvp(curve, (t,), (one,)), (t,), (one,))
+    ones = jnp.ones_like(t)
+    (value, rate), (_, second) = jax.jvp(lambda t: jax.jvp(curve, (t,), (ones,)), (t,), (ones,))
     return value, rate, second

@@ -84,10 +84,10 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
 
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
-    found = read_vehicle(path, options, "")
-    report = _of_vehicle(found.data.facts(), found.location)
+    vehicle_file = read_vehicle(path, options, "")
+    report = _of_vehicle(vehicle_file.data.facts(), vehicle_file.location)
     if not report.errors:
-        found.vehicle()  # raises errors that no rule covers
+        vehicle_file.vehicle()  # raises errors that no rule covers
     return report
 
 
@@ -100,12 +100,12 @@ def _of_part(name: str, part: Any) -> Report:
         return _of_vehicle(facts_of(part))
     if isinstance(part, AbstractThruster):
         return _of_thruster(part, f"{name} (thruster)", partial(_place, part))
-    found = check_contract(part)
+    findings = check_contract(part)
     where = partial(_place, part)
-    said = () if found else getattr(part, "advice", tuple)()
-    rows = derived_of_plant(part) if isinstance(part, AbstractPlant) and not found else ()
-    own = [Finding("advice", "own", name, sentence.rstrip(".")) for sentence in said]
-    return _report([*found, *own], where, title=f"{name} (plant)", rows=rows)
+    sentences = () if findings else getattr(part, "advice", tuple)()
+    rows = derived_of_plant(part) if isinstance(part, AbstractPlant) and not findings else ()
+    part_advice = [Finding("advice", "own", name, sentence.rstrip(".")) for sentence in sentences]
+    return _report([*findings, *part_advice], where, title=f"{name} (plant)", rows=rows)
 
 
 def _of_feedback(make: Callable[..., Any], axes: int) -> Report:
@@ -136,11 +136,11 @@ def _of_scenario(text: Text) -> list[Report]:
     """Reports on the scenario itself, its vehicle and thruster, and its plant and other parts."""
     built = build(text)
     loop = built.closed_loop
-    said = [
-        (Finding("advice", "scenario", "", one.says, one.hint), one.where)
-        for one in (*built.advice(), *flow_advice(built))
+    located_advice = [
+        (Finding("advice", "scenario", "", advice.says, advice.hint), advice.where)
+        for advice in (*built.advice(), *flow_advice(built))
     ]
-    reports = [Report(tuple(said), ())]
+    reports = [Report(tuple(located_advice), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
         reports.append(_of_vehicle(facts, vehicle_location(text)))
     if isinstance(thruster := getattr(loop.plant, "thruster", None), AbstractThruster):
@@ -162,34 +162,37 @@ def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[.
     """Name and instance of a part, and a function that makes another one, for a given model."""
     if ".py:" in thing or thing.endswith(".py"):
         function = catalogue.find("", thing, what=thing)
-        make = lambda *given: factory.call(function, options, given, Path())[0]
+        make = lambda *leading_arguments: factory.call(function, options, leading_arguments, Path())[0]
         _check_model_comes_first(function, options)
-        part, name = make(*_leading(function)), thing.rpartition(":")[2]
+        part = make(*_leading(function))
+        name = thing.rpartition(":")[2]
         if not factory.is_part(part):
             raise _no_part(name, part, "controllers" if factory.takes_model(function) else "")
         return name, part, make
     prefix, _, short = thing.rpartition("/")
-    known = {kind: catalogue.names(kind) for kind in catalogue.KINDS if prefix in ("", kind)}
-    for kind, names in known.items():
-        if (whole := catalogue.presets(kind).get(short, short)) in names:
-            make = lambda *given, kind=kind: factory.make(kind, {"kind": short, **options}, Path(), given)[0]
-            return short, make(*_leading(names[whole])), make
-    every = {name for kind, names in known.items() for name in (*names, *catalogue.presets(kind))}
+    names_by_kind = {kind: catalogue.names(kind) for kind in catalogue.KINDS if prefix in ("", kind)}
+    for kind, names in names_by_kind.items():
+        if (full_name := catalogue.presets(kind).get(short, short)) in names:
+            make = lambda *leading_arguments, kind=kind: factory.make(
+                kind, {"kind": short, **options}, Path(), leading_arguments
+            )[0]
+            return short, make(*_leading(names[full_name])), make
+    part_names = {name for kind, names in names_by_kind.items() for name in (*names, *catalogue.presets(kind))}
     must = "be a .yaml file, or the name of a part"
     if Path(thing).exists() or Path(thing).suffix:
         raise no_file(Path(thing), "", must)
-    hint = nearest_file(Path(thing)) or nearest(short, every) or "`undertow list` shows the names of all parts"
+    hint = nearest_file(Path(thing)) or nearest(short, part_names) or "`undertow list` shows the names of all parts"
     raise BadInput(thing, must, "not", hint=hint)
 
 
 def _no_part(name: str, thing: Any, kind: str) -> BadInput:
     """Error for what a function returns instead of a part."""
-    place = place_of(thing)
-    if not place:
+    location = place_of(thing)
+    if not location:
         hint = "Return a vehicle, thruster, plant, controller or another part"
         return BadInput("", "", f"`{name}` returns {thing!r}, which is not a part", hint=hint)
-    says = f"`{name}` returns a `{type(thing).__name__}`, which is not a part"
-    return BadInput("", "", says, hint=factory.derive_hint(thing, kind), where=place)
+    message = f"`{name}` returns a `{type(thing).__name__}`, which is not a part"
+    return BadInput("", "", message, hint=factory.derive_hint(thing, kind), where=location)
 
 
 def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
@@ -201,13 +204,17 @@ def _check_model_comes_first(function: Callable[..., Any], options: Mapping[str,
     first = next(iter(inspect.signature(function).parameters.values()), None)
     if first is None or first.name == "model" or first.name in options or first.default is not first.empty:
         return
-    classes = [one for one in getattr(function, "__globals__", {}).values() if inspect.isclass(one) and place_of(one)]
-    if any(issubclass(one, AbstractController) for one in classes):
-        says = (
+    classes = [
+        member
+        for member in getattr(function, "__globals__", {}).values()
+        if inspect.isclass(member) and place_of(member)
+    ]
+    if any(issubclass(member, AbstractController) for member in classes):
+        message = (
             f"the first argument of a controller must be `model`, but that of `{function.__name__}` is `{first.name}`"
         )
         hint = "Call it `model`: undertow gives the nominal model of the plant there"
-        raise BadInput("", "", says, hint=hint, where=place_of(function))
+        raise BadInput("", "", message, hint=hint, where=place_of(function))
 
 
 def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
@@ -220,11 +227,11 @@ def _leading(function: Callable[..., Any]) -> tuple[Any, ...]:
 def _report(
     findings: Iterable[Finding], where: Callable[[str], str] = lambda key: "", title: str = "", rows: Rows = ()
 ) -> Report:
-    found = tuple((finding, where(finding.key)) for finding in findings)
-    return Report(found, ((title, rows),) if rows else ())
+    located_findings = tuple((finding, where(finding.key)) for finding in findings)
+    return Report(located_findings, ((title, rows),) if rows else ())
 
 
 def _joined(reports: list[Report]) -> Report:
     """All reports as one; of equal findings the later one is kept, which has the location."""
-    found = {finding.says: (finding, where) for report in reports for finding, where in report.found}
-    return Report(tuple(found.values()), tuple(table for report in reports for table in report.tables))
+    by_sentence = {finding.says: (finding, where) for report in reports for finding, where in report.found}
+    return Report(tuple(by_sentence.values()), tuple(table for report in reports for table in report.tables))

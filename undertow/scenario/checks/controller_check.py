@@ -29,8 +29,8 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     r, dt = Target(jnp.zeros(n), jnp.zeros(n), jnp.zeros(n)), jnp.asarray(1e-3)
     z = jax.eval_shape(controller.init, y, r)
     answer = jax.eval_shape(controller.command, z, y, r)
-    if wrong := list(two_values("command", answer, PAIR)):
-        yield from wrong
+    if findings := list(two_values("command", answer, PAIR)):
+        yield from findings
         return
     u, signals = answer
     inputs = controller.model.dynamics.gain(y).shape[1]
@@ -41,12 +41,12 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
     check_declared(controller, signals, "command")
     sizes = {"axis": n, "actuator": inputs}
     for name, signal in controller.signals().items():
-        found = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
-        due = tuple(sizes.get(dimension, found.get(dimension, 1)) for dimension in signal.dimensions)
-        yield from shaped(f"command, signal {name}", signals[name], due)  # pyright: ignore[reportArgumentType] - every size is known here
+        own_sizes = dict(zip(signal.dimensions, signals[name].shape, strict=False))  # sizes of the law's own dimensions
+        expected_shape = tuple(sizes.get(dimension, own_sizes.get(dimension, 1)) for dimension in signal.dimensions)
+        yield from shaped(f"command, signal {name}", signals[name], expected_shape)  # pyright: ignore[reportArgumentType] - every size is known here
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
-    wrong = list(alike("advance", after, z, STATE, types=True))
-    yield from wrong or shaped(
+    findings = list(alike("advance", after, z, STATE, types=True))
+    yield from findings or shaped(
         "command", jax.jit(lambda: controller.command(controller.init(y, r), y, r)[0])(), (inputs,)
     )
 
@@ -59,9 +59,9 @@ def check_stability(controller: AbstractController, plant: DoubleIntegrator, dt:
         plant: plant of the test.
         dt: sampling time, s.
     """
-    still = np.zeros(len(plant.outputs))
-    loop = ClosedLoop(plant, controller, setpoint(still), none(), perfect())
-    at = equilibrium(loop, dt, still, still)
+    zeros = np.zeros(len(plant.outputs))
+    loop = ClosedLoop(plant, controller, setpoint(zeros), none(), perfect())
+    at = equilibrium(loop, dt, zeros, zeros)
     try:
         radius, reversed_radius = (margins.spectral_radius(margins.closed(at, dt, gain=gain)) for gain in (1.0, -1.0))
     except margins.NoSlopes:

@@ -21,8 +21,8 @@ class Finding(NamedTuple):
 
     def sentence(self, where: str = "") -> str:
         """One line. `where` is the location in a file, when known."""
-        place = f" ({where})" if where else ""
-        return f"{self.level.capitalize()}: {self.says}{place}{f'. {self.hint}' if self.hint else ''}"
+        location = f" ({where})" if where else ""
+        return f"{self.level.capitalize()}: {self.says}{location}{f'. {self.hint}' if self.hint else ''}"
 
 
 def error(rule: str, key: str, must: str, got: str, hint: str = "") -> Finding:
@@ -57,8 +57,8 @@ def is_a(name: str, value: Any, kind: type) -> Iterator[Finding]:
 
 def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
     """Check for a tuple of exactly two."""
-    if says := not_two(name, value, what):
-        yield Finding("error", "contract", name, says)
+    if message := not_two(name, value, what):
+        yield Finding("error", "contract", name, message)
 
 
 def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
@@ -69,9 +69,9 @@ def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> 
 
 def agree(name: str, value: Any, other: Any, what: str) -> Iterator[Finding]:
     """Check for equal values."""
-    off = np.abs(np.asarray(value) - np.asarray(other))
+    deviation = np.abs(np.asarray(value) - np.asarray(other))
     scale = max(1.0, float(np.abs(np.asarray(other)).max(initial=0.0)))
-    if off.max(initial=0.0) > _TOLERANCE * scale:
-        i = int(off.argmax())
+    if deviation.max(initial=0.0) > _TOLERANCE * scale:
+        i = int(deviation.argmax())
         got = f"{np.ravel(value)[i]:.6g} instead of {np.ravel(other)[i]:.6g} in entry {i + 1}"
         yield error("contract", name, f"agree with {what}", got)

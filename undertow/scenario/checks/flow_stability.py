@@ -39,12 +39,12 @@ def flow_advice(built: Built) -> tuple[Advice, ...]:
     flow, growth = _in_fast_flow(built)
     if not _HARMLESS < growth < np.inf:
         return ()
-    says = (
+    message = (
         f"at {1 / loop.dt:g} Hz the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow "
         f"by {growth:.2g} 1/s"
     )
     with within(location=built.text.location):
-        return (advice("loop.dt", says, _remedy(built)),)
+        return (advice("loop.dt", message, _remedy(built)),)
 
 
 def munk_rate(body: Body) -> float:
@@ -64,10 +64,10 @@ def _remedy(built: Built) -> str:
     for times in _FASTER:
         faster = settings.model_copy(update={"dt": settings.dt / times})
         try:
-            again = build_scenario(built.scenario.model_copy(update={"loop": faster}), built.text)
+            faster_built = build_scenario(built.scenario.model_copy(update={"loop": faster}), built.text)
         except BadInput:  # other times of the scenario may not be multiples of this one
             continue
-        if _in_fast_flow(again)[1] <= _HARMLESS:
+        if _in_fast_flow(faster_built)[1] <= _HARMLESS:
             return f"{times / settings.dt:g} Hz is enough; a slower motion or a weaker current helps as well"
     return "A faster loop alone does not help: use other gains, a nearer nominal model, or a weaker current"
 
@@ -88,10 +88,12 @@ def _growth(built: Built) -> tuple[float, float]:
     settings = built.scenario.loop
     loop = dataclasses.replace(built.of_the_law().closed_loop, navigation=perfect())
     position = np.asarray(loop.reference.at(as_array(settings.duration / 2)).position)
-    still = equilibrium(loop, settings.dt, position, np.zeros_like(position))
-    every = max(settings.dt, settings.duration / _LOOKS)
-    around = disturbance_profile(loop, still, key_of_seed(built.scenario.seed), int(settings.duration / every), every)
-    acting = around.operating_points(())[-1]
-    assert acting.flow is not None
-    radius = margins.certify(loop, settings.dt, position, [acting])[0]
-    return float(np.linalg.norm(acting.flow)), float(np.log(radius) / settings.dt)
+    at_rest = equilibrium(loop, settings.dt, position, np.zeros_like(position))
+    interval = max(settings.dt, settings.duration / _LOOKS)
+    profile = disturbance_profile(
+        loop, at_rest, key_of_seed(built.scenario.seed), int(settings.duration / interval), interval
+    )
+    operating_point = profile.operating_points(())[-1]
+    assert operating_point.flow is not None
+    radius = margins.certify(loop, settings.dt, position, [operating_point])[0]
+    return float(np.linalg.norm(operating_point.flow)), float(np.log(radius) / settings.dt)

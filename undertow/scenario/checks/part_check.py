@@ -79,52 +79,52 @@ def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ..
         if isinstance(part, kind):
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 try:
-                    found = tuple(use(part, around))
+                    findings = tuple(use(part, around))
                 except RAISED as complaint:
-                    found = (_failed(part, complaint),)
-            return (*found, *_printed(part, printed.getvalue()))
+                    findings = (_failed(part, complaint),)
+            return (*findings, *_printed(part, printed.getvalue()))
     return ()
 
 
 def _printed(part: Any, text: str) -> Iterator[Finding]:
     """Advice where a part prints what it computes: it does so once, when it is compiled, and without numbers."""
     print(text, end="")
-    if shown := _TRACED.search(text):
-        says = f"`{type(part).__name__}` prints `{shown[0]}`, once, while it is compiled, and never again"
-        yield Finding("advice", "print", type(part).__name__, says, 'Use `jax.debug.print("{}", value)`')
+    if match := _TRACED.search(text):
+        message = f"`{type(part).__name__}` prints `{match[0]}`, once, while it is compiled, and never again"
+        yield Finding("advice", "print", type(part).__name__, message, 'Use `jax.debug.print("{}", value)`')
 
 
 def _failed(part: Any, complaint: BaseException) -> Finding:
     """Finding for an exception in a part or in its use."""
     if isinstance(complaint, BadInput):  # worded already, with its place
         return Finding("error", "contract", "", str(complaint))
-    says, hint = fault_of(complaint)
-    if says.startswith("cannot"):
-        return Finding("error", "contract", "", says[:1].upper() + says[1:], hint)
-    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {says}", hint)
+    message, hint = fault_of(complaint)
+    if message.startswith("cannot"):
+        return Finding("error", "contract", "", message[:1].upper() + message[1:], hint)
+    return error("contract", type(part).__name__, "be usable as its contract says", f"not: {message}", hint)
 
 
 def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iterator[Finding]:
     n, pose = len(around.truth.position), around.pose
-    still = Load(jnp.zeros(n), jnp.zeros(n))
-    busy = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
-    realization, again = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
-    yield from alike("realize", again, realization, "give the same realization for the same key")
-    if not all(map(np.array_equal, jax.tree.leaves(realization), jax.tree.leaves(again))):
+    zero_load = Load(jnp.zeros(n), jnp.zeros(n))
+    other_load = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
+    realization, repeated = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
+    yield from alike("realize", repeated, realization, "give the same realization for the same key")
+    if not all(map(np.array_equal, jax.tree.leaves(realization), jax.tree.leaves(repeated))):
         yield error("contract", "realize", "give the same realization for the same key", "another one")
-    at = jax.jit(lambda t, still: disturbance.at(realization, t, pose, still))
-    form = jax.eval_shape(at, jnp.zeros(()), still)
-    wrong = list(is_a("at", form, Load))
-    wrong = wrong or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
-    if wrong:
-        yield from wrong
+    at = jax.jit(lambda t, load: disturbance.at(realization, t, pose, load))
+    form = jax.eval_shape(at, jnp.zeros(()), zero_load)
+    findings = list(is_a("at", form, Load))
+    findings = findings or [*shaped("at", form.acceleration, (n,)), *shaped("at", form.wrench, (n,))]
+    if findings:
+        yield from findings
         return
     for t in map(jnp.asarray, _TIMES):
-        load, more = at(t, still), at(t, busy)
+        load, added_load = at(t, zero_load), at(t, other_load)
         yield from (finding for value in load[:2] for finding in shaped("at", value, (n,)))
         for name in ("acceleration", "wrench"):
-            gained = getattr(more, name) - getattr(load, name)
-            yield from agree("at", gained, getattr(busy, name), f"what was there already: add to `load.{name}`")
+            gained = getattr(added_load, name) - getattr(load, name)
+            yield from agree("at", gained, getattr(other_load, name), f"what was there already: add to `load.{name}`")
     jumps = disturbance.jumps(10.0)
     if not isinstance(jumps, tuple) or not all(0 < jump < 10 for jump in jumps):
         yield error("contract", "jumps", "be a tuple of times between 0 and the duration", f"{jumps} for 10 s")
@@ -139,8 +139,8 @@ def _navigation(navigation: AbstractNavigation, around: Surroundings) -> Iterato
         return
     y, after = answer
     yield from alike("measure", after, state, "return the state in the form that `init` gives it", types=True)
-    wrong, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
-    yield from wrong or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
+    findings, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
+    yield from findings or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
 
 def _sensor(sensor: AbstractSensor, around: Surroundings) -> Iterator[Finding]:
@@ -210,8 +210,8 @@ def _plant_fault(fault: AbstractPlantFault, around: Surroundings) -> Iterator[Fi
         for active in (False, True)
     ]
     for load in loads:
-        if wrong := list(is_a("load", load, Load)):
-            yield from wrong
+        if findings := list(is_a("load", load, Load)):
+            yield from findings
             return
         yield from (finding for value in load[:2] for finding in shaped("load", value, (n,)))
     for name in ("acceleration", "wrench"):
@@ -220,8 +220,8 @@ def _plant_fault(fault: AbstractPlantFault, around: Surroundings) -> Iterator[Fi
 
 def _computation_fault(fault: AbstractComputationFault, around: Surroundings) -> Iterator[Finding]:
     yield from _roles(fault, ("computation",))
-    now = Instant(jnp.asarray(True), jnp.asarray(0), jnp.asarray(float(fault.severity[2])))
-    yield from is_a("execution", fault.execution(now, jnp.asarray(0.01)), Execution)
+    instant = Instant(jnp.asarray(True), jnp.asarray(0), jnp.asarray(float(fault.severity[2])))
+    yield from is_a("execution", fault.execution(instant, jnp.asarray(0.01)), Execution)
 
 
 def _roles(fault: AbstractFault, allowed: tuple[str, ...]) -> Iterator[Finding]:

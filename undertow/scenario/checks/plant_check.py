@@ -17,23 +17,23 @@ _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
 def check_plant(plant: AbstractPlant) -> Iterator[Finding]:
     """Findings from every method near the origin, each result against another way to the same number."""
-    wrong = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
-    wrong = wrong or list(_forms_of_model(plant))
-    if wrong:
-        yield from wrong
+    findings = [*_forms(plant), *is_a("advice", plant.advice(), tuple)]
+    findings = findings or list(_forms_of_model(plant))
+    if findings:
+        yield from findings
         return
-    found = jax.jit(partial(_numbers, plant))(_trial(plant))
-    yield from agree("output", found["velocity"], found["position_rate"], "the rate of its position")
-    yield from agree("acceleration", found["acceleration"], found["velocity_rate"], "the rate of the output")
+    results = jax.jit(partial(_numbers, plant))(_trial(plant))
+    yield from agree("output", results["velocity"], results["position_rate"], "the rate of its position")
+    yield from agree("acceleration", results["acceleration"], results["velocity_rate"], "the rate of the output")
     added = "the lumped acceleration of the load, which adds to it"
-    yield from agree("acceleration", found["gained"], _extra(plant), added)
-    held, gain, true_gain = found["held"], found["gain"], found["true_gain"]
+    yield from agree("acceleration", results["gained"], _extra(plant), added)
+    held, gain, true_gain = results["held"], results["gain"], results["true_gain"]
     if not (held < 0).all():
         i = int(np.argmax(held))
         got = f"{held[i]:.4g} for a unit of it on {plant.outputs[i]}"
         hint = "It stands on the left side of Eq. (2): subtract it from the forces"
         yield error("contract", "acceleration", "fall with the wrench of the load", got, hint)
-    yield from agree("invert", found["reached"], found["reachable"], "`gain`: G G# a = a")
+    yield from agree("invert", results["reached"], results["reachable"], "`gain`: G G# a = a")
     if np.abs(true_gain).max() > _GRIP and float((true_gain * gain).sum()) < 0:
         i, j = np.unravel_index(np.abs(gain).argmax(), gain.shape)
         got = f"{gain[i, j]:.4g} where x_ddot changes by {true_gain[i, j]:.4g} per unit"

@@ -25,23 +25,25 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
     state = thruster.initial_state(_COUNT)
     jax.eval_shape(thruster.dynamics, state, volts)  # raises if it does not compile
     jax.eval_shape(thruster.thrust, state, volts)
-    each, once = (_COUNT,), ()
+    per_thruster, scalar = (_COUNT,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
-    wrong = [
+    findings = [
         *alike("dynamics", thruster.dynamics(state, volts), state, "have the form of the state"),
-        *shaped("thrust", thruster.thrust(state, volts), each),
-        *shaped("current", thruster.current(state, volts), each),
-        *shaped("stored", thruster.stored(state), each, once),
-        *shaped("voltage_gain", thruster.voltage_gain(), once, each),
+        *shaped("thrust", thruster.thrust(state, volts), per_thruster),
+        *shaped("current", thruster.current(state, volts), per_thruster),
+        *shaped("stored", thruster.stored(state), per_thruster, scalar),
+        *shaped("voltage_gain", thruster.voltage_gain(), scalar, per_thruster),
         *is_a("advice", thruster.advice(), tuple),
         *(is_a("powers", powers, Powers) if powers is not None else ()),
         *(is_a("report", report, PropellerReport) if report is not None else ()),
     ]
     for name, values in (("powers", powers), ("report", report)):
         if isinstance(values, Powers | PropellerReport):
-            wrong += [finding for value in values if value is not None for finding in shaped(name, value, each)]
-    if wrong:
-        yield from wrong
+            findings += [
+                finding for value in values if value is not None for finding in shaped(name, value, per_thruster)
+            ]
+    if findings:
+        yield from findings
         return
     full, gain = _full_voltage(thruster), float(np.min(thruster.voltage_gain()))
     forward, reverse = _settled_thrust(thruster, full)
@@ -85,7 +87,9 @@ def _settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, 
 
 def derived_of_thruster(thruster: AbstractThruster) -> tuple[tuple[str, str, str], ...]:
     """Rows (what, value, unit)."""
-    supply, limit, unit = float(thruster.supply), _full_voltage(thruster), thruster.input_unit
+    supply = float(thruster.supply)
+    limit = _full_voltage(thruster)
+    unit = thruster.input_unit
     rows = [
         (
             "supply, dead zone" if unit == "V" else "largest command, dead zone",

@@ -15,23 +15,23 @@ _LEFT_OUT = "left_out"  # attribute of a result: series that the run had and the
 _SHOWN = 3  # of what differs
 
 
-def shortened(dataset: xr.Dataset, kept: Collection[str]) -> xr.Dataset:
+def shortened(dataset: xr.Dataset, names: Collection[str]) -> xr.Dataset:
     """A result with some of its series only, to be written compressed; no number is changed.
 
     Its content hash stays that of the whole run, so that a repetition is compared with all of it.
 
     Args:
         dataset: of the run.
-        kept: names of series; those that the run has not are ignored.
+        names: of series; those that the run has not are ignored.
     """
-    left_out = sorted(str(name) for name in dataset.data_vars if name not in kept)
-    short = dataset.drop_vars(left_out).copy()
-    for variable in short.variables.values():
+    left_out = sorted(str(name) for name in dataset.data_vars if name not in names)
+    reduced = dataset.drop_vars(left_out).copy()
+    for variable in reduced.variables.values():
         if variable.dtype.kind in "fi":
             variable.encoding = {"zlib": True, "shuffle": True, "complevel": 4}
-    short.attrs[_LEFT_OUT] = ", ".join(left_out)
-    short.attrs["checksum"] = checksum(short)
-    return short
+    reduced.attrs[_LEFT_OUT] = ", ".join(left_out)
+    reduced.attrs["checksum"] = checksum(reduced)
+    return reduced
 
 
 class Repetition(NamedTuple):
@@ -45,10 +45,10 @@ class Repetition(NamedTuple):
 def compare(path: Path, repeated: xr.Dataset) -> Repetition:
     """Compare a run with the result file at `path`, whose scenario it used and whose checksum, if any, is correct."""
     with opened_result(path) as earlier:
-        before, held = dict(earlier.attrs), claims(earlier)
-    now, left_out = claims(repeated), set(before.get(_LEFT_OUT, "").split(", "))
-    differing = [name for name, claim in held.items() if now.get(name) != claim]
-    added = sorted(set(now) - set(held) - left_out)
+        before, earlier_claims = dict(earlier.attrs), claims(earlier)
+    repeated_claims, left_out = claims(repeated), set(before.get(_LEFT_OUT, "").split(", "))
+    differing = [name for name, claim in earlier_claims.items() if repeated_claims.get(name) != claim]
+    added = sorted(set(repeated_claims) - set(earlier_claims) - left_out)
     if _LEFT_OUT in before and not differing and not added and before["content_hash"] != repeated.attrs["content_hash"]:
         differing = ["series that it has left out"]
     code = _code(path, before)
@@ -57,8 +57,8 @@ def compare(path: Path, repeated: xr.Dataset) -> Repetition:
         though = f", although {code}" if code else ""
         unknown = "" if "checksum" in before else "; it has no checksum that could reveal changes to the file"
         return Repetition(True, True, f"{path.name} was repeated bit for bit {which}{though}{unknown}")
-    others = [_differences(before, repeated.attrs), code, f"one without {_listed(added)}" if added else ""]
-    reasons = ", ".join(filter(None, others))
+    causes = [_differences(before, repeated.attrs), code, f"one without {_listed(added)}" if added else ""]
+    reasons = ", ".join(filter(None, causes))
     why = f"; other versions: {reasons}" if reasons else ", with the same versions"
     return Repetition(
         False, bool(reasons), f"{path.name} was not repeated bit for bit{why}. Differences: {_listed(differing)}"
@@ -80,9 +80,9 @@ def _code(path: Path, before: dict) -> str:
     return ", ".join(f"{file} has changed" for file in files)
 
 
-def _differences(before: dict, now: dict) -> str:
-    names = sorted(name for name in {*before, *now} if name.startswith("version_") or name == "machine")
-    changed = [name for name in names if before.get(name) != now.get(name)]
+def _differences(before: dict, after: dict) -> str:
+    names = sorted(name for name in {*before, *after} if name.startswith("version_") or name == "machine")
+    changed = [name for name in names if before.get(name) != after.get(name)]
     return ", ".join(
-        f"{name.removeprefix('version_')} {before.get(name)} then, {now.get(name)} now" for name in changed
+        f"{name.removeprefix('version_')} {before.get(name)} then, {after.get(name)} now" for name in changed
     )

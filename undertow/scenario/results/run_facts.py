@@ -81,36 +81,38 @@ class RunFacts(NamedTuple):
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of a dataset that say the same."""
-        found: dict[str, Any] = {"status": self.status.word, "status_sentence": self.sentence, "ended": self.ended}
+        attributes: dict[str, Any] = {"status": self.status.word, "status_sentence": self.sentence, "ended": self.ended}
         if self.certificate is not None:
-            found["certificate"] = to_json(self.certificate)
+            attributes["certificate"] = to_json(self.certificate)
         if self.left_to_xla:
-            found["left_to_xla"] = self.left_to_xla
-        found["title"] = self.title
+            attributes["left_to_xla"] = self.left_to_xla
+        attributes["title"] = self.title
         if self.scenario:
             text = dump(self.scenario)
-            found |= {"scenario": text, "scenario_hash": text_hash(text), "code": self.code}
-        found |= {"seed": self.seed} | dict(self.versions)
-        found["metrics"] = to_json({"steady": self.steady, "whole": self.whole})
-        found["metric_meanings"] = to_json({name: metric._asdict() for name, metric in self.meanings.items()})
+            attributes |= {"scenario": text, "scenario_hash": text_hash(text), "code": self.code}
+        attributes |= {"seed": self.seed} | dict(self.versions)
+        attributes["metrics"] = to_json({"steady": self.steady, "whole": self.whole})
+        attributes["metric_meanings"] = to_json({name: metric._asdict() for name, metric in self.meanings.items()})
         if self.success is not None:
-            found["success"] = to_json(self.success._asdict())
+            attributes["success"] = to_json(self.success._asdict())
         if self.requirements:
-            found["requirements"] = to_json({name: verdict._asdict() for name, verdict in self.requirements.items()})
+            attributes["requirements"] = to_json(
+                {name: verdict._asdict() for name, verdict in self.requirements.items()}
+            )
         if self.navigation is not None:
-            found["navigation"] = to_json(self.navigation)
+            attributes["navigation"] = to_json(self.navigation)
         if self.transitions is not None:
-            found["transitions"] = to_json([transition._asdict() for transition in self.transitions])
-        return found
+            attributes["transitions"] = to_json([transition._asdict() for transition in self.transitions])
+        return attributes
 
     def summary(self, further: Mapping[str, Any]) -> str:
         """Contents of metrics.json, with further entries."""
-        found: dict[str, Any] = {"status": self.status.word, "ended": self.ended}
-        found["success"] = None if self.success is None else self.success._asdict()
+        entries: dict[str, Any] = {"status": self.status.word, "ended": self.ended}
+        entries["success"] = None if self.success is None else self.success._asdict()
         if self.requirements:
-            found["requirements"] = {name: verdict._asdict() for name, verdict in self.requirements.items()}
-        found |= {"steady": self.steady, "whole": self.whole} | dict(further) | {"certificate": self.certificate}
-        return to_json(found, indent=2) + "\n"
+            entries["requirements"] = {name: verdict._asdict() for name, verdict in self.requirements.items()}
+        entries |= {"steady": self.steady, "whole": self.whole} | dict(further) | {"certificate": self.certificate}
+        return to_json(entries, indent=2) + "\n"
 
 
 def facts_from(attributes: Mapping[str, Any]) -> RunFacts:
@@ -122,7 +124,9 @@ def facts_from(attributes: Mapping[str, Any]) -> RunFacts:
         BadInput: the scenario is not as it was written.
     """
     read = lambda name: json.loads(attributes[name]) if name in attributes else None
-    metrics, success, transitions = read("metrics") or {}, read("success"), read("transitions")
+    metrics = read("metrics") or {}
+    success = read("success")
+    transitions = read("transitions")
     status, text = _status(attributes["status"]), attributes.get("scenario")
     return RunFacts(
         status=status,

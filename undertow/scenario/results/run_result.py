@@ -158,7 +158,7 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         series = series.assign(certified.signals)
     lasted_but_unseen = status is Status.OK and steady is None
     supervised = state_in(outcome.final[1])
-    shown = {*whole, *settings.criterion}  # a run that failed at once lacks metrics that its criterion names
+    metric_names = {*whole, *settings.criterion}  # a run that failed at once lacks metrics that its criterion names
     facts = RunFacts(
         status=status,
         ended=ended,
@@ -167,7 +167,7 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         seed=origin.seed,
         steady=steady,
         whole=whole,
-        meanings={name: metric for name, metric in meanings(loop, settings.own).items() if name in shown},
+        meanings={name: metric for name, metric in meanings(loop, settings.own).items() if name in metric_names},
         scenario=origin.scenario,
         success=None if lasted_but_unseen else judged(settings.criterion, steady),
         requirements=_verdicts(outcome, settings, steady or {}),
@@ -216,7 +216,8 @@ def lost_thrusters(series: xr.Dataset) -> list[tuple[str, float]] | None:
     """
     if "lost_thrusters" not in series:
         return None
-    names, time = series["actuator"].attrs["names"].split(", "), series["time"].values
+    names = series["actuator"].attrs["names"].split(", ")
+    time = series["time"].values
     lost = zip(names, series["lost_thrusters"].values.T, strict=True)
     losses = [(name, float(time[signal.argmax()])) for name, signal in lost if signal.any()]
     return sorted(losses, key=lambda loss: loss[1])

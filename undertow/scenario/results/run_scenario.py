@@ -36,8 +36,8 @@ def run_scenario(source: Text | Mapping[str, Any] | Built) -> ScenarioResult:
 @in_its_precision
 def _run(built: Built) -> ScenarioResult:
     scenario, gathered = built.scenario, gathered_of(built)
-    ended = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
-    return finished(built, *ended, gathered)
+    outcome_and_reason = run_loop(built.closed_loop, scenario.loop, scenario.initial, scenario.seed, gathered)
+    return finished(built, *outcome_and_reason, gathered)
 
 
 def gathered_of(built: Built) -> Gathered:
@@ -80,17 +80,22 @@ def run_loop(
     Returns:
         The outcome, in NumPy arrays; and the reason why the SIMD backend could not be used, "" otherwise.
     """
-    place = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
-    given: dict[str, Any] = {"duration": settings.duration, "dt": settings.dt, "key": key_of_seed(seed), **place}
+    start_arrays = {key: None if value is None else np.asarray(value, dtype=float) for key, value in start}
+    run_options: dict[str, Any] = {
+        "duration": settings.duration,
+        "dt": settings.dt,
+        "key": key_of_seed(seed),
+        **start_arrays,
+    }
     compilers: tuple[Callable[..., Outcome], Callable[..., Outcome]]
     if settings.kind == "continuous":
-        given |= {"record_step": settings.record}
+        run_options |= {"record_step": settings.record}
         if settings.method == "adaptive":
             tolerances = (settings.rtol, settings.atol)
-            return jax.device_get(continuous.simulate(loop, tolerances=tolerances, **given)), ""
+            return jax.device_get(continuous.simulate(loop, tolerances=tolerances, **run_options)), ""
         compilers = simd_batch.integrate, continuous.simulate
     else:
-        given |= {
+        run_options |= {
             "record_every": round(settings.record / settings.dt),
             "method": settings.method,
             "substeps": settings.substeps,
@@ -101,7 +106,7 @@ def run_loop(
     lacking = ""
     if settings.backend == "simd":
         try:
-            return jax.device_get(by_simd(loop, **given)), ""
+            return jax.device_get(by_simd(loop, **run_options)), ""
         except simd_batch.Unsupported as error:
             lacking = str(error)
-    return jax.device_get(by_xla(loop, **given)), lacking
+    return jax.device_get(by_xla(loop, **run_options)), lacking

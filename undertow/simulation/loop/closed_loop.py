@@ -74,8 +74,8 @@ class ClosedLoop(eqx.Module):
     def outputs_at_start(self, position: Any, velocity: Any) -> tuple[Outputs, Outputs]:
         """Outputs at t = 0 as arrays, zero where None: one compiled program serves every start."""
         zero = np.zeros(len(self.plant.outputs))
-        made = lambda given: as_array(zero if given is None else given)
-        return made(position), made(velocity)
+        as_outputs = lambda value: as_array(zero if value is None else value)
+        return as_outputs(position), as_outputs(velocity)
 
     def starting_at(self, position: Any) -> "ClosedLoop":
         """This loop with its reference beginning where the plant does; at zero where None."""
@@ -89,14 +89,14 @@ class ClosedLoop(eqx.Module):
         Raises:
             BadInput: two parts declare a signal of the same name.
         """
-        found = RECORDED | (RECORDED_WITH_FAULTS if self.faults is not None else {})
+        declarations = RECORDED | (RECORDED_WITH_FAULTS if self.faults is not None else {})
         informed = [self.navigation] if isinstance(self.navigation, AbstractInformedNavigation) else []
         for part in (self.plant, self.controller, *informed):
             for name, signal in part.signals().items():
-                if name in found:
+                if name in declarations:
                     raise BadInput(name, "be the name of one signal only", f"declared again by {type(part).__name__}")
-                found[name] = signal
-        return found
+                declarations[name] = signal
+        return declarations
 
     def realize(self, key: PRNGKeyArray) -> "Realization":
         """Sample everything random once."""
@@ -220,9 +220,9 @@ class Realization(NamedTuple):
         navigation = self.loop.navigation
         if not (isinstance(measuring, MeasurementState) and isinstance(navigation, AbstractInformedNavigation)):
             return {}
-        found = navigation.diagnostics(measuring.navigation)
-        check_declared(navigation, found, "diagnostics")
-        return found
+        diagnostics = navigation.diagnostics(measuring.navigation)
+        check_declared(navigation, diagnostics, "diagnostics")
+        return diagnostics
 
     def _bad_readings(self, measuring: Any) -> Int[Array, ""]:
         """Number of readings so far that were not finite: ignored by the navigation, or replaced for the law."""
@@ -256,7 +256,8 @@ def _decided(realization: Realization, t: Time, x: PyTree, z: PyTree, measuring:
 
 def _failed(realization: Realization, faults: PyTree, t: Time, x: PyTree, applied: Inputs) -> tuple[Inputs, PyTree]:
     """Input that acts on the plant, and the state of the faults."""
-    loop, most = realization.loop, jnp.full(applied.shape, _LARGE)
+    loop = realization.loop
+    most = jnp.full(applied.shape, _LARGE)
     limits = loop.plant.admissible(x, -most), loop.plant.admissible(x, most)
     assert loop.faults is not None
     return loop.faults.input(realization.faults_realization, faults, t, applied, limits)

@@ -42,10 +42,10 @@ def blamed(
     """
     rate = flow(t, state, realization)
     for share in (0.0, 0.5, 1.0):
-        there = t + share * dt
+        stage_time = t + share * dt
         ahead = jax.tree.map(lambda now, change, share=share: now + share * dt * change, state, rate)
         at = ahead if share else state
-        blame = ending.blamed(realization.decide(there, *at).command, there)
+        blame = ending.blamed(realization.decide(stage_time, *at).command, stage_time)
         # A state that a load made non-finite makes every command non-finite.
         ending = Ending(*(jnp.where(all_finite(at), new, old) for new, old in zip(blame, ending, strict=True)))
     return ending
@@ -138,8 +138,8 @@ def check(loop: ClosedLoop) -> None:
 def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, int]) -> Outcome:
     steps, every = plan
     realization = loop.realize(key)
-    one = partial(step, realization, dt)
-    (final, _, ending), (time, samples) = record(realization, one, begin(realization, start), dt, steps, every)
+    advance = partial(step, realization, dt)
+    (final, _, ending), (time, samples) = record(realization, advance, begin(realization, start), dt, steps, every)
     return Outcome(time, samples, (), final, *ending.until(instant(steps, dt)))
 
 
@@ -150,11 +150,11 @@ def begin(realization: Realization, start: tuple[Outputs, Outputs]) -> PyTree:
 
 def step(realization: Realization, dt: Any, carry, k):
     """A fixed step of plant and controller together."""
-    state, nothing, ending = carry
+    state, accumulated, ending = carry
     t, controller = instant(k, dt), cast(AbstractContinuousController, realization.loop.controller)
     x, z = rk4_compact(lambda s, state: flow(s, state, realization), t, state, dt)
     state, ending = freeze_on_failure(realization.loop, state, (x, controller.project(z)), ending, t, dt)
-    return state, nothing, ending
+    return state, accumulated, ending
 
 
 def explained(loop: ClosedLoop, key: PRNGKeyArray, outcome: Outcome, dt: float) -> Outcome:

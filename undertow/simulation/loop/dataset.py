@@ -21,13 +21,13 @@ def to_dataset(outcome: Outcome, loop: ClosedLoop) -> xr.Dataset:
         for name, signal in loop.signals().items()
     }
     status = Status(int(outcome.status))
-    found = coordinates(np.asarray(outcome.time), loop.plant)
-    found["actuator"].attrs["names"] = ", ".join(input_names(loop.plant))
+    coords = coordinates(np.asarray(outcome.time), loop.plant)
+    coords["actuator"].attrs["names"] = ", ".join(input_names(loop.plant))
     if loop.controller.model.coordinates.axes:
-        found["axis"].attrs["controller_axes"] = ", ".join(loop.controller.model.coordinates.axes)
+        coords["axis"].attrs["controller_axes"] = ", ".join(loop.controller.model.coordinates.axes)
     return xr.Dataset(
         variables,
-        coords=found,
+        coords=coords,
         attrs={"status": status.word, "status_sentence": outcome.sentence(), "ended": float(outcome.ended)},
     )
 

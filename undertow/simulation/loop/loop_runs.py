@@ -56,13 +56,13 @@ def numbers_of(run: LoopRun) -> list[Any]:
 
 def with_numbers(run: LoopRun, numbers: Sequence[Any]) -> LoopRun:
     """A run with other arrays, in the order of `numbers_of`."""
-    arrays, rest = eqx.partition(run, eqx.is_array)
-    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), numbers), rest)
+    arrays, static = eqx.partition(run, eqx.is_array)
+    return eqx.combine(jax.tree.unflatten(jax.tree.structure(arrays), numbers), static)
 
 
-def outcome_of(several: Outcome, run: int) -> Outcome:
+def outcome_of(batch: Outcome, run: int) -> Outcome:
     """The outcome of one run of a batch."""
-    return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, several)
+    return jax.tree.map(lambda leaf: leaf[run] if isinstance(leaf, np.ndarray) else leaf, batch)
 
 
 def structure(tree: Any) -> Any:

@@ -26,9 +26,11 @@ class Ending(NamedTuple):
     def blamed(self, command: Inputs, t: Any) -> "Ending":
         """The ending with the cause if the run failed at `t` (s) by a command that is not finite."""
         failed = (self.status == int(Status.NOT_FINITE)) | (self.status == int(Status.STEPS_EXHAUSTED))
-        wrong = wrong_input(command)
-        by_command = Ending(jnp.asarray(int(Status.COMMAND_NOT_FINITE)), jnp.asarray(t, dtype=float), wrong)
-        return Ending(*(jnp.where(failed & (wrong > 0), new, old) for new, old in zip(by_command, self, strict=True)))
+        input_number = wrong_input(command)
+        by_command = Ending(jnp.asarray(int(Status.COMMAND_NOT_FINITE)), jnp.asarray(t, dtype=float), input_number)
+        return Ending(
+            *(jnp.where(failed & (input_number > 0), new, old) for new, old in zip(by_command, self, strict=True))
+        )
 
 
 def going() -> Ending:
@@ -49,10 +51,10 @@ class Outcome(NamedTuple):
 
     def sentence(self) -> str:
         """How the run ended, in a sentence."""
-        status, said = Status(int(self.status)), ""
+        status, detail = Status(int(self.status)), ""
         if status is Status.COMMAND_NOT_FINITE:
-            said = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
-        return status.sentence + said
+            detail = f" It is input {int(self.input)}, at {float(self.ended):.6g} s."
+        return status.sentence + detail
 
 
 def status_of(loop: ClosedLoop, x: PyTree, z: PyTree) -> Array:

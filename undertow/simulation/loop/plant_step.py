@@ -44,8 +44,8 @@ def begin(realization: Realization, start: tuple[Outputs, Outputs]) -> tuple[Pla
     """State and observation at time zero, with no input."""
     x = realization.loop.plant.initial_state(*start)
     measuring = realization.initial_measuring(x)
-    still = jnp.zeros(realization.loop.plant.inputs())
-    return observe(realization, PlantState(x, measuring.navigation, measuring.faults), jnp.zeros(()), still)
+    zero_input = jnp.zeros(realization.loop.plant.inputs())
+    return observe(realization, PlantState(x, measuring.navigation, measuring.faults), jnp.zeros(()), zero_input)
 
 
 def hold(

@@ -61,13 +61,17 @@ def freeze_on_failure(
         t, dt: s.
         command: of the control step, where a command that is not finite ends the run.
     """
-    code, time, wrong = status_of(loop, *new[:2]), t + dt, jnp.zeros((), dtype=int)
+    code = status_of(loop, *new[:2])
+    time = t + dt
+    input_number = jnp.zeros((), dtype=int)
     if command is not None:
-        wrong = wrong_input(command)
-        code = jnp.where(wrong > 0, int(Status.COMMAND_NOT_FINITE), code)
-        time = jnp.where(wrong > 0, t, time)
+        input_number = wrong_input(command)
+        code = jnp.where(input_number > 0, int(Status.COMMAND_NOT_FINITE), code)
+        time = jnp.where(input_number > 0, t, time)
     failing = (ending.status == int(Status.OK)) & (code != int(Status.OK))
-    ending = Ending(*(jnp.where(failing, now, was) for now, was in zip((code, time, wrong), ending, strict=True)))
+    ending = Ending(
+        *(jnp.where(failing, now, was) for now, was in zip((code, time, input_number), ending, strict=True))
+    )
     valid = ending.status == int(Status.OK)
     return jax.tree.map(lambda n, o: jnp.where(valid, n, o), new, old), ending
 

@@ -85,13 +85,13 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     steps, record_every, method, substeps = plan
     realization = loop.realize(key)
     carry = begin(realization, start, accumulators)
-    one = partial(control_step, realization, accumulators, dt, METHODS[method], substeps)
+    advance = partial(control_step, realization, accumulators, dt, METHODS[method], substeps)
     if record_every == 0:
-        carry = jax.lax.fori_loop(0, steps, lambda k, c: one(c, k), carry)
+        carry = jax.lax.fori_loop(0, steps, lambda k, c: advance(c, k), carry)
         blank = jax.eval_shape(realization.record, dt, *carry[0])
         time, samples = jnp.zeros(0), jax.tree.map(lambda leaf: jnp.zeros((0, *leaf.shape)), blank)
     else:
-        carry, (time, samples) = record(realization, one, carry, dt, steps, record_every)
+        carry, (time, samples) = record(realization, advance, carry, dt, steps, record_every)
     final, gathered, ending = carry
     return Outcome(time, samples, gathered, final[:2], *ending.until(steps * dt))
 

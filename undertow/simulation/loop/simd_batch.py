@@ -112,10 +112,10 @@ def starter(prepare: Callable, begin: Callable, numbers: Any, constant: Sequence
     """
     if unavailable():
         raise Unsupported(unavailable())
-    begun = lambda known, carry, k: begin(known)
-    cache, nothing = cache_folder() / "native", np.zeros(())
-    unchanged = lambda known, carry, k: carry
-    loop = simdjit.Loop(prepare, lambda known: nothing, unchanged, begun, numbers, constant, cache=cache)
+    record_start = lambda prepared, carry, k: begin(prepared)
+    cache, no_output = cache_folder() / "native", np.zeros(())
+    unchanged = lambda prepared, carry, k: carry
+    loop = simdjit.Loop(prepare, lambda prepared: no_output, unchanged, record_start, numbers, constant, cache=cache)
     return lambda numbers: jax.tree.map(lambda leaf: leaf[:, 0], loop.run(numbers, 0, 1)[1])
 
 
@@ -152,33 +152,34 @@ class SimdBatchRunner:
     ):
         if unavailable():
             raise Unsupported(unavailable())
-        numbers, rest = eqx.partition(run, eqx.is_array)
+        numbers, static = eqx.partition(run, eqx.is_array)
         if (largest := max(leaf.size for leaf in jax.tree.leaves(numbers))) > _LARGEST:
             raise Unsupported(f"a table of {largest} numbers, more than {_LARGEST}")
         self._plan = plan
         # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
         compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW
-        integrate, dt = (COMPACT_METHODS if compact else METHODS)[plan.method], plan.dt
+        integrate = (COMPACT_METHODS if compact else METHODS)[plan.method]
+        dt = plan.dt
 
         def realize(numbers):
-            loop, accumulators, at, key = eqx.combine(numbers, rest)
+            loop, accumulators, at, key = eqx.combine(numbers, static)
             return loop.realize(key), accumulators, at
 
-        def start(known):
-            realization, accumulators, at = known
+        def start(prepared):
+            realization, accumulators, at = prepared
             if plan.continuous:
                 return continuous.begin(realization, at)
             return sampled.begin(realization, at, accumulators)
 
-        def control_step(known, carry, k):
-            realization, accumulators, _ = known
+        def control_step(prepared, carry, k):
+            realization, accumulators, _ = prepared
             if plan.continuous:
                 return continuous.step(realization, jnp.asarray(dt), carry, k)
             return sampled.control_step(realization, accumulators, jnp.asarray(dt), integrate, plan.substeps, carry, k)
 
-        def record(known, carry, k):
+        def record(prepared, carry, k):
             t = instant(k, jnp.asarray(dt))
-            signals = known[0].record(t, *carry[0])
+            signals = prepared[0].record(t, *carry[0])
             return t, {name: signals[name] for name in plan.signals}
 
         cache = cache_folder() / "native"
@@ -215,16 +216,17 @@ def realized_disturbance(loop: ClosedLoop, key: PRNGKeyArray) -> Any:
     """
     if unavailable():
         raise Unsupported(unavailable())
-    numbers, rest = eqx.partition((loop, key), eqx.is_array)
+    numbers, static = eqx.partition((loop, key), eqx.is_array)
 
     def realize(numbers):
-        loop, key = eqx.combine(numbers, rest)
+        loop, key = eqx.combine(numbers, static)
         return loop.realize(key).disturbance_realization
 
     constant = [decides_structure(leaf) for leaf in jax.tree.leaves(numbers)]
-    kept, nothing = lambda known, carry, k: carry, lambda known, carry, k: jnp.zeros(())
+    unchanged = lambda prepared, carry, k: carry
+    no_output = lambda prepared, carry, k: jnp.zeros(())
     cache = cache_folder() / "native"
-    program = simdjit.Loop(realize, lambda known: known, kept, nothing, numbers, constant, 1, None, cache)
+    program = simdjit.Loop(realize, lambda prepared: prepared, unchanged, no_output, numbers, constant, 1, None, cache)
     carry, _ = program.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], numbers), 1, 0)
     return jax.tree.map(lambda leaf: leaf[0], carry)
 

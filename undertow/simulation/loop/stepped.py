@@ -64,9 +64,9 @@ class CompiledStep(Uncopied):
 
 def step_of(function: Callable, part: Any, state: Any, inputs: Any) -> CompiledStep:
     """A compiled step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
-    of_part, rest = eqx.partition(part, eqx.is_array)
+    of_part, static = eqx.partition(part, eqx.is_array)
     return CompiledStep(
-        lambda of_part, state, inputs: function(eqx.combine(of_part, rest), state, inputs), of_part, state, inputs
+        lambda of_part, state, inputs: function(eqx.combine(of_part, static), state, inputs), of_part, state, inputs
     )
 
 
@@ -74,16 +74,16 @@ class _ByXla:
     """The same by XLA, in arrays that are copied to and fro; a call takes a tenth of a millisecond or more."""
 
     def __init__(self, function: Callable, numbers: Any, state: Any, inputs: Any):
-        own = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
-        self.numbers, self.state, self.inputs = own(numbers), own(state), own(inputs)
+        copied = lambda tree: jax.tree.map(lambda leaf: np.array(leaf), tree)
+        self.numbers, self.state, self.inputs = copied(numbers), copied(state), copied(inputs)
         self._function = jax.jit(function).lower(self.numbers, self.state, self.inputs).compile()
-        _, found = self._function(self.numbers, self.state, self.inputs)
-        self.outputs = own(found)
+        _, outputs = self._function(self.numbers, self.state, self.inputs)
+        self.outputs = copied(outputs)
 
     def __call__(self) -> None:
-        found = self._function(self.numbers, self.state, self.inputs)
-        for place, value in zip(jax.tree.leaves((self.state, self.outputs)), jax.tree.leaves(found), strict=True):
-            place[...] = value
+        results = self._function(self.numbers, self.state, self.inputs)
+        for target, value in zip(jax.tree.leaves((self.state, self.outputs)), jax.tree.leaves(results), strict=True):
+            target[...] = value
 
 
 def realized(loop: ClosedLoop, key: Any) -> Realization:
@@ -95,8 +95,8 @@ def realized(loop: ClosedLoop, key: Any) -> Realization:
     return loop.realized_with(disturbance, key)
 
 
-def put(places: Any, values: Any) -> None:
+def put(targets: Any, values: Any) -> None:
     """Write the arrays of a tree into those of another."""
-    for place, value in zip(jax.tree.leaves(places), jax.tree.leaves(values), strict=True):
-        if place is not value:
-            place[...] = value
+    for target, value in zip(jax.tree.leaves(targets), jax.tree.leaves(values), strict=True):
+        if target is not value:
+            target[...] = value

@@ -83,15 +83,17 @@ class _ByXla:
         varying = [None if same else leaf for leaf, same in zip(leaves, constant, strict=True)]
         fixed = jax.tree.unflatten(form, [leaf if same else None for leaf, same in zip(leaves, constant, strict=True)])
         stacked = lambda tree: jax.tree.map(lambda leaf: np.broadcast_to(leaf, (runs, *np.shape(leaf))).copy(), tree)
-        given = jax.tree.unflatten(form, varying), state, inputs
-        self._given = {name: stacked(part) for name, part in zip(("numbers", "state", "inputs"), given, strict=True)}
-        one = lambda own, state, inputs: function(eqx.combine(own, fixed), state, inputs)
-        self._step = jax.jit(jax.vmap(one)).lower(*self._given.values()).compile()
+        varying_arguments = jax.tree.unflatten(form, varying), state, inputs
+        self._given = {
+            name: stacked(part) for name, part in zip(("numbers", "state", "inputs"), varying_arguments, strict=True)
+        }
+        run_step = lambda run_numbers, state, inputs: function(eqx.combine(run_numbers, fixed), state, inputs)
+        self._step = jax.jit(jax.vmap(run_step)).lower(*self._given.values()).compile()
 
     def put(self, what: str, values: Any, runs: np.ndarray | None = None) -> None:
-        places = jax.tree.leaves(self._given[what])
-        for place, value in zip(places, jax.tree.leaves(values), strict=True):
-            place[slice(None) if runs is None else runs] = value
+        targets = jax.tree.leaves(self._given[what])
+        for target, value in zip(targets, jax.tree.leaves(values), strict=True):
+            target[slice(None) if runs is None else runs] = value
 
     def __call__(self) -> Any:
         state, outputs = self._step(*self._given.values())

@@ -27,8 +27,8 @@ class XlaBatchRunner:
     """
 
     def __init__(self, run: LoopRun, plan: RunPlan, width: int = 0):
-        numbers, rest = eqx.partition(run, eqx.is_array)
-        self.run: Callable[[Any], Outcome] = _batched(partial(_one, rest, plan), numbers, width or _WIDTH)
+        numbers, static = eqx.partition(run, eqx.is_array)
+        self.run: Callable[[Any], Outcome] = _batched(partial(_one, static, plan), numbers, width or _WIDTH)
 
 
 def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callable[[Any], Any]:
@@ -39,16 +39,16 @@ def _batched(function: Callable[[Any], Any], numbers: Any, width: int) -> Callab
     def run(numbers: Any) -> Any:
         runs, pieces = len(jax.tree.leaves(numbers)[0]), []
         for first in range(0, runs, width):
-            which = np.minimum(np.arange(first, first + width), runs - 1)
-            results = program(jax.tree.map(lambda leaf, which=which: leaf[which], numbers))
+            indices = np.minimum(np.arange(first, first + width), runs - 1)
+            results = program(jax.tree.map(lambda leaf, indices=indices: leaf[indices], numbers))
             pieces.append(jax.tree.map(np.asarray, results))
         return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], *pieces)
 
     return run
 
 
-def _one(rest: Any, plan: RunPlan, numbers: Any) -> Outcome:
-    loop, accumulators, (position, velocity), key = eqx.combine(numbers, rest)
+def _one(static: Any, plan: RunPlan, numbers: Any) -> Outcome:
+    loop, accumulators, (position, velocity), key = eqx.combine(numbers, static)
     outcome = sampled.simulate(
         loop,
         duration=plan.steps * plan.dt,

@@ -79,15 +79,15 @@ def vehicle_facts(plant: AbstractPlant, description: Mapping[str, Any]) -> Facts
     if not isinstance(vehicle, VehicleModel):
         return None
     file = description.get("vehicle", {}).get("contents", {})
-    known: dict[str, Any] = {
+    further_facts: dict[str, Any] = {
         key: np.asarray(file[key], dtype=float) for key in ("size", "water_density") if key in file
     }
     if file:
-        known["angles"] = angles_of(file["thrusters"])
+        further_facts["angles"] = angles_of(file["thrusters"])
     if "thruster_matrix" in file:
         running = [number - 1 for number in description.get("thrusters") or range(1, vehicle.thrusters + 1)]
-        known["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
-    return facts_of(vehicle)._replace(**known)
+        further_facts["printed_matrix"] = np.asarray(file["thruster_matrix"], dtype=float)[:, running]
+    return facts_of(vehicle)._replace(**further_facts)
 
 
 _SHOWN = ("gravity", "degrees", "arm")  # advice that matters before a run
@@ -101,10 +101,12 @@ def vehicle_advice(built: Built) -> tuple[Advice, ...]:
     description = built.resolved["plant"]
     facts = vehicle_facts(built.closed_loop.plant, description)
     findings = () if facts is None else lint(facts)
-    shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
-    given = description.get("vehicle", {})
-    if "mass" in given and "weight" not in given:
+    findings_shown = [finding for finding in findings if finding.level == "error" or finding.rule in _SHOWN]
+    changes = description.get("vehicle", {})
+    if "mass" in changes and "weight" not in changes:
         stays = "With `mass` alone changed, weight and buoyancy stay: give `weight` and `buoyancy`, too"
-        shown = [finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in shown]
+        findings_shown = [
+            finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in findings_shown
+        ]
     with within("plant.vehicle", vehicle_location(built.text)):
-        return tuple(advice(finding.key, finding.says, finding.hint) for finding in shown)
+        return tuple(advice(finding.key, finding.says, finding.hint) for finding in findings_shown)

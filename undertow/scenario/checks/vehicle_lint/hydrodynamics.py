@@ -68,21 +68,27 @@ def dissipation(facts: Facts) -> Iterator[Finding]:
 
 def undamped(facts: Facts) -> Iterator[Finding]:
     """Every motion is damped."""
-    free = (np.diag(facts.linear_damping) == 0) & (np.diag(facts.quadratic_damping) == 0)
-    if np.any(free):
-        got = f"zero, like the linear one, in {_names(free)}"
+    undamped_axes = (np.diag(facts.linear_damping) == 0) & (np.diag(facts.quadratic_damping) == 0)
+    if np.any(undamped_axes):
+        got = f"zero, like the linear one, in {_names(undamped_axes)}"
         yield advice("undamped", "quadratic_damping", "slow every motion", got)
 
 
 def _is_of_sphere(facts: Facts) -> bool:
     diagonal = np.diag(facts.added_mass)
-    off = np.any(facts.added_mass - np.diag(diagonal))
-    return not off and bool(np.ptp(diagonal[:3]) <= 1e-6 * diagonal[0]) and diagonal[0] > 0 and not np.any(diagonal[3:])
+    coupled = np.any(facts.added_mass - np.diag(diagonal))
+    return (
+        not coupled
+        and bool(np.ptp(diagonal[:3]) <= 1e-6 * diagonal[0])
+        and diagonal[0] > 0
+        and not np.any(diagonal[3:])
+    )
 
 
 def _sphere(facts: Facts) -> Iterator[Finding]:
     """Equal added mass along all axes and none in rotation is that of a sphere: then size and mass must fit one."""
-    mass, half = facts.added_mass[0, 0], _SPHERE * facts.displaced_mass
+    mass = facts.added_mass[0, 0]
+    half = _SPHERE * facts.displaced_mass
     if abs(mass / half - 1) > 0.05:
         got = f"{mass:.4g} kg, where half the displaced mass is {half:.4g} kg"
         radius = np.cbrt(2 * mass / FRESH_WATER / (4 / 3 * np.pi))

@@ -26,13 +26,13 @@ def unit_directions(facts: Facts) -> Iterator[Finding]:
 
 def degrees(facts: Facts) -> Iterator[Finding]:
     """Angles are in degrees: not all of them are those of a protractor, in radians with three digits."""
-    given = {key: value for key, value in facts.angles.items() if value}
-    steps = {key: value / _STEP for key, value in given.items() if abs(value) <= 2 * np.pi and (2 * value) % 1}
-    if given and len(steps) == len(given) and all(abs(n - round(n)) * _STEP < _ROUNDING for n in steps.values()):
-        key, value = next(iter(given.items()))
+    nonzero = {key: value for key, value in facts.angles.items() if value}
+    steps = {key: value / _STEP for key, value in nonzero.items() if abs(value) <= 2 * np.pi and (2 * value) % 1}
+    if nonzero and len(steps) == len(nonzero) and all(abs(n - round(n)) * _STEP < _ROUNDING for n in steps.values()):
+        key, value = next(iter(nonzero.items()))
         angle = f"{np.degrees(_STEP) * round(steps[key]):g}"
-        others = ", and the other angles in degrees as well" if len(given) > 1 else ""
-        got, hint = f"{value:g}, which is {angle} degrees in radians", f"Write {angle}{others}"
+        remark = ", and the other angles in degrees as well" if len(nonzero) > 1 else ""
+        got, hint = f"{value:g}, which is {angle} degrees in radians", f"Write {angle}{remark}"
         if any(printed_matrix(facts)):
             yield error("degrees", key, "be in degrees", f"{got}, and `thruster_matrix` contradicts it", hint)
         else:
@@ -55,7 +55,8 @@ def arms(facts: Facts) -> Iterator[Finding]:
         axis = int(np.argmax(beyond))
         if beyond[axis] > 0.6:
             side = ("length", "width", "height")[axis]
-            key, at = f"thrusters[{j}].position", abs(position[axis] - facts.r_g[axis])
+            key = f"thrusters[{j}].position"
+            at = abs(position[axis] - facts.r_g[axis])
             got = f"{at:.3g} m from the centre of gravity, of a hull with a {side} of {facts.size[axis]:.3g} m"
             level = error if beyond[axis] > 5 else advice
             yield level("arm", key, "be on the hull", got, "Is it that of another vehicle, or in another unit?")
@@ -66,9 +67,9 @@ def rank(facts: Facts) -> Iterator[Finding]:
     for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, BODY_AXES):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
-    left, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
+    left_vectors, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
     if sizes[0] > _WORST_CONDITION * sizes[5]:
-        weakest = BODY_AXES[int(np.argmax(np.abs(left[:, 5])))]
+        weakest = BODY_AXES[int(np.argmax(np.abs(left_vectors[:, 5])))]
         got = f"such that the best is pushed {sizes[0] / sizes[5]:.3g} times harder than the worst, {weakest}"
         yield advice("condition", "thrusters", "push all directions alike", got)
 
@@ -92,8 +93,8 @@ def mirror(facts: Facts) -> Iterator[Finding]:
     distance = np.minimum(*(np.abs(images[:, None] - sign * columns).max(axis=2) for sign in (1, -1)))
     alone = np.flatnonzero(distance.min(axis=1) > 0.02)
     if 0 < len(alone) <= len(columns) // 2 and len(columns) > 2:
-        others = f", like {', '.join(f'`thrusters[{j}]`' for j in alone[1:])}" if len(alone) > 1 else ""
-        key, got = f"thrusters[{alone[0]}]", f"without one{others}, of {len(columns)} thrusters"
+        further = f", like {', '.join(f'`thrusters[{j}]`' for j in alone[1:])}" if len(alone) > 1 else ""
+        key, got = f"thrusters[{alone[0]}]", f"without one{further}, of {len(columns)} thrusters"
         hint = "The others have one: is a sign or a number wrong?"
         yield advice("mirror", key, "have a mirror image on the other side", got, hint)
 

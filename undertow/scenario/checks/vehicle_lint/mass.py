@@ -28,9 +28,9 @@ def mass_matrix(facts: Facts) -> Iterator[Finding]:
         if skew > 1e-9 * np.abs(matrix).max():
             hint = "Take (A + A^T) / 2 if this is rounding" if skew < 0.01 * np.abs(matrix).max() else ""
             yield error("symmetry", key, "be symmetric", f"off by {skew:.3g}", hint)
-    whole, rigid = (_smallest(matrix) for matrix in (facts.mass_matrix, facts.mass_matrix - facts.added_mass))
-    if not whole > 0 and rigid > 0:  # else it is the inertia, see `triangle`
-        got = f"such that M, with it, has the eigenvalue {whole:.3g}"
+    total, rigid = (_smallest(matrix) for matrix in (facts.mass_matrix, facts.mass_matrix - facts.added_mass))
+    if not total > 0 and rigid > 0:  # else it is the inertia, see `triangle`
+        got = f"such that M, with it, has the eigenvalue {total:.3g}"
         hint = f"With mass and inertia alone the smallest is {rigid:.3g}"
         yield error("definite", "added_mass", "leave M = M_RB + M_A positive definite", got, hint)
 
@@ -58,10 +58,13 @@ def gyration(facts: Facts) -> Iterator[Finding]:
     """The radius of gyration must fit the hull. Finds grams, centimetres and other vehicles' inertia."""
     radii = facts.radii_of_gyration
     if facts.size is None:
-        limits, usual, basis = np.full(3, facts.scale), _USUAL_OF_SCALE, "Thruster arms and volume make the vehicle"
+        limits = np.full(3, facts.scale)
+        usual = _USUAL_OF_SCALE
+        basis = "Thruster arms and volume make the vehicle"
     else:
         limits = _corner_radii(facts.size)
-        usual, basis = _USUAL, "All its mass in the corners of the hull would give"
+        usual = _USUAL
+        basis = "All its mass in the corners of the hull would give"
     ratios = radii / limits
     i = int(np.argmax(np.maximum(ratios / usual[1], usual[0] / np.maximum(ratios, 1e-12))))
     smallest, largest = np.array(usual) * limits[i]
@@ -91,12 +94,13 @@ def axes(facts: Facts) -> Iterator[Finding]:
     """
     if facts.size is None or any(gyration(facts)):
         return
-    given, box = np.diag(facts.inertia), _corner_radii(facts.size) ** 2
-    pairs = [(box[i] / box[j], i, j) for i in range(3) for j in range(3) if 0 < given[j] < given[i]]
+    moments = np.diag(facts.inertia)
+    box = _corner_radii(facts.size) ** 2
+    pairs = [(box[i] / box[j], i, j) for i in range(3) for j in range(3) if 0 < moments[j] < moments[i]]
     ratio, i, j = min(pairs, default=(1.0, 0, 0))
     if ratio < _CLEARLY_SMALLER:
         should = f"be smaller in {_AXES[i]} than in {_AXES[j]}"
-        got = f"{given[i]:.4g} against {given[j]:.4g} kg m^2"
+        got = f"{moments[i]:.4g} against {moments[j]:.4g} kg m^2"
         size = " x ".join(f"{side:.4g}" for side in facts.size)
         hint = f"In a uniform box of {size} m (`size`) it is {ratio:.2g} times as large. {_ORDER}"
         yield advice("axes", "inertia", should, got, hint)

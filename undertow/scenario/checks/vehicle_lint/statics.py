@@ -24,8 +24,8 @@ def gravity(facts: Facts) -> Iterator[Finding]:
             1e3: "Is `weight` in mN, or `mass` in tonnes?",
         }
         near = [hint for factor, hint in hints.items() if abs(np.log(g / 9.81 / factor)) < 0.1]
-        other = "Does `buoyancy` fit better? Then the two are swapped, or `mass` belongs to another version"
-        yield error("gravity", "weight", should, got, near[0] if near else other)
+        alternative = "Does `buoyancy` fit better? Then the two are swapped, or `mass` belongs to another version"
+        yield error("gravity", "weight", should, got, near[0] if near else alternative)
     elif not _EARTH[0] < g < _EARTH[1]:
         yield advice("gravity", "weight", should, got)
 

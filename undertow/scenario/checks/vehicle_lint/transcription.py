@@ -21,19 +21,18 @@ def printed_matrix(facts: Facts) -> Iterator[Finding]:
     expected = facts.thruster_matrix + 0.0  # no minus zeros
     for row, (printed, computed) in enumerate(zip(facts.printed_matrix, expected, strict=True)):
         largest = np.maximum(np.abs(printed), np.abs(computed)).max()
-        off = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
-        if len(off):
-            j = int(off[np.argmax(np.abs(printed - computed)[off])])
+        wrong_entries = np.flatnonzero(np.abs(printed - computed) > _ROUNDING * largest)
+        if len(wrong_entries):
+            j = int(wrong_entries[np.argmax(np.abs(printed - computed)[wrong_entries])])
             must = f"agree with the poses, which give {computed[j]:.4g} for `thrusters[{j}]` in {BODY_AXES[row]}"
-            got = f"{printed[j]:.4g}{_others(off)}"
-            hint = (
-                f"{_likely(printed[off], computed[off])} If you moved a thruster, delete `thruster_matrix` or update it"
-            )
+            got = f"{printed[j]:.4g}{_others(wrong_entries)}"
+            mistake = _likely(printed[wrong_entries], computed[wrong_entries])
+            hint = f"{mistake} If you moved a thruster, delete `thruster_matrix` or update it"
             yield error("printed_matrix", f"thruster_matrix[{row}]", must, got, hint)
 
 
-def _others(off: np.ndarray) -> str:
-    return f" ({len(off)} entries of this row are off)" if len(off) > 1 else ""
+def _others(wrong_entries: np.ndarray) -> str:
+    return f" ({len(wrong_entries)} entries of this row are off)" if len(wrong_entries) > 1 else ""
 
 
 def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
@@ -45,7 +44,8 @@ def _likely(printed: np.ndarray, computed: np.ndarray) -> str:
     if np.all(np.abs(ratio - np.sqrt(2)) < 0.05 * np.sqrt(2)):
         return "The arm was not multiplied by sin 45 degrees."
     if np.all(np.isfinite(ratio)) and np.ptp(ratio) < 0.02 * ratio.max():
-        size, excess = max(ratio[0], 1 / ratio[0]), "long" if ratio[0] > 1 else "short"
+        size = max(ratio[0], 1 / ratio[0])
+        excess = "long" if ratio[0] > 1 else "short"
         return f"The matrix's arms are {size:.3g} times too {excess} for the poses: another vehicle's, or another unit."
     return "Is it the matrix of another layout, order or frame?"
 
@@ -56,13 +56,15 @@ _OTHER_MASS = 0.1  # relative; a vehicle of the same mass may have the same iner
 
 def copied(facts: Facts) -> Iterator[Finding]:
     """Compare with every vehicle of the catalogue, about the centre of gravity and about the origin."""
-    for other in _known():
-        if abs(facts.mass / other.mass - 1) < _OTHER_MASS:
+    for vehicle in _known():
+        if abs(facts.mass / vehicle.mass - 1) < _OTHER_MASS:
             continue
-        pairs = (facts.inertia, other.inertia), (_about_origin(facts), _about_origin(other))
+        pairs = (facts.inertia, vehicle.inertia), (_about_origin(facts), _about_origin(vehicle))
         for power in (power for pair in pairs for power in _moved(*pair)):
             scale = "" if power == 0 else f"{10**power} times " if power > 0 else f"1/{10**-power} of "
-            got = f"{scale}that of {other.name}, digit for digit, for {facts.mass:.4g} instead of {other.mass:.5g} kg"
+            got = (
+                f"{scale}that of {vehicle.name}, digit for digit, for {facts.mass:.4g} instead of {vehicle.mass:.5g} kg"
+            )
             yield advice("copied", "inertia", "be the vehicle's own", got)
             return
 
