@@ -41,15 +41,15 @@ class ArdupilotRunner:
     def run(self, plan: Plan) -> LinkRun:
         """What happens by a plan."""
         self._chance, self._plan = random.Random(plan.seed), plan
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle_socket:
             port = free_port()
-            self._address, self._socket = ("127.0.0.1", port), own
+            self._address, self._socket = ("127.0.0.1", port), vehicle_socket
             self._command.begin(["ardupilot", str(self._scenario), "--port", str(port)], plan.disk)
             failures = self._talk() if self._begins() else [("N3", "the physics did not begin")]
             ended_at = time.monotonic()
             failures += self._end()
-        found = [Failure(event, plan.identity, f"{says} ({plan})") for event, says in failures]
-        return LinkRun(plan, 0.0, 0.0, 0.0, max(0.0, self._ended_at - ended_at), self._code, found)
+        never_events = [Failure(event, plan.identity, f"{message} ({plan})") for event, message in failures]
+        return LinkRun(plan, 0.0, 0.0, 0.0, max(0.0, self._ended_at - ended_at), self._code, never_events)
 
     def _begins(self) -> bool:
         until = time.monotonic() + _BEGINS
@@ -60,7 +60,7 @@ class ArdupilotRunner:
 
     def _talk(self) -> list[tuple[str, str]]:
         """Frames until the end of the plan; never-events."""
-        found: list[tuple[str, str]] = []
+        failures: list[tuple[str, str]] = []
         sent, before = [self._packet(0)], 0.0
         for step in range(1, self._plan.last):
             begun, packet = time.monotonic(), self._packet(step)
@@ -69,16 +69,18 @@ class ArdupilotRunner:
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
             answer = self._patiently(packet, before)
             if answer is None:
-                return found if self._command.code() is not None else [*found, ("N3", f"no answer to frame {step}")]
+                return (
+                    failures if self._command.code() is not None else [*failures, ("N3", f"no answer to frame {step}")]
+                )
             numbers = np.hstack([np.ravel(value) for value in _numbers(answer)])
             if not np.isfinite(numbers).all():
-                found.append(("N1", f"an answer with numbers that are not finite at frame {step}"))
+                failures.append(("N1", f"an answer with numbers that are not finite at frame {step}"))
             if answer["timestamp"] < before:
-                found.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
+                failures.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
             before = answer["timestamp"]
             sent.append(packet)
             time.sleep(max(0.0, begun + PERIOD - time.monotonic()))
-        return found
+        return failures
 
     def _disturb(self, kind: str, first: bool, packet: bytes, sent: list[bytes]) -> None:
         """What comes beside the packet of a frame."""
@@ -94,8 +96,8 @@ class ArdupilotRunner:
         elif kind == _OLD:  # one at a time: two old ones in a row are a restart, as the protocol has no session
             send(self._chance.choice(sent))
         elif kind == "another sender":
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-                other.sendto(self._packet(self._chance.randrange(1, 2**31)), self._address)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign_socket:
+                foreign_socket.sendto(self._packet(self._chance.randrange(1, 2**31)), self._address)
         elif kind == "silence" and first:
             time.sleep(1.0)
 

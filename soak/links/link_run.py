@@ -88,10 +88,10 @@ class LinkRunner:
         self._peer.begin(self._chance)
         self._command.begin(self._arguments, plan.disk)
         if not self._control_begins():
-            says = f"control did not begin: exit code {self._command.code()}. {_last(self._command.printed())}"
+            message = f"control did not begin: exit code {self._command.code()}. {_last(self._command.printed())}"
             self._code = self._command.code()
             self._command.kill()
-            return self._result(0.0, [("N3", says)])
+            return self._result(0.0, [("N3", message)])
         while self._step < plan.last:
             for event in plan.events:
                 if event.kind == "stall" and event.first == self._step:
@@ -170,9 +170,9 @@ class LinkRunner:
             self._held_back += items
             if len(self._held_back) < 4:
                 return []
-            found, self._held_back = self._held_back, []
-            self._chance.shuffle(found)
-            return found
+            released, self._held_back = self._held_back, []
+            self._chance.shuffle(released)
+            return released
         if event.kind == "replayed":
             return items + self._chance.choices(list(self._sent), k=3)
         if event.kind == "old only":
@@ -205,24 +205,24 @@ class LinkRunner:
         return ended_at
 
     def _events(self, ended_at: float) -> list[tuple[str, str]]:
-        plan, found = self._plan, []
+        plan, events = self._plan, []
         after = self._thrust_at - ended_at
         stated = STATED.get(plan.ending, 1.0)
         stopped = not self._volts.any() or (self._stops_itself and time.monotonic() - self._commanded_at > MAX_AGE)
         if not stopped:
-            found.append(("N8", f"the last command is not neutral, {after:.2f} s after the end"))
+            events.append(("N8", f"the last command is not neutral, {after:.2f} s after the end"))
         elif after > stated:
-            found.append(("N8", f"the last command that is not neutral came {after:.2f} s after the end"))
+            events.append(("N8", f"the last command that is not neutral came {after:.2f} s after the end"))
         if plan.is_single and self._vehicle.longest_full > _TRANSIENT + 1e-9:
-            found.append(("N8", f"full thrust for {self._vehicle.longest_full:.2f} s"))
+            events.append(("N8", f"full thrust for {self._vehicle.longest_full:.2f} s"))
         if self._vehicle.failed:
-            found.append(("N1", "the vehicle's state is not finite"))
+            events.append(("N1", "the vehicle's state is not finite"))
         printed = self._command.printed()
         if self._code is None:
-            found.append(("N3", "the command did not end within ten seconds"))
+            events.append(("N3", "the command did not end within ten seconds"))
         elif self._code not in self._codes() or "Traceback" in printed:
-            found.append(("N2", f"exit code {self._code}: {_last(printed)}"))
-        return found + self._of_log()
+            events.append(("N2", f"exit code {self._code}: {_last(printed)}"))
+        return events + self._of_log()
 
     def _codes(self) -> tuple[int, ...]:
         """Exit codes that are right: a loop that stood still or got nothing may have ended by itself before."""
@@ -246,10 +246,10 @@ class LinkRunner:
         return []
 
     def _result(self, after: float, events: list[tuple[str, str]]) -> LinkRun:
-        of = self._vehicle
-        failures = [Failure(event, self._plan.identity, f"{says} ({self._plan})") for event, says in events]
-        seen = of.volt_seconds, of.longest_full, of.furthest
-        return LinkRun(self._plan, *seen, max(0.0, after), self._code, failures)
+        vehicle = self._vehicle
+        failures = [Failure(event, self._plan.identity, f"{message} ({self._plan})") for event, message in events]
+        measures = vehicle.volt_seconds, vehicle.longest_full, vehicle.furthest
+        return LinkRun(self._plan, *measures, max(0.0, after), self._code, failures)
 
 
 def _rows(path: Path) -> int:

@@ -134,8 +134,8 @@ def time_together(motion: LoggedMotion, inputs: Series) -> float:
 def held(inputs: Series, times: np.ndarray) -> np.ndarray:
     """Inputs at times: those of the last sample until then."""
     early = _EARLY * np.median(np.diff(inputs.time))
-    places = np.searchsorted(inputs.time, times + early, side="right") - 1
-    return inputs.values[places.clip(0, len(inputs.time) - 1)]
+    indices = np.searchsorted(inputs.time, times + early, side="right") - 1
+    return inputs.values[indices.clip(0, len(inputs.time) - 1)]
 
 
 def logged(motion: LoggedMotion, times: np.ndarray) -> np.ndarray:
@@ -162,24 +162,24 @@ def _predicted(
     before, stride, method, substeps = settings
     plant, integrate = realization.loop.plant, METHODS[method]
 
-    def step(x: VehicleState, given: tuple[Any, Inputs]):
-        t, u = given
+    def step(x: VehicleState, time_and_input: tuple[Any, Inputs]):
+        t, u = time_and_input
         u = plant.admissible(x, u) if limited else u
         h = dt / substeps
         for i in range(substeps):
             x = integrate(lambda t, x: realization.motion(jnp.asarray(t), x, u), t + i * h, x, h)
         return x, None
 
-    def several(x: VehicleState, given: tuple[Any, Inputs]):
-        x, _ = jax.lax.scan(step, x, given)
-        y = plant.output(given[0][-1] + dt, x)
+    def several(x: VehicleState, times_and_inputs: tuple[Any, Inputs]):
+        x, _ = jax.lax.scan(step, x, times_and_inputs)
+        y = plant.output(times_and_inputs[0][-1] + dt, x)
         return x, jnp.concatenate([y.position, body_of(y).nu])
 
-    def window(given: _Windows, factor: Inputs):
-        inputs = factor[None] * given.inputs
-        ran_in, _ = jax.lax.scan(step, given.before, (given.time[:before], inputs[:before]))
-        start = given.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
-        after = given.time[before:].reshape(-1, stride), inputs[before:].reshape(-1, stride, inputs.shape[1])
+    def window(starts: _Windows, factor: Inputs):
+        inputs = factor[None] * starts.inputs
+        ran_in, _ = jax.lax.scan(step, starts.before, (starts.time[:before], inputs[:before]))
+        start = starts.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
+        after = starts.time[before:].reshape(-1, stride), inputs[before:].reshape(-1, stride, inputs.shape[1])
         return jax.lax.scan(several, start, after)[1]
 
     return jax.vmap(jax.vmap(window, (0, None)), (None, 0))(windows, factors)

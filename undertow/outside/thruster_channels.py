@@ -31,11 +31,11 @@ class Channels(NamedTuple):
         Raises:
             BadInput: there are fewer channels than the thrusters need.
         """
-        given = np.asarray(pwm, dtype=float)
-        if self.numbers.max() > len(given):
+        pulses = np.asarray(pwm, dtype=float)
+        if self.numbers.max() > len(pulses):
             hint = "With SERVO_32_ENABLE = 1 ArduPilot sends 32"
-            raise BadInput("channels", f"be of the {len(given)} that arrive", str(self.numbers.max()), hint=hint)
-        return neutral + self.signs * (given[self.numbers - 1] - neutral)
+            raise BadInput("channels", f"be of the {len(pulses)} that arrive", str(self.numbers.max()), hint=hint)
+        return neutral + self.signs * (pulses[self.numbers - 1] - neutral)
 
     def of_outputs(self, pulses: ArrayLike, neutral: float) -> dict[int, float]:
         """Pulse (or another signal about its neutral value) by number of the channel, from those of the thrusters."""

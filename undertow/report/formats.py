@@ -42,16 +42,16 @@ def plain(value: float, digits: int = _DIGITS) -> str:
     if value and not _SMALL <= abs(value) < _LARGE:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{_minus(mantissa)} \u00d7 10{str(int(exponent)).translate(_RAISED)}"
-    whole = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
-    return _minus(f"{value:.0f}" if whole else f"{value:#.{digits}g}".rstrip("."))
+    is_integer = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
+    return _minus(f"{value:.0f}" if is_integer else f"{value:#.{digits}g}".rstrip("."))
 
 
 def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
     """A number with its unit; angles in degrees."""
     if value is None:
         return number(None)
-    shown, name = for_people(value, of)
-    return join(number(shown, digits), Html("&nbsp;"), unit(name)) if name else number(shown, digits)
+    displayed, name = for_people(value, of)
+    return join(number(displayed, digits), Html("&nbsp;"), unit(name)) if name else number(displayed, digits)
 
 
 def percent(value: float | None) -> Html:
@@ -71,9 +71,9 @@ def prose(content: Any) -> Html:
 
 
 def _typeset(words: str) -> Html:
-    marked = _TINY.sub(lambda found: _scientific(len(found[1]), found[2]), with_symbols(words))
-    marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), marked)
-    marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
+    marked = _TINY.sub(lambda match: _scientific(len(match[1]), match[2]), with_symbols(words))
+    marked = _POWER.sub(lambda match: _with_power(match[1], f"{match[2]}{match[3]}".lstrip("+")), marked)
+    marked = re.sub(r"\^(-?\d)", lambda match: f"<sup>{_minus(match[1])}</sup>", marked)
     marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
     for sign, entity in _SIGNS.items():
         marked = marked.replace(sign, entity)

@@ -72,23 +72,23 @@ class Session:
             self.counts["invalid"] += 1
             self.complaint = str(error)
             return None
-        other = sender != self.sender
-        anew = packet.frame_count == 0 and self.sender is not None and sender[0] == self.sender[0]
-        if other and now - self._received < SILENCE and not anew:
+        from_another = sender != self.sender
+        new_process = packet.frame_count == 0 and self.sender is not None and sender[0] == self.sender[0]
+        if from_another and now - self._received < SILENCE and not new_process:
             self.counts["strangers"] += 1
             return None
-        if not other and packet.frame_count < self._last and now - self._received < SILENCE:
+        if not from_another and packet.frame_count < self._last and now - self._received < SILENCE:
             follows = self._smaller is not None and packet.frame_count - self._smaller in (0, 1)
             self._smaller = packet.frame_count
             if not follows:
                 self.counts["late"] += 1
                 return None
         self._smaller = None
-        known, self.sender, self._received = self.sender, sender, now
-        if packet.frame_count == self._last and not other:
+        previous_sender, self.sender, self._received = self.sender, sender, now
+        if packet.frame_count == self._last and not from_another:
             self.counts["repeated"] += 1
             return self._answer
-        self._place(packet.frame_count, other and known is not None)
+        self._place(packet.frame_count, from_another and previous_sender is not None)
         self.undriven = undriven
         self._advance(packet, pulses)
         return self._answer

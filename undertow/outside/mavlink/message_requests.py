@@ -75,8 +75,8 @@ class MessageRequests:
 
     def complaint(self) -> str:
         """Which messages the autopilot refuses, in words; "" where it refuses none."""
-        said = ", ".join(f"{name} ({result})" for name, result in self._rejections.items())
-        return f"the vehicle refuses to send {said}" if said else ""
+        refused = ", ".join(f"{name} ({result})" for name, result in self._rejections.items())
+        return f"the vehicle refuses to send {refused}" if refused else ""
 
     def _note_answer(self, result: int, now: float) -> None:
         name, self._asked = self._asked, None

@@ -67,17 +67,17 @@ def linear_closed_loop(
         BadInput: as of `linear_controller`.
     """
     built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
-    at, of = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
+    at, signals = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
     plant, law = _plant(built, at, True, all_states), _controller(built, at, all_states)
-    ends = np.cumsum([len(of.measured), len(of.desired)])
+    ends = np.cumsum([len(signals.measured), len(signals.desired)])
     (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
-    u_x, shown = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
-    own = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
-    a, b = own + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
-    c, d = np.vstack([shown, u_x]), np.vstack([np.zeros((len(shown), len(of.desired))), d_r])
-    outputs, states = of.measured | of.command, plant.state_labels + law.state_labels
+    u_x, shown_outputs = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
+    uncoupled = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
+    a, b = uncoupled + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
+    c, d = np.vstack([shown_outputs, u_x]), np.vstack([np.zeros((len(shown_outputs), len(signals.desired))), d_r])
+    outputs, states = signals.measured | signals.command, plant.state_labels + law.state_labels
     system = ct.ss(a, b, c, d, built.scenario.loop.dt)
-    return _named(system, "closed_loop", of.desired | outputs, list(of.desired), list(outputs), states)
+    return _named(system, "closed_loop", signals.desired | outputs, list(signals.desired), list(outputs), states)
 
 
 def _without_ledger(built: Built, all_states: bool) -> Built:
@@ -94,10 +94,10 @@ def _without_ledger(built: Built, all_states: bool) -> Built:
 def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
     loop, dt = built.closed_loop, built.scenario.loop.dt
     axes = len(loop.plant.outputs)
-    for name, given in (("position", position), ("load", load)):
-        if given is not None and np.shape(given) != (axes,):
+    for name, value in (("position", position), ("load", load)):
+        if value is not None and np.shape(value) != (axes,):
             raise BadInput(
-                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(given)}"
+                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(value)}"
             )
     with computing(built):
         if position is None:
@@ -114,51 +114,60 @@ def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
 
 
 def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
-    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    loop, signals = at.parts.loop, signals_of(built.closed_loop.plant)
     plant, zero = loop.plant, jnp.zeros(())
 
-    def moved(state: Any, u: Any) -> Any:
+    def derivative(state: Any, u: Any) -> Any:
         unloaded = plant.no_load()
         pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(at.at["load"]))
         return vector_of(plant.dynamics(zero, at.parts.plant_state(state), u, pushed))
 
-    def shown(state: Any) -> Any:
+    def measurement(state: Any) -> Any:
         return vector_of_measurement(plant.output(zero, at.parts.plant_state(state)))
 
     with computing(built):
         state, u = jnp.asarray(at.at["plant"]), jnp.asarray(at.at["u"])
-        a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
-        c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
+        a, b = map(np.asarray, jax.jit(jax.jacfwd(derivative, argnums=(0, 1)))(state, u))
+        c = np.asarray(jax.jit(jax.jacfwd(measurement))(state))
         names = state_names(at.parts.plant_state(state), "plant")
-        found = StateSpaceMatrices(a, b, c, names)
-        found = found if all_states else seen(with_angles(found, np.asarray(state)))
-    system = ct.ss(found.a, found.b, found.c, np.zeros((len(c), b.shape[1])))
+        matrices = StateSpaceMatrices(a, b, c, names)
+        matrices = matrices if all_states else seen(with_angles(matrices, np.asarray(state)))
+    system = ct.ss(matrices.a, matrices.b, matrices.c, np.zeros((len(c), b.shape[1])))
     if sampled:
         system = ct.sample_system(system, built.scenario.loop.dt, "zoh")
-    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), found.names)
+    return _named(
+        system,
+        "plant",
+        signals.applied | signals.measured,
+        list(signals.applied),
+        list(signals.measured),
+        matrices.names,
+    )
 
 
 def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpace:
-    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
+    loop, signals = at.parts.loop, signals_of(built.closed_loop.plant)
     law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
-    sizes = np.cumsum([len(of.measured), len(of.desired)])
+    sizes = np.cumsum([len(signals.measured), len(signals.desired)])
 
-    def both(state: Any, given: Any) -> Any:
-        measured, desired, applied = jnp.split(given, sizes)
+    def update_and_command(state: Any, inputs_of_law: Any) -> Any:
+        measured, desired, applied = jnp.split(inputs_of_law, sizes)
         z, y, r = at.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
         return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
 
     with computing(built):
         x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
         state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
-        given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
-        (a, b), (c, d) = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given))
+        inputs_of_law = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
+        (a, b), (c, d) = jax.tree.map(
+            np.asarray, jax.jit(jax.jacfwd(update_and_command, argnums=(0, 1)))(state, inputs_of_law)
+        )
         names = state_names(at.parts.law_state(state), "law")
-    found = StateSpaceMatrices(a, b, c, names)
-    found = found if all_states else seen(found)
-    inputs = of.measured | of.desired | of.applied
-    system = ct.ss(found.a, found.b, found.c, d, built.scenario.loop.dt)
-    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), found.names)
+    matrices = StateSpaceMatrices(a, b, c, names)
+    matrices = matrices if all_states else seen(matrices)
+    inputs = signals.measured | signals.desired | signals.applied
+    system = ct.ss(matrices.a, matrices.b, matrices.c, d, built.scenario.loop.dt)
+    return _named(system, "controller", inputs | signals.command, list(inputs), list(signals.command), matrices.names)
 
 
 def _named(

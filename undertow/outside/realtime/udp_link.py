@@ -29,16 +29,16 @@ class UdpVehicleLink(AbstractLink):
     period, so that it knows where to send its measurements. The newest measurement counts.
 
     Args:
-        place: HOST:PORT.
+        address: HOST:PORT.
         built: the scenario.
 
     Raises:
         BadInput: no such host, or the plant is no vehicle.
     """
 
-    def __init__(self, place: str, built: Built):
+    def __init__(self, address: str, built: Built):
         _check_vehicle(built)
-        host, port = address_of(place, "--link")
+        host, port = address_of(address, "--link")
         self.form, self._actuators = Format("quaternion", "body"), built.closed_loop.plant.inputs()
         try:
             self._peer = socket.gethostbyname(host), port
@@ -57,7 +57,7 @@ class UdpVehicleLink(AbstractLink):
         return self._socket.fileno()
 
     def receive(self, elapsed: float) -> LinkMeasurement | None:
-        found = None
+        newest = None
         for _ in range(_AT_ONCE):
             try:
                 data, sender = self._socket.recvfrom(_LONGEST)
@@ -66,14 +66,14 @@ class UdpVehicleLink(AbstractLink):
             if sender != self._peer:
                 self._others += 1
                 continue
-            taken = self._received.take(data)
-            found = found if taken is None else taken
+            datagram = self._received.take(data)
+            newest = newest if datagram is None else datagram
         else:
             self._received.counts["left unread"] += 1
-        if found is None:
+        if newest is None:
             return None
-        motion, applied = found.values[:MOTION], found.values[MOTION:]
-        return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if found.flag else None)
+        motion, applied = newest.values[:MOTION], newest.values[MOTION:]
+        return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if newest.flag else None)
 
     def guard(self, safe: np.ndarray, longest: float) -> None:
         self._safe, self._watchdog = safe, Watchdog(self._socket, longest)
@@ -113,7 +113,7 @@ class UdpVehicleServer:
 
     Args:
         built: the scenario.
-        place: HOST:PORT to listen on.
+        address: HOST:PORT to listen on.
 
     Attributes:
         last_command: that was received last.
@@ -122,19 +122,19 @@ class UdpVehicleServer:
         BadInput: the address cannot be used, or the plant is no vehicle.
     """
 
-    def __init__(self, built: Built, place: str):
+    def __init__(self, built: Built, address: str):
         _check_vehicle(built)
         self._period, self._actuators = float(built.scenario.loop.dt), built.closed_loop.plant.inputs()
         self._received = DatagramFilter(COMMAND, self._actuators)
         self._sender = Sender(MEASUREMENT, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind(address_of(place, "--serve"))
+            self._socket.bind(address_of(address, "--serve"))
         except (OSError, UnicodeError) as error:
             self._socket.close()
             hint = "Another program may be listening there"
             reason = getattr(error, "strerror", None) or "no such host"
-            raise BadInput("--serve", "be free to use", f"{place}: {reason}", hint=hint) from None
+            raise BadInput("--serve", "be free to use", f"{address}: {reason}", hint=hint) from None
         except BadInput:
             self._socket.close()
             raise
@@ -173,13 +173,15 @@ class UdpVehicleServer:
             self._answer(command.sequence, sender)
 
     def _answer(self, sequence: int, sender: tuple[str, int]) -> None:
-        found = self._measurement
-        known = found.applied is not None
-        applied = found.applied if known else np.zeros(self._actuators)
+        measurement = self._measurement
+        input_known = measurement.applied is not None
+        applied = measurement.applied if input_known else np.zeros(self._actuators)
         # Of `both` and `both`: the quaternion follows the Euler angles, and body velocity the rates.
-        values = np.concatenate([found.position, found.attitude[3:], found.velocity[6:], applied])
+        values = np.concatenate([measurement.position, measurement.attitude[3:], measurement.velocity[6:], applied])
         with contextlib.suppress(OSError):
-            self._socket.sendto(self._sender.pack(values, round(1e9 * self._vehicle.time), sequence, known), sender)
+            self._socket.sendto(
+                self._sender.pack(values, round(1e9 * self._vehicle.time), sequence, input_known), sender
+            )
 
 
 def _check_vehicle(built: Built) -> None:

@@ -78,19 +78,19 @@ class Inlet(Generic[Message]):
     def _taken(self) -> Iterator[Message]:
         while True:
             try:
-                found = self._reader.take(1)  # one by one: a message that cannot be read must cost no other
+                messages = self._reader.take(1)  # one by one: a message that cannot be read must cost no other
             except DDSException:
                 raise
             except Exception:  # of struct, UTF-8, or CycloneDDS's own `Exception`
                 self.malformed += 1
                 continue
-            if not found:
+            if not messages:
                 return
-            if getattr(found[0], "sample_info", None) is None or not found[0].sample_info.valid_data:
+            if getattr(messages[0], "sample_info", None) is None or not messages[0].sample_info.valid_data:
                 continue  # a publisher has left
             self.received += 1
-            self._link.record(self.topic, found[0])
-            yield found[0]
+            self._link.record(self.topic, messages[0])
+            yield messages[0]
 
     def publishers(self) -> int:
         """How many publishers there are."""
@@ -197,13 +197,13 @@ class Link:
 
     def topics(self) -> dict[str, str]:
         """Topics that are published in the domain, and their types in ROS 2."""
-        there: dict[Any, Any] = {}
-        for one in self._announced.read(1000):
-            there[one.key] = one  # without names where the publisher has left
+        publications: dict[Any, Any] = {}
+        for publication in self._announced.read(1000):
+            publications[publication.key] = publication  # without names where the publisher has left
         return {
-            one.topic_name[2:]: one.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
-            for one in there.values()
-            if (one.topic_name or "").startswith("rt/")
+            publication.topic_name[2:]: publication.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
+            for publication in publications.values()
+            if (publication.topic_name or "").startswith("rt/")
         }
 
     def record(self, topic: str, message: Any) -> None:
@@ -223,9 +223,9 @@ class Link:
         if not _NAME.fullmatch(topic):
             must = "be a name of ROS 2, such as /odom: letters, digits, underscores, and a slash before each part"
             raise BadInput("topic", must, repr(topic))
-        made = Topic(self._participant, f"rt{topic}", kind, self._qos)
-        self._kept.append(made)
-        return made
+        dds_topic = Topic(self._participant, f"rt{topic}", kind, self._qos)
+        self._kept.append(dds_topic)
+        return dds_topic
 
 
 # What makes that two sides see nothing of each other.
@@ -234,9 +234,9 @@ DIFFERENT_NETWORKS = "Is the domain right, and --localhost given to both sides o
 
 def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     """Why nothing arrives at a subscriber, in a sentence."""
-    there, expected = link.topics(), ros_type(kind)
-    if inlet.topic in there and there[inlet.topic] != expected:
-        return f"{inlet.topic} is published as {there[inlet.topic]}, but {expected} is expected"
+    types_by_topic, expected = link.topics(), ros_type(kind)
+    if inlet.topic in types_by_topic and types_by_topic[inlet.topic] != expected:
+        return f"{inlet.topic} is published as {types_by_topic[inlet.topic]}, but {expected} is expected"
     if inlet.incompatible():
         return (
             f"{inlet.topic} is published with another quality of service than is asked for. "
@@ -244,8 +244,8 @@ def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
         )
     if inlet.publishers():
         return f"{inlet.topic} has a publisher that sends nothing"
-    alike = sorted(name for name, one in there.items() if one == expected)
-    hint = f"{expected} is published on {', '.join(alike)}: use --remap" if alike else DIFFERENT_NETWORKS
+    same_type = sorted(name for name, message_type in types_by_topic.items() if message_type == expected)
+    hint = f"{expected} is published on {', '.join(same_type)}: use --remap" if same_type else DIFFERENT_NETWORKS
     return f"nobody publishes {inlet.topic} ({expected}). {hint}"
 
 

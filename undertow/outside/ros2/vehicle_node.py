@@ -123,17 +123,17 @@ class VehicleNode:
 
     def _take_command(self) -> bool:
         """Take the newest command that can be used; whether there was one."""
-        found: NDArray | None = None
+        command: NDArray | None = None
         for message in self._commands.take():
             try:
-                found = thrusters_from(message, self._vehicle.thrusters, self._label, self._commands.topic)
+                command = thrusters_from(message, self._vehicle.thrusters, self._label, self._commands.topic)
             except BadInput as error:
                 if self._settings.pace == "lock-step":
                     raise
                 self._reporter.trouble(f"ignored ({error.name})", f"{error}. The command is ignored")
-        if found is None:
+        if command is None:
             return False
-        self._command, self._last = found, time.monotonic()
+        self._command, self._last = command, time.monotonic()
         self._reporter.over("stopped")
         return True
 
