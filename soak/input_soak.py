@@ -56,13 +56,13 @@ class _Worker:
         self.asked: tuple[str, int] | None = None
         self.since, self._tried = time.monotonic(), 0
 
-    def ask(self, one: tuple[str, int]) -> None:
+    def ask(self, task: tuple[str, int]) -> None:
         """Let it try an input."""
         if self._tried >= _FRESH:
             self.end()
             self._start()
-        self.asked, self.since, self._tried = one, time.monotonic(), self._tried + 1
-        self.pipe.send(one)
+        self.asked, self.since, self._tried = task, time.monotonic(), self._tried + 1
+        self.pipe.send(task)
 
     def restart(self) -> str:
         """End the process and start another; how it ended."""

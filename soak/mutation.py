@@ -142,11 +142,11 @@ def change(data: Any, chance: random.Random) -> None:
     elif how < 0.88:
         node[chance.choice(_KEYS)] = _value(chance, None)
     else:  # the value of another place
-        *others, key = chance.choice(places)
-        other = data
-        for step in others:
-            other = other[step]
-        node[last] = copy.deepcopy(other[key]) if key in other or isinstance(other, list) else None
+        *path, key = chance.choice(places)
+        source = data
+        for step in path:
+            source = source[step]
+        node[last] = copy.deepcopy(source[key]) if key in source or isinstance(source, list) else None
 
 
 def _places(node: Any, path: Path_ = ()) -> Iterator[Path_]:

@@ -122,10 +122,10 @@ def plug_in(chance: random.Random) -> str:
         return PLUG_IN.replace(
             "(model, frequency=1.0)", chance.choice(("()", "(x)", "(*a, **b)", "(model, /)", "(a, b)"))
         )
-    zero, kept = "return jnp.zeros(1)", "return z"
+    zero, unchanged = "return jnp.zeros(1)", "return z"
     init = chance.choice((zero, zero, "return None", "return {'a': 3}", "raise ValueError('no')", "return jnp.nan"))
     advance = chance.choice(
-        (kept, kept, "return None", "return jnp.zeros(9)", "return (z, z)", "return z / 0", "return 'a'")
+        (unchanged, unchanged, "return None", "return jnp.zeros(9)", "return (z, z)", "return z / 0", "return 'a'")
     )
     signals = chance.choice(("{}", "{}", "{}", "None", "3", "{'x': 3}", "{'position': None}"))
     return _OWN.format(init=init, signals=signals, command=chance.choice(_COMMANDS), advance=advance)

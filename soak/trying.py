@@ -29,15 +29,15 @@ class _Overdue(BaseException):
     """An input takes too long. No Exception, so that nothing that is tried can answer it."""
 
 
-def try_in_process(run: Run, given: Attack, folder: Path) -> Done:
+def try_in_process(run: Run, hostile_input: Attack, folder: Path) -> Done:
     """What an input does in this process.
 
     Args:
         run: `undertow` with arguments, in this process.
-        given: the input.
+        hostile_input: the input.
         folder: empty, and empty again afterwards.
     """
-    _write(given.files, folder)
+    _write(hostile_input.files, folder)
     before = _state(folder)
     out, err = _stream("strict"), _stream("backslashreplace")
     began = time.process_time(), time.monotonic()
@@ -47,7 +47,7 @@ def try_in_process(run: Run, given: Attack, folder: Path) -> Done:
         signal.setitimer(signal.ITIMER_PROF, _LIMIT)
         with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             try:
-                code = run(given.arguments)
+                code = run(hostile_input.arguments)
             finally:
                 signal.setitimer(signal.ITIMER_PROF, 0.0)
     except _Overdue:

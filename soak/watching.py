@@ -53,14 +53,14 @@ class Watch(AbstractAccumulator):
         outputs = jnp.isfinite(signals["position"]).all() & jnp.isfinite(signals["velocity"]).all()
         finite = jnp.isfinite(acting).all() & jnp.isfinite(signals["commanded_input"]).all()
         now = jnp.minimum(jnp.floor(t / self.length + 1e-9), self.windows - 1.0)
-        here = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
+        in_window = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
         largest = jnp.abs(signals["weights_peak"]).max() if "weights_peak" in signals else jnp.zeros(())
         return Counts(
             state.steps + 1.0,
             state.undefined_inputs + jnp.where(finite, 0.0, 1.0),
             state.exceeded_limits + jnp.where(finite & ~within.all(), 1.0, 0.0),
             state.undefined_outputs + jnp.where(outputs, 0.0, 1.0),
-            state.samples + here,
-            state.squares + here[:, None] * signals["error"][None, :] ** 2,
-            jnp.maximum(state.weights, here * largest),
+            state.samples + in_window,
+            state.squares + in_window[:, None] * signals["error"][None, :] ** 2,
+            jnp.maximum(state.weights, in_window * largest),
         )

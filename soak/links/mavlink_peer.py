@@ -54,12 +54,12 @@ class MavlinkPeer(AbstractPeer):
             pass
 
     def items(self, measured: Measured, time: float) -> list[Any]:
-        found = [self._odometry(measured, time).pack(self._wire)]
+        messages = [self._odometry(measured, time).pack(self._wire)]
         if time - self._alive_at >= 1.0 or time < self._alive_at:
             self._alive_at = time
             armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-            found.insert(0, mavlink.MAVLink_heartbeat_message(12, 3, armed, 0, 4, 3).pack(self._wire))
-        return found
+            messages.insert(0, mavlink.MAVLink_heartbeat_message(12, 3, armed, 0, 4, 3).pack(self._wire))
+        return messages
 
     def send(self, item: bytes) -> None:
         self._transmit(self._socket, item)
@@ -98,8 +98,8 @@ class MavlinkPeer(AbstractPeer):
         """Take the pulses of a command; whether it was one."""
         kind = message.get_type()
         if kind == "RC_CHANNELS_OVERRIDE":
-            given = np.array([getattr(message, f"chan{n}_raw") for n in range(1, 17)], dtype=float)
-            self._pulses = np.where(given == 65535, self._pulses, given)
+            channels = np.array([getattr(message, f"chan{n}_raw") for n in range(1, 17)], dtype=float)
+            self._pulses = np.where(channels == 65535, self._pulses, channels)
             return True
         if kind == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_DO_SET_SERVO:
             self._pulses[int(message.param1) - 1] = message.param2
@@ -113,12 +113,12 @@ class MavlinkPeer(AbstractPeer):
     def _odometry(self, measured: Measured, time: float, frame: int = mavlink.MAV_FRAME_LOCAL_NED) -> Any:
         with warnings.catch_warnings(), np.errstate(over="ignore"):
             warnings.simplefilter("ignore")
-            numbers: Any = [np.float32(one).tolist() for one in measured]
+            numbers: Any = [np.float32(vector).tolist() for vector in measured]
         position, attitude, velocity = numbers
         frames = frame, mavlink.MAV_FRAME_BODY_FRD
         stamp = self._origin + round(1e6 * time)
-        made: Any = mavlink.MAVLink_odometry_message
-        return made(stamp, *frames, *position, attitude, *velocity, _UNKNOWN, _UNKNOWN, 0, 3, 0)
+        make_message: Any = mavlink.MAVLink_odometry_message
+        return make_message(stamp, *frames, *position, attitude, *velocity, _UNKNOWN, _UNKNOWN, 0, 3, 0)
 
     def _transmit(self, by: socket.socket, data: bytes) -> None:
         try:

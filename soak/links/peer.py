@@ -67,7 +67,7 @@ def measured_of(motion: MeasuredMotion) -> Measured:
 def altered(measured: Measured, what: str) -> Measured:
     """A measurement with one of `plan.WILD`."""
     name, size = what.split()[:2]
-    position, attitude, velocity = (np.array(one) for one in measured)
+    position, attitude, velocity = (np.array(vector) for vector in measured)
     if name == "position":
         position = position + np.array([float(size), 0.0, 0.0])
     elif name == "velocity":

@@ -58,8 +58,8 @@ def _kind(name: str, form: str, columns: list[str]) -> _Kind | None:
     good = len(form) == len(columns) == len(set(columns)) and all(columns) and set(form) <= set(_TYPES)
     if not good or not form or not name.isascii() or not name.isprintable():
         return None
-    fields = np.dtype([(column, _TYPES[one][0]) for column, one in zip(columns, form, strict=True)])
-    return _Kind(name, fields, tuple(_TYPES[one][1] for one in form), 3 + fields.itemsize)
+    fields = np.dtype([(column, _TYPES[type_letter][0]) for column, type_letter in zip(columns, form, strict=True)])
+    return _Kind(name, fields, tuple(_TYPES[type_letter][1] for type_letter in form), 3 + fields.itemsize)
 
 
 _OF_FMT = _kind("FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
@@ -148,15 +148,15 @@ def _described(data: bytes, at: int) -> tuple[int, _Kind | None]:
     return number, kind if kind is not None and kind.size == size and number != _FMT else None
 
 
-def _number(data: bytes, at: int, kind: _Kind, kinds: dict[int, _Kind], numbered: dict[str, str]) -> None:
+def _number(data: bytes, offset: int, kind: _Kind, kinds: dict[int, _Kind], numbered: dict[str, str]) -> None:
     """Remember the column that a message FMTU says to number sensors or cores."""
-    fields = np.frombuffer(data, kind.fields, 1, at + 3)[0]
+    fields = np.frombuffer(data, kind.fields, 1, offset + 3)[0]
     if not {"FmtType", "UnitIds"} <= set(kind.fields.names or ()):
         return
     about, units = kinds.get(int(fields["FmtType"])), bytes(fields["UnitIds"])
-    place = units.find(b"#")
-    if about is not None and about.fields.names and 0 <= place < len(about.fields.names):
-        numbered[about.name] = about.fields.names[place]
+    index = units.find(b"#")
+    if about is not None and about.fields.names and 0 <= index < len(about.fields.names):
+        numbered[about.name] = about.fields.names[index]
 
 
 def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, TopicMessages]:
@@ -167,9 +167,9 @@ def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, TopicMess
     time = rows["TimeUS"] * 1e-6
     if instance not in fields:
         return {kind.name: TopicMessages(time, fields, kind.name)}
-    found = {}
+    tables = {}
     for number in np.unique(fields[instance]):
-        own = fields[instance] == number
-        part = {name: values[own] for name, values in fields.items()}
-        found[f"{kind.name}[{number:g}]"] = TopicMessages(time[own], part, kind.name)
-    return found
+        of_instance = fields[instance] == number
+        part = {name: values[of_instance] for name, values in fields.items()}
+        tables[f"{kind.name}[{number:g}]"] = TopicMessages(time[of_instance], part, kind.name)
+    return tables

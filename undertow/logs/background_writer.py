@@ -88,8 +88,8 @@ class BackgroundWriter:
 
     def missing(self, what: str) -> list[str]:
         """What the recording lacks, as sentences; `what` names the entries, as in `steps`."""
-        found = [f"{self.failure}; later {what} are not recorded"] if self.failure else []
-        return found + [f"{self.dropped} {what} are missing: the disk was too slow"] * (self.dropped > 0)
+        sentences = [f"{self.failure}; later {what} are not recorded"] if self.failure else []
+        return sentences + [f"{self.dropped} {what} are missing: the disk was too slow"] * (self.dropped > 0)
 
     def _run(self) -> None:
         try:

@@ -40,18 +40,20 @@ def read_csv(path: Path) -> Log | Recording:
 
 
 def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray, notes: tuple[str, ...]) -> Log:
-    times, several = numbers[:, 0], {}
+    times, columns_by_signal = numbers[:, 0], {}
     for i, name in enumerate(header[1:], start=1):
-        found = _OURS.fullmatch(name)
-        assert found is not None, "`read_csv` has looked"
-        several.setdefault((found["signal"], found["unit"]), []).append((found["column"] or "", i))
+        match = _OURS.fullmatch(name)
+        assert match is not None, "`read_csv` has looked"
+        columns_by_signal.setdefault((match["signal"], match["unit"]), []).append((match["column"] or "", i))
     signals = {}
-    for (name, unit), columns in several.items():
-        titles, places = (tuple(part) for part in zip(*columns, strict=True))
-        kept = ~empty[:, list(places)].all(axis=1)
-        values = numbers[np.ix_(kept, places)]
-        alone = titles == ("",)
-        signals[name] = Series(times[kept], values[:, 0] if alone else values, () if alone else titles, unit)
+    for (name, unit), columns in columns_by_signal.items():
+        titles, indices = (tuple(part) for part in zip(*columns, strict=True))
+        has_values = ~empty[:, list(indices)].all(axis=1)
+        values = numbers[np.ix_(has_values, indices)]
+        is_scalar = titles == ("",)
+        signals[name] = Series(
+            times[has_values], values[:, 0] if is_scalar else values, () if is_scalar else titles, unit
+        )
     return Log(signals, path.name, "CSV", notes)
 
 

@@ -117,7 +117,9 @@ class LogSignals:
 
     def duration(self) -> float:
         """Time from the first sample of any signal to the last, s."""
-        ends = [time for one in self.signals.values() if len(one.time) for time in (one.time[0], one.time[-1])]
+        ends = [
+            time for series in self.signals.values() if len(series.time) for time in (series.time[0], series.time[-1])
+        ]
         return float(max(ends) - min(ends)) if ends else 0.0
 
     def __repr__(self) -> str:
@@ -145,8 +147,8 @@ def _how_to_add(log: LogSignals, name: str) -> str:
     """How a log comes to have a signal: by a mapping, unless undertow wrote it, or the name means nothing."""
     if name not in SIGNALS or log.format == "undertow":
         return nearest(name, log.signals)
-    known = SIGNALS[name]
-    return mapping_hint(log, name, ", ".join(known.columns) or name, f"unit: {known.unit}")
+    signal = SIGNALS[name]
+    return mapping_hint(log, name, ", ".join(signal.columns) or name, f"unit: {signal.unit}")
 
 
 def mapping_hint(log: LogSignals, name: str, columns: str, how: str, topic: str = "TOPIC") -> str:

@@ -124,11 +124,11 @@ def _series(
         values = frames.attitudes_of_quaternions(values, *entry.frame)
     else:
         values = _in_our_frame(values, signal, entry.frame)
-    shown = f"{topic} " if topic else ""
+    topic_prefix = f"{topic} " if topic else ""
     used = entry.unit or signal.unit
     signed = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
     named = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signed)
-    origin = f"{shown}{named} ({used}{_frame_note(signal, entry.frame)})"
+    origin = f"{topic_prefix}{named} ({used}{_frame_note(signal, entry.frame)})"
     return ours, Series(table.time, values[:, 0] if not titles else values, titles, unit, SIGNALS[ours].meaning, origin)
 
 
@@ -154,8 +154,8 @@ def _in_our_frame(values: np.ndarray, signal: KnownSignal, frame: tuple[str, str
 
 
 def _frame_note(signal: KnownSignal, frame: tuple[str, str]) -> str:
-    shown = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
-    note = shown.get(signal.kind, f"{frame[1]} in {frame[0]}")
+    notes_by_kind = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
+    note = notes_by_kind.get(signal.kind, f"{frame[1]} in {frame[0]}")
     return f", {note}" if note else ""
 
 

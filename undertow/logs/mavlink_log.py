@@ -63,8 +63,10 @@ def read_mavlink(path: Path, names: Collection[str] = ("",)) -> Recording:
     senders = [sender for sender, _ in scan.autopilots.most_common()]
     vehicle = senders[0] if senders else next(iter(scan.fields))[1]
     start = min(min(fields.stamps) for fields in scan.fields.values())
-    own = {name: fields.table(start) for (name, sender), fields in scan.fields.items() if sender == vehicle}
-    tables, restarts = on_vehicle_clock(own)
+    tables_of_vehicle = {
+        name: fields.table(start) for (name, sender), fields in scan.fields.items() if sender == vehicle
+    }
+    tables, restarts = on_vehicle_clock(tables_of_vehicle)
     for (name, sender), fields in scan.fields.items():
         if sender != vehicle:
             tables[f"{name}[{sender[0]}:{sender[1]}]"] = fields.table(start)
@@ -171,4 +173,6 @@ def _numbers(message: Any) -> Iterator[tuple[str, float]]:
         if isinstance(value, int | float):
             yield name, float(value)
         elif isinstance(value, list | tuple):
-            yield from ((f"{name}[{i}]", float(one)) for i, one in enumerate(value) if isinstance(one, int | float))
+            yield from (
+                (f"{name}[{i}]", float(entry)) for i, entry in enumerate(value) if isinstance(entry, int | float)
+            )

@@ -169,10 +169,12 @@ def _of_sqlite(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Messa
     from rosbags.rosbag2 import Reader
 
     forms = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
-    with whole_files(file, notes) as (whole,), Reader(whole) as reader:
-        connections = [one for one in reader.connections if getattr(one.ext, "serialization_format", "") == "cdr"]
-        requested = [one for one in connections if topics.requested(one.topic, one.msgtype)]
-        for chosen in (requested, *([one] for one in connections if one not in requested)):
+    with whole_files(file, notes) as (whole_file,), Reader(whole_file) as reader:
+        connections = [
+            candidate for candidate in reader.connections if getattr(candidate.ext, "serialization_format", "") == "cdr"
+        ]
+        requested = [candidate for candidate in connections if topics.requested(candidate.topic, candidate.msgtype)]
+        for chosen in (requested, *([candidate] for candidate in connections if candidate not in requested)):
             for connection, recorded, data in reader.messages(chosen) if chosen else ():
                 definition = Definition(forms.get(connection.msgdef.format, ""), connection.msgdef.data)
                 yield _Message(connection.topic, connection.msgtype, definition, recorded, unpacked(bytes(data)))

@@ -19,12 +19,12 @@ def unpacked(data: bytes) -> bytes:
         return data
     import zstandard
 
-    reader, whole = zstandard.ZstdDecompressor().stream_reader(data), bytearray()
+    reader, content = zstandard.ZstdDecompressor().stream_reader(data), bytearray()
     while piece := reader.read(_PIECE):
-        whole += piece
-        if len(whole) > _LARGEST:
+        content += piece
+        if len(content) > _LARGEST:
             raise ValueError(f"a message of more than the {_LARGEST} bytes that are read")
-    return bytes(whole)
+    return bytes(content)
 
 
 def unpacked_file(file: Path, folder: Path) -> Path:

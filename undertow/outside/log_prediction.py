@@ -170,7 +170,7 @@ def _predicted(
             x = integrate(lambda t, x: realization.motion(jnp.asarray(t), x, u), t + i * h, x, h)
         return x, None
 
-    def several(x: VehicleState, times_and_inputs: tuple[Any, Inputs]):
+    def stride_of_steps(x: VehicleState, times_and_inputs: tuple[Any, Inputs]):
         x, _ = jax.lax.scan(step, x, times_and_inputs)
         y = plant.output(times_and_inputs[0][-1] + dt, x)
         return x, jnp.concatenate([y.position, body_of(y).nu])
@@ -180,6 +180,6 @@ def _predicted(
         ran_in, _ = jax.lax.scan(step, starts.before, (starts.time[:before], inputs[:before]))
         start = starts.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
         after = starts.time[before:].reshape(-1, stride), inputs[before:].reshape(-1, stride, inputs.shape[1])
-        return jax.lax.scan(several, start, after)[1]
+        return jax.lax.scan(stride_of_steps, start, after)[1]
 
     return jax.vmap(jax.vmap(window, (0, None)), (None, 0))(windows, factors)

@@ -46,12 +46,12 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
         return ((predicted - truth) @ root.T).reshape(len(rows), -1)
 
     alone = np.eye(number)
-    found = errors(np.vstack([np.ones(number), np.zeros(number), alone, -alone]))
-    if not np.isfinite(found).all():
+    residuals = errors(np.vstack([np.ones(number), np.zeros(number), alone, -alone]))
+    if not np.isfinite(residuals).all():
         return ()
-    mapped, without = (found[:2] ** 2).sum(axis=1)
-    as_mapped, turned = found[2:].reshape(2, number, -1) - found[1]
-    to_turn = _best_set(found[1] + as_mapped.sum(axis=0), turned - as_mapped)
+    mapped, without = (residuals[:2] ** 2).sum(axis=1)
+    as_mapped, turned = residuals[2:].reshape(2, number, -1) - residuals[1]
+    to_turn = _best_set(residuals[1] + as_mapped.sum(axis=0), turned - as_mapped)
     if to_turn.any():
         signs = np.where(to_turn, -1.0, 1.0)
         rows = np.vstack([signs, -np.ones(number), signs * (1.0 - 2.0 * alone), np.broadcast_to(signs, alone.shape)])

@@ -74,8 +74,8 @@ class SteppedVehicle:
         with runtime.on_processor(), runtime.in_precision(self.vehicle.precision):
             zero, none = jnp.zeros(()), jnp.zeros(self.plant.inputs())
 
-            def look(realization_now: Realization, _, arguments: tuple[Any, VehicleState, Inputs]):
-                return (), _state_of(realization_now, *arguments)
+            def look(part: Realization, _, arguments: tuple[Any, VehicleState, Inputs]):
+                return (), _state_of(part, *arguments)
 
             realization, x = self.vehicle.realization, self.vehicle.state
             self._look = step_of(look, realization, (), (zero, x, none))

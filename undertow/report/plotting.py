@@ -80,9 +80,9 @@ def serve() -> None:
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     _ = figures.plot_run  # imports matplotlib before there is anything to do
-    asked = sys.stdin.buffer.read()
-    if asked:
-        pickle.dump(_plot(*pickle.loads(asked)), answer)
+    request = sys.stdin.buffer.read()
+    if request:
+        pickle.dump(_plot(*pickle.loads(request)), answer)
         answer.close()
 
 

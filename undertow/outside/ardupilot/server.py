@@ -80,8 +80,8 @@ def serve(
 def status_line(session: Session, latency: Durations) -> str:
     """What is going on, in one line."""
     if session.sender is None:
-        others = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""
-        return f"waiting for ArduPilot{others}"
+        complaint = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""
+        return f"waiting for ArduPilot{complaint}"
     north, east, down = session.vehicle.state().position
     parts = [
         f"{session.vehicle.time:.1f} s",

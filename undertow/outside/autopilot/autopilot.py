@@ -468,14 +468,14 @@ class Autopilot(Uncopied):
         put(self._at.numbers, eqx.filter(placed, eqx.is_array))
 
     def _input(self, applied: Any) -> np.ndarray:
-        found = numbers("applied", applied, self._command.shape)
-        checks.finite("applied", found)
-        return found
+        values = numbers("applied", applied, self._command.shape)
+        checks.finite("applied", values)
+        return values
 
     def _reported(self, applied: Any) -> np.ndarray:
         """The applied input; for entries that are not finite the commanded one."""
-        found = numbers("applied", applied, self._command.shape)
-        return np.where(np.isfinite(found), found, self._command)
+        values = numbers("applied", applied, self._command.shape)
+        return np.where(np.isfinite(values), values, self._command)
 
     def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
@@ -504,14 +504,14 @@ class Autopilot(Uncopied):
             return
         self._logged = True
         memory = self._go_on.state
-        own = {
+        step_signals = {
             "measured_position": memory.y.position,
             "measured_velocity": memory.y.velocity,
             "reference": memory.r.position,
             "commanded_input": self._command,
         }
         signals = self._go_on.outputs.signals
-        self._log.append(self._clock.time, own | signals | self._received.numbers())
+        self._log.append(self._clock.time, step_signals | signals | self._received.numbers())
 
 
 def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tuple[ClosedLoop, str, float | None]:

@@ -36,9 +36,8 @@ def unpacked(state: Any, identity: bytes, like: Sequence[np.ndarray]) -> list[np
     if zlib.crc32(content).to_bytes(_SUM, "little") != checksum:
         raise BadInput("state", "be undamaged", "damaged: its checksum is wrong")
     sizes = [array.nbytes for array in like]
-    if content[len(_MAGIC) : header_size] != hashlib.sha256(identity).digest() or len(content) != header_size + sum(
-        sizes
-    ):
+    is_same = content[len(_MAGIC) : header_size] == hashlib.sha256(identity).digest()
+    if not is_same or len(content) != header_size + sum(sizes):
         raise BadInput("state", "be that of the same controller with the same numbers and formats", "of another")
     ends_at = np.cumsum([header_size, *sizes])
     parts = [content[start:end] for start, end in itertools.pairwise(ends_at)]

@@ -19,7 +19,7 @@ def sources_of(
 ) -> tuple[dict[str, str], ModelDescription]:
     """The files of the folder `sources`, and the unit."""
     system = program.system
-    rows = ",\n    ".join(_row(program, one) for one in variables)
+    rows = ",\n    ".join(_row(program, variable) for variable in variables)
     integer = "int64_t" if program.kind == "double" else "int32_t"
     filled = {"NAME": system.name, "REAL": program.kind, "INTEGER": integer, "VARIABLES_ROWS": rows}
     model = (_CONTROLLER if "target" in program.fields else _VEHICLE) + _COMMON
@@ -35,13 +35,13 @@ def sources_of(
     return sources, ModelDescription(system.name, guid, system.about, variables, compiled_ones, system.period, duration)
 
 
-def _row(program: CProgram, one: Variable) -> str:
+def _row(program: CProgram, variable: Variable) -> str:
     """The row of a variable in the table in C."""
-    struct, member, index = one.place
-    place = f"offsetof(fmu_model, {member if struct == 'model' else struct})"
+    struct, member, index = variable.place
+    offset = f"offsetof(fmu_model, {member if struct == 'model' else struct})"
     if struct != "model":
-        place += f" + offsetof({program.system.name}_{struct}, {member}) + {index} * sizeof(fmu_real)"
-    return f'{{"{one.name}", FMU_{one.kind.upper()}, {_ROLES[one.role]}, {place}}}'
+        offset += f" + offsetof({program.system.name}_{struct}, {member}) + {index} * sizeof(fmu_real)"
+    return f'{{"{variable.name}", FMU_{variable.kind.upper()}, {_ROLES[variable.role]}, {offset}}}'
 
 
 _COMMON = """

@@ -80,8 +80,8 @@ class Names(NamedTuple):
         for word, unit in units.items():
             value = getattr(report, word, None)
             if value is not None:
-                said, member = f"{meaning} {word} of the propeller of", f"actuator_{word}"
-                yield from numbered(f"propeller_{word}", struct, member, role, unit, said, self._owners())
+                description, member = f"{meaning} {word} of the propeller of", f"actuator_{word}"
+                yield from numbered(f"propeller_{word}", struct, member, role, unit, description, self._owners())
 
     def wrench(self, name: str, struct: str, member: str, role: str, meaning: str) -> Iterator[Variable]:
         """Force and moment on a vehicle, or what drives the outputs of another plant."""
@@ -123,9 +123,9 @@ def numbered(
 
 def signals(struct: str, member: str, declared: Mapping[str, Signal]) -> Iterator[Variable]:
     """Outputs for signals that are numbers."""
-    for name, one in declared.items():
-        unit = "" if one.unit == "1" else one.unit
-        yield Variable(name, (struct, f"{member}_{name}", 0), "output", "Real", unit, one.meaning)
+    for name, signal in declared.items():
+        unit = "" if signal.unit == "1" else signal.unit
+        yield Variable(name, (struct, f"{member}_{name}", 0), "output", "Real", unit, signal.meaning)
 
 
 def _per_second(units: Sequence[str]) -> tuple[str, ...]:

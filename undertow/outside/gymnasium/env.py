@@ -75,10 +75,8 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         terminated = bool(result.status[0] != Status.OK)
         truncated = not terminated and self._step >= self._episodes.steps
         self._over = terminated or truncated
-        observation, reward = (
-            self._shown.observation(result.observation[0]),
-            float(self._shown.rewards(result.reward[0])),
-        )
+        observation = self._shown.observation(result.observation[0])
+        reward = float(self._shown.rewards(result.reward[0]))
         return observation, reward, terminated, truncated, info_of(result, 0)
 
 

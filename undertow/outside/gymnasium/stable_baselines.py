@@ -66,7 +66,7 @@ def for_stable_baselines(env: VectorEnv) -> Any:
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             raise BadInput(attr_name, "stay as it is: the environments are one program")
 
-        def env_method(self, method_name: str, *given: Any, indices: Any = None, **options: Any) -> list[Any]:
+        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
             raise BadInput(method_name, "not be called on single environments: they are one program")
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

@@ -111,9 +111,9 @@ def of_local_position(position: Any, attitude: Any) -> MavlinkOdometry:
     world = np.array([position.vx, position.vy, position.vz], dtype=float)
     rates = np.array([attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed], dtype=float)
     velocity = np.concatenate([in_body_axes(quaternion, world), rates])
-    place = np.array([position.x, position.y, position.z], dtype=float)
-    check_plausible("LOCAL_POSITION_NED", place, velocity)
-    return MavlinkOdometry(1000 * position.time_boot_ms, place, quaternion, velocity)
+    north_east_down = np.array([position.x, position.y, position.z], dtype=float)
+    check_plausible("LOCAL_POSITION_NED", north_east_down, velocity)
+    return MavlinkOdometry(1000 * position.time_boot_ms, north_east_down, quaternion, velocity)
 
 
 def in_body_axes(quaternion: NDArray, world: NDArray) -> NDArray:
@@ -129,8 +129,8 @@ def _unit(quaternion: NDArray) -> NDArray:
     return quaternion / length if abs(length - 1) <= _LENGTH else np.full(4, np.nan)
 
 
-def _check_frame(name: str, frame: int, known: set[int]) -> None:
-    if frame not in known:
-        names = " or ".join(mavlink.enums["MAV_FRAME"][one].name for one in sorted(known))
+def _check_frame(name: str, frame: int, allowed: set[int]) -> None:
+    if frame not in allowed:
+        names = " or ".join(mavlink.enums["MAV_FRAME"][number].name for number in sorted(allowed))
         got = mavlink.enums["MAV_FRAME"].get(frame)
         raise BadInput(f"ODOMETRY.{name}", f"be {names}", got.name if got else f"{frame}, which is no frame")

@@ -131,12 +131,12 @@ class Submerged:
         mujoco.mju_sparse2dense(
             levers, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
         )
-        own = data.qfrc_passive - data.qfrc_bias + levers.T @ thrust
+        force = data.qfrc_passive - data.qfrc_bias + levers.T @ thrust
         rotation = self.rotation()
         to_body = frames.velocity_map(rotation)
         nu = to_body @ data.qvel
         water = self._hydrodynamics.wrench(rotation, nu, self._water) + added_mass @ _turning(nu)
-        qacc = np.linalg.solve(mass_matrix + to_body.T @ added_mass @ to_body, own + to_body.T @ water)
+        qacc = np.linalg.solve(mass_matrix + to_body.T @ added_mass @ to_body, force + to_body.T @ water)
         data.qfrc_applied[:] = to_body.T @ (water - added_mass @ to_body @ qacc)
 
 

@@ -301,16 +301,16 @@ def _system(
         step = step_of(lambda part, _, arguments: ((), function(part, *arguments)), realization, (), arguments)
         at, state, u = step.inputs
 
-        def call(t: float, x: NDArray, taken: NDArray, params: Any) -> NDArray:
-            at[...], state[...], u[...] = _number(t, period) if by_number else t, x, taken
+        def call(t: float, x: NDArray, input_vector: NDArray, params: Any) -> NDArray:
+            at[...], state[...], u[...] = _number(t, period) if by_number else t, x, input_vector
             step()
             return step.outputs.astype(float)
 
         return call
 
-    updated, shown = map(called, functions)
+    updated, output = map(called, functions)
     system: Any = ct.nlsys(
-        updated, shown, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
+        updated, output, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
     )
     system.units, system.start = inputs | outputs, np.asarray(start, dtype=float)
     return system

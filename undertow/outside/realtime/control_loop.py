@@ -94,7 +94,7 @@ class RealTimeLoop:
         if received is None:
             return self._why_no_start()
         self._begun()
-        clock, period, seen = self._clock, self._period, self.statistics
+        clock, period, statistics = self._clock, self._period, self.statistics
         begin = started = last = clock.now()
         planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
         while True:
@@ -104,12 +104,12 @@ class RealTimeLoop:
             self._autopilot.log_step()  # after the command is on its way
             following = max(planned + 1, math.floor((clock.now() - begin) / period) + 1)
             self._count(answered - begin - planned * period, following - planned - 1, received is not None)
-            seen.computing.add(answered - begun)
-            seen.lateness.add(started - begin - planned * period)
-            seen.longest_stale = max(seen.longest_stale, waited)
-            if seen.steps > 1 and started - last < 1.5 * period:
-                seen.jitter.add(abs(started - last - period))
-            if seen.steps >= steps or planned + 1 >= periods:
+            statistics.computing.add(answered - begun)
+            statistics.lateness.add(started - begin - planned * period)
+            statistics.longest_stale = max(statistics.longest_stale, waited)
+            if statistics.steps > 1 and started - last < 1.5 * period:
+                statistics.jitter.add(abs(started - last - period))
+            if statistics.steps >= steps or planned + 1 >= periods:
                 return Reason.COMPLETED
 
             planned, last = following, started
@@ -130,17 +130,17 @@ class RealTimeLoop:
 
     def _count(self, answered: float, missed: int, fresh: bool) -> None:
         """Count a step whose command came `answered` (s) after its planned beginning."""
-        seen = self.statistics
-        seen.steps += 1
-        seen.overruns += answered >= self._deadline
-        seen.missed += missed
-        seen.stale += not fresh
+        statistics = self.statistics
+        statistics.steps += 1
+        statistics.overruns += answered >= self._deadline
+        statistics.missed += missed
+        statistics.stale += not fresh
 
     def _instant(self, since: float) -> float:
         """Time of a step that begins `since` (s) after the start, as the controller gets it, in periods."""
         periods = since / self._period
-        whole = math.floor(periods + _ROUNDING)
-        return whole if periods - whole <= _LITTLE else periods
+        whole_periods = math.floor(periods + _ROUNDING)
+        return whole_periods if periods - whole_periods <= _LITTLE else periods
 
     def _command(self, received: LinkMeasurement | None, elapsed: float) -> np.ndarray:
         """The command for a measurement, or without one."""

@@ -188,15 +188,15 @@ def _metadata(writer: Writer) -> str:
     topics = [
         {
             "topic_metadata": {
-                "name": one.topic,
-                "type": one.msgtype,
+                "name": connection.topic,
+                "type": connection.msgtype,
                 "serialization_format": "cdr",
                 "offered_qos_profiles": [],
-                "type_description_hash": one.digest,
+                "type_description_hash": connection.digest,
             },
-            "message_count": writer.counts[one.id],
+            "message_count": writer.counts[connection.id],
         }
-        for one in writer.connections
+        for connection in writer.connections
     ]
     about = {
         "version": writer.version,

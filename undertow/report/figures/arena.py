@@ -73,7 +73,7 @@ def robustness_figure(standings: Sequence[Standing]) -> Figure:
         if levels[0] > levels[-1]:
             panel.invert_xaxis()
         ticks = list(parameter.levels[:: 2 if len(levels) > 5 else 1])
-        panel.set_xticks(ticks, [f"{standing:g}" for standing in ticks])
+        panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         panel.xaxis.minorticks_off()
         panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
         style.label(panel, parameter.label, "error / tolerance" if column == 0 else "")

@@ -87,8 +87,8 @@ def _head(figure: Figure, title: str, acting: Iterable[str]) -> None:
 
 def _plot(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
     for name, values, look in curves:
-        shown = np.where(np.isfinite(values), values, np.nan)
-        panel.plot(time, shown, **look.line, label=name)
+        finite_values = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(time, finite_values, **look.line, label=name)
     if key:
         panel.legend(
             loc="lower right",

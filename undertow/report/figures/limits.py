@@ -39,8 +39,8 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
         peaks = set(beyond.values())
         if len(beyond) == len(series) and len(peaks) == 1:  # all the same, in few words beside the name of the panel
             named = [f"to {peaks.pop()}"]
-        said = f"first {start:.2g} s: {', '.join(named)}"
-        style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
+        note = f"first {start:.2g} s: {', '.join(named)}"
+        style.note(panel, note, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
 
 
 def _shorten(panel: Axes) -> None:

@@ -81,13 +81,13 @@ def _above(block: Block) -> float:
 
 
 def _plot(panel: Axes, block: Block, column: int) -> None:
-    shown = [_cut(curve, block.window) for curve in block.curves]
-    for curve in shown:
+    curves_in_window = [_cut(curve, block.window) for curve in block.curves]
+    for curve in curves_in_window:
         values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)
         panel.plot(curve.time, values, **curve.look.line, label=curve.name)
-    series = [(curve.name, curve.time, curve.values[:, column]) for curve in shown]
+    series = [(curve.name, curve.time, curve.values[:, column]) for curve in curves_in_window]
     {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric}[block.scale](panel, series, block.limits_from)
-    ends = [curve.time[[0, -1]] for curve in shown if len(curve.time)]
+    ends = [curve.time[[0, -1]] for curve in curves_in_window if len(curve.time)]
     if ends and np.ptp(ends) > 0:
         panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
     for mark in block.marks:

@@ -54,9 +54,8 @@ def plan_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
         for i, (name, look) in enumerate(looks_of(findings.names).items())
     ]
     desired = _points(dataset["series:reference"].isel({findings.dimension: 0, SAMPLES: 0}))
-    point_sets = [candidate.points for candidate in paths if candidate.completed] or [
-        candidate.points for candidate in paths
-    ]
+    completed = [candidate for candidate in paths if candidate.completed]
+    point_sets = [candidate.points for candidate in completed or paths]
     views = [_view("whole run", np.ones(len(time), bool), [*point_sets, desired])]
     second_half = _view(f"{time[-1] / 2:g} to {time[-1]:g} s", time >= time[-1] / 2, [*point_sets, desired])
     views += [second_half] if second_half.span.max() < _ENLARGED * views[0].span.max() else []

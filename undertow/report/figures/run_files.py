@@ -24,9 +24,9 @@ def plot_run(record: RunRecord, width: str | None = None) -> Plotted:
     pictures: dict[str, str | bytes] = {}
 
     def put(name, figure) -> None:
-        made = files_of(figure, name, width)
-        pictures[name] = _picture(made[f"{name}.svg"], made[f"{name}.png"])
-        files.update(made)
+        files_of_figure = files_of(figure, name, width)
+        pictures[name] = _picture(files_of_figure[f"{name}.svg"], files_of_figure[f"{name}.png"])
+        files.update(files_of_figure)
 
     failures = make_all(lambda: run_plots(record.series, record.facts), put)
     return Plotted(files, pictures, failures)

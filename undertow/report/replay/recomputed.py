@@ -99,8 +99,8 @@ def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, vel
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    found = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
-    return Environment(*(None if series is None else np.asarray(series) for series in found))
+    histories = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
+    return Environment(*(None if series is None else np.asarray(series) for series in histories))
 
 
 @eqx.filter_jit
