@@ -141,8 +141,8 @@ def sampled(number: int, seed: int, all_programs: Sequence[FaultProgram]) -> lis
     samples = []
     for i in range(number):
         chance = np.random.default_rng([seed, 20, i])
-        which = int(chance.choice(len(all_programs), p=shares / shares.sum()))
-        samples.append(Sampled(which, all_programs[which].sample(chance), i))
+        program_index = int(chance.choice(len(all_programs), p=shares / shares.sum()))
+        samples.append(Sampled(program_index, all_programs[program_index].sample(chance), i))
     return samples
 
 
@@ -174,11 +174,11 @@ def run_faulted(
             endings[judged_run.status.word] += 1
             states[judged_run.state] += 1
             modes.update(f"{program.kinds[k].target} {program.kinds[k].mode}" for k in run.faults)
-        again = runs_of_program[: _MOST_REPEATED * _REPEATED : _REPEATED]
+        repeats = runs_of_program[: _MOST_REPEATED * _REPEATED : _REPEATED]
         failures += _other_bytes(
-            program, again, dict(zip((run.seed for run in runs_of_program), judged, strict=True)), seed
+            program, repeats, dict(zip((run.seed for run in runs_of_program), judged, strict=True)), seed
         )
-        done, compiled, repeated = done + len(runs_of_program), compiled + 1, repeated + len(again)
+        done, compiled, repeated = done + len(runs_of_program), compiled + 1, repeated + len(repeats)
         watch(done, len(failures))
     seconds = time.monotonic() - began
     return Faulted(done, dict(endings), dict(states), dict(modes), compiled, repeated, failures, seconds)
@@ -230,9 +230,11 @@ def _other_bytes(
 ) -> list[Failure]:
     """N6: runs whose bytes differ when they are built from their scenarios and run in the opposite order."""
     runs = runs[::-1]
-    again = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
+    repeated_runs = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
     pairs = [
-        (run, repeated) for run, repeated in zip(runs, again, strict=True) if repeated.digest != judged[run.seed].digest
+        (run, repeated)
+        for run, repeated in zip(runs, repeated_runs, strict=True)
+        if repeated.digest != judged[run.seed].digest
     ]
     return [
         Failure(

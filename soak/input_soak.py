@@ -147,8 +147,8 @@ def _answers(
         if not busy:
             return
         ready: list[Connection] = wait(list(busy), 1.0)  # pyright: ignore[reportAssignmentType]
-        late = [pipe for pipe, worker in busy.items() if time.monotonic() - worker.since > _LATEST]
-        for pipe in {*ready, *late}:
+        overdue = [pipe for pipe, worker in busy.items() if time.monotonic() - worker.since > _LATEST]
+        for pipe in {*ready, *overdue}:
             worker = busy.pop(pipe)
             task_of_worker = worker.asked
             assert task_of_worker is not None
@@ -158,8 +158,8 @@ def _answers(
                 answer = worker.pipe.recv()
             except (EOFError, OSError):
                 elapsed = time.monotonic() - worker.since
-                how = worker.restart()
-                answer = attack(*_known(task_of_worker, seed), material), Done(None, "", how, (elapsed, elapsed), ())
+                cause = worker.restart()
+                answer = attack(*_known(task_of_worker, seed), material), Done(None, "", cause, (elapsed, elapsed), ())
             idle.append(worker)
             yield answer
 

@@ -156,12 +156,12 @@ def _store(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[s
         f"out/{name.removeprefix('store/')}": data for name, data in material.items() if name.startswith("store/")
     }
     for _ in range(chance.choice((1, 1, 2, 5))):
-        name, how = chance.choice(sorted(store)), chance.random()
-        if how < 0.5:
+        name, draw = chance.choice(sorted(store)), chance.random()
+        if draw < 0.5:
             store[name] = spoilt_bytes(store[name] or b"", chance)
-        elif how < 0.75 and len(store) > 1:
+        elif draw < 0.75 and len(store) > 1:
             del store[name]
-        elif how < 0.9:
+        elif draw < 0.9:
             store[chance.choice(sorted(store))] = store[name]
         else:
             store[name + chance.choice((".partial", ".x", "2"))] = chance.randbytes(40)

@@ -160,11 +160,11 @@ class _Sabotage:
             return
         self.damaged += 1
         chunk = self._chance.choice(chunks)
-        data, how = bytearray(chunk.read_bytes()), self._chance.random()
-        if how < 0.4 and data:
+        data, draw = bytearray(chunk.read_bytes()), self._chance.random()
+        if draw < 0.4 and data:
             data[self._chance.randrange(len(data))] ^= 1 << self._chance.randrange(8)
             chunk.write_bytes(bytes(data))
-        elif how < 0.8:
+        elif draw < 0.8:
             chunk.write_bytes(bytes(data[: self._chance.randrange(len(data) + 1)]))
         else:
             chunk.with_name(f"{chunk.name}.0123.partial").write_bytes(bytes(data[: len(data) // 2]))

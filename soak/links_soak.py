@@ -190,7 +190,7 @@ def _row(link: str, runs: Sequence[LinkRun]) -> dict[str, Any]:
 
 def _worst(runs: Sequence[LinkRun], number: int = 10) -> list[dict[str, Any]]:
     """The runs with the most volt-seconds."""
-    chosen = sorted(runs, key=lambda run: -run.volt_seconds)[:number]
+    worst_runs = sorted(runs, key=lambda run: -run.volt_seconds)[:number]
     return [
         {
             "identity": run.plan.identity,
@@ -198,5 +198,5 @@ def _worst(runs: Sequence[LinkRun], number: int = 10) -> list[dict[str, Any]]:
             "full": run.longest_full,
             "plan": str(run.plan),
         }
-        for run in chosen
+        for run in worst_runs
     ]

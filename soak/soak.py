@@ -88,8 +88,8 @@ def soak(
     attacks: list[tuple[Failure, Attack]] = []
     with tempfile.TemporaryDirectory(prefix="undertow-soak-", ignore_cleanup_errors=True) as name:
         for number, part in enumerate(parts):
-            left = began + 60.0 * minutes - time.monotonic()
-            until = time.monotonic() + left / (len(parts) - number)
+            seconds_left = began + 60.0 * minutes - time.monotonic()
+            until = time.monotonic() + seconds_left / (len(parts) - number)
             folder = Path(name) / part
             folder.mkdir()
             caller = run_link if part == "links" and run_link is not None else run
@@ -252,8 +252,8 @@ _PARTS: Mapping[str, Callable[..., Described]] = {
 }
 
 
-def _plain(described: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in described.items() if key != "failures"}
+def _plain(results: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in results.items() if key != "failures"}
 
 
 def _seldom(watch: Callable[[Any, int], None]) -> Callable[[Any, int], None]:

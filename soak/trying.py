@@ -57,9 +57,9 @@ def try_in_process(run: Run, hostile_input: Attack, folder: Path) -> Done:
         code = -2
     seconds = time.process_time() - began[0], time.monotonic() - began[1]
     after = _state(folder)
-    left = [name for name, data in after.items() if before.get(name) != data]
+    files_left = [name for name, data in after.items() if before.get(name) != data]
     _empty(folder)
-    return Done(code, _text(out), _text(err), seconds, left)
+    return Done(code, _text(out), _text(err), seconds, files_left)
 
 
 def work(run: Run, seed: int, material: Mapping[str, bytes], folder: str, pipe: Connection) -> None:

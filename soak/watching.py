@@ -43,8 +43,10 @@ class Watch(AbstractAccumulator):
     windows: int = eqx.field(static=True)
 
     def init(self, signals: Signals) -> Counts:
-        zero, each = jnp.zeros(()), jnp.zeros(self.windows)
-        return Counts(zero, zero, zero, zero, each, jnp.zeros((self.windows, *signals["error"].shape)), each)
+        zero, zero_per_window = jnp.zeros(()), jnp.zeros(self.windows)
+        return Counts(
+            zero, zero, zero, zero, zero_per_window, jnp.zeros((self.windows, *signals["error"].shape)), zero_per_window
+        )
 
     def update(self, state: Counts, t: Float[Array, ""], signals: Signals) -> Counts:
         acting = signals.get("acting_input", signals["input"])

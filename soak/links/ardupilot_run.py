@@ -63,7 +63,7 @@ class ArdupilotRunner:
         failures: list[tuple[str, str]] = []
         sent, before = [self._packet(0)], 0.0
         for step in range(1, self._plan.last):
-            begun, packet = time.monotonic(), self._packet(step)
+            frame_start, packet = time.monotonic(), self._packet(step)
             now = [event for event in self._plan.events if event.covers(step)]
             for kind in sorted({_OLD if event.kind in _OLD_KINDS else event.kind for event in now}):
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
@@ -79,7 +79,7 @@ class ArdupilotRunner:
                 failures.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
             before = answer["timestamp"]
             sent.append(packet)
-            time.sleep(max(0.0, begun + PERIOD - time.monotonic()))
+            time.sleep(max(0.0, frame_start + PERIOD - time.monotonic()))
         return failures
 
     def _disturb(self, kind: str, first: bool, packet: bytes, sent: list[bytes]) -> None:

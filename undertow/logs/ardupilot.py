@@ -96,7 +96,7 @@ def read_ardupilot(path: Path) -> Recording:
             continue
         if not kind.divisors[0]:
             raise BadInput("log", "have numbers as TimeUS", f"{path.name}, whose messages {kind.name} have text there")
-        rows = np.frombuffer(b"".join(data[at + 3 : at + kind.size] for at in places), kind.fields)
+        rows = np.frombuffer(b"".join(data[offset + 3 : offset + kind.size] for offset in places), kind.fields)
         tables |= _tables(kind, rows, scan.numbered.get(kind.name, ""))
         if kind.name == "PARM":
             parameters |= _parameters(kind, rows)
@@ -119,30 +119,30 @@ def _parameters(kind: _Kind, rows: np.ndarray) -> dict[str, float]:
 def _scanned(data: bytes) -> _Scan:
     assert _OF_FMT is not None
     kinds, places, numbered = {_FMT: _OF_FMT}, {}, dict(_NUMBERED)
-    at = lost = 0
-    while at < len(data):
-        kind = kinds.get(data[at + 2]) if data[at : at + 2] == _HEAD and at + 2 < len(data) else None
-        if kind is None or at + kind.size > len(data):
-            after = data.find(_HEAD, at + 1)
-            after = len(data) if after < 0 else after
-            lost += after - at
-            at = after
+    offset = lost = 0
+    while offset < len(data):
+        kind = kinds.get(data[offset + 2]) if data[offset : offset + 2] == _HEAD and offset + 2 < len(data) else None
+        if kind is None or offset + kind.size > len(data):
+            next_head = data.find(_HEAD, offset + 1)
+            next_head = len(data) if next_head < 0 else next_head
+            lost += next_head - offset
+            offset = next_head
             continue
         if kind.name == "FMT":
-            number, described = _described(data, at)
-            if described is not None:
-                kinds[number] = described
+            number, described_kind = _described(data, offset)
+            if described_kind is not None:
+                kinds[number] = described_kind
         elif kind.name == "FMTU":
-            _number(data, at, kind, kinds, numbered)
-        places.setdefault(kind, []).append(at)
-        at += kind.size
+            _number(data, offset, kind, kinds, numbered)
+        places.setdefault(kind, []).append(offset)
+        offset += kind.size
     return _Scan(places, numbered, lost)
 
 
-def _described(data: bytes, at: int) -> tuple[int, _Kind | None]:
+def _described(data: bytes, offset: int) -> tuple[int, _Kind | None]:
     """Type and kind that a message FMT describes; None where it is damaged."""
     assert _OF_FMT is not None
-    number, size, name, form, columns = np.frombuffer(data, _OF_FMT.fields, 1, at + 3)[0].item()
+    number, size, name, form, columns = np.frombuffer(data, _OF_FMT.fields, 1, offset + 3)[0].item()
     texts = [part.decode("latin-1") for part in (name, form, columns)]
     kind = _kind(texts[0], texts[1], texts[2].split(","))
     return number, kind if kind is not None and kind.size == size and number != _FMT else None

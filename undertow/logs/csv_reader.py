@@ -76,9 +76,11 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str]
     if len(numbered) < 2:
         raise BadInput("log", "have a header and at least one row", f"{path.name} with {len(numbered)} rows")
     header = numbered[0][1]
-    again, times = Counter(header).most_common(1)[0]
+    repeated_name, times = Counter(header).most_common(1)[0]
     if times > 1:
-        raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs {times} times")
+        raise BadInput(
+            "log", "have columns of different names", f"{path.name}, where `{repeated_name}` occurs {times} times"
+        )
     texts: dict[str, str] = {}
     numbers = np.array([_numbers(path.name, line, row, header, texts) for line, row in numbered[1:]])
     return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), texts, notes

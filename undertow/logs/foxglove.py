@@ -104,14 +104,14 @@ def transforms(time: np.ndarray, motions: Mapping[str, np.ndarray]) -> Iterator[
     """
     parts = []
     for outputs in motions.values():
-        good = np.atleast_1d(np.isfinite(outputs).all(axis=1))
+        is_finite = np.atleast_1d(np.isfinite(outputs).all(axis=1))
         attitudes = quaternions(outputs[:, 3:])[:, [1, 2, 3, 0]].tolist()
-        parts.append(zip(good, outputs[:, :3].tolist(), attitudes, strict=True))
+        parts.append(zip(is_finite, outputs[:, :3].tolist(), attitudes, strict=True))
     for when, *frames in zip(time.tolist(), *parts, strict=True):
         stamp = divmod(nanoseconds(when), 10**9)
         messages = [_TRANSFORM % (*stamp, WORLD, NED, 0, 0, 0, *_NED_IN_WORLD)]
-        for name, (good, position, quaternion) in zip(motions, frames, strict=True):
-            if good:
+        for name, (is_finite, position, quaternion) in zip(motions, frames, strict=True):
+            if is_finite:
                 messages.append(_TRANSFORM % (*stamp, NED, name, *position, *quaternion))
         yield when, f'{{"transforms": [{", ".join(messages)}]}}'.encode()
 

@@ -125,8 +125,8 @@ class LogSignals:
     def __repr__(self) -> str:
         lines = [f"Log of {self.source} ({self.format}), {self.duration():g} s"]
         for name, series in self.signals.items():
-            how = self.sampling(name)
-            lines.append(f"  {name:<20}{how.samples:>8} samples {how.rate:>8.4g} Hz  {series.unit}")
+            sampling = self.sampling(name)
+            lines.append(f"  {name:<20}{sampling.samples:>8} samples {sampling.rate:>8.4g} Hz  {series.unit}")
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
@@ -168,8 +168,8 @@ def check_times(name: str, time: np.ndarray, source: str) -> None:
     if not np.isfinite(time).all():
         row = int(np.argmin(np.isfinite(time)))
         raise BadInput("log", "have finite times", f"{source}, {name}, sample {row + 1}: {time[row]:g}")
-    late = np.diff(time) <= 0
-    if late.any():
-        row = int(np.argmax(late)) + 1
+    not_increasing = np.diff(time) <= 0
+    if not_increasing.any():
+        row = int(np.argmax(not_increasing)) + 1
         got = f"{source}, {name}, sample {row + 1}: {time[row]:.9g} s after {time[row - 1]:.9g} s"
         raise BadInput("log", "have increasing times", got)

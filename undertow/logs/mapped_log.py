@@ -25,11 +25,11 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
             entries = tuple(_with_motors(entry, recording) for entry in entries)
             entry = next((candidate for candidate in entries if _has(recording, candidate)), entries[-1])
             topic, table = recording.table(entry.topic)
-        used, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
+        cleaned_table, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
         if repeated:
             notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
         with within("signals"), within(name):
-            ours, series = _series(name, entry, topic, used, recording)
+            ours, series = _series(name, entry, topic, cleaned_table, recording)
             signals[ours] = series
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
 
@@ -63,15 +63,15 @@ def suited(recording: Recording, mapping: LogMapping) -> tuple[LogMapping, tuple
     """The mapping without what a file does not have, and a sentence for each topic that has another frame."""
     signals, notes = {}, []
     for name, entries in mapping.signals.items():
-        fitting = []
+        suitable = []
         for entry in entries:
             mismatch = _other_frame(recording, entry) if _has(recording, entry) else ""
             if mismatch:
                 notes.append(f"{entry.topic} is not read as {name}: {mismatch}")
             elif _has(recording, entry):
-                fitting.append(entry)
-        if fitting:
-            signals[name] = tuple(fitting)
+                suitable.append(entry)
+        if suitable:
+            signals[name] = tuple(suitable)
     return mapping._replace(signals=signals), tuple(notes)
 
 
@@ -125,10 +125,10 @@ def _series(
     else:
         values = _in_our_frame(values, signal, entry.frame)
     topic_prefix = f"{topic} " if topic else ""
-    used = entry.unit or signal.unit
-    signed = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
-    named = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signed)
-    origin = f"{topic_prefix}{named} ({used}{_frame_note(signal, entry.frame)})"
+    file_unit = entry.unit or signal.unit
+    signs_and_columns = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
+    signed_names = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signs_and_columns)
+    origin = f"{topic_prefix}{signed_names} ({file_unit}{_frame_note(signal, entry.frame)})"
     return ours, Series(table.time, values[:, 0] if not titles else values, titles, unit, SIGNALS[ours].meaning, origin)
 
 

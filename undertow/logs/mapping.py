@@ -83,11 +83,11 @@ def mapping_of(data: Any) -> LogMapping:
     with within("signals"):
         if not isinstance(data["signals"], Mapping) or not data["signals"]:
             raise BadInput("", "be a mapping of signals", data["signals"])
-        for name, described in data["signals"].items():
+        for name, settings in data["signals"].items():
             if name not in SIGNALS:
                 raise BadInput(str(name), "be a known signal", "unknown", hint=did_you_mean(str(name), SIGNALS))
             with within(str(name)):
-                signals[name] = (_entry(name, described, frame),)
+                signals[name] = (_entry(name, settings, frame),)
         if {"attitude", "quaternion"} <= set(signals):
             raise BadInput("quaternion", "be left out where `attitude` is given", "given too")
     return LogMapping(signals, _time(data.get("time", "")))
@@ -125,17 +125,17 @@ def _entry(name: str, settings: Any, frame: tuple[str, str]) -> SignalMapping:
     motors = isinstance(settings, Mapping) and "frame" in settings and name in INPUTS
     known_keys = ("columns", *(["frame"] if name in INPUTS else []), "topic", "unit", "world", "body", "supply", *_ESC)
     _keys(settings, name, known_keys, "frame" if motors else "columns")
-    signed = _columns(settings["columns"]) if not motors or "columns" in settings else []
+    signed_columns = _columns(settings["columns"]) if not motors or "columns" in settings else []
     with_axes = {"world": frame[0], "body": frame[1]} | dict(settings)
     entry = SignalMapping(
-        columns=tuple(column for _, column in signed),
+        columns=tuple(column for _, column in signed_columns),
         topic=str(settings.get("topic", "")),
         unit=str(settings.get("unit", "")),
         frame=(_word(with_axes, "world", WORLD), _word(with_axes, "body", BODY)),
         supply=_number(settings, "supply", None),
         esc={key: _number(settings, key, usual) for key, usual in _ESC.items()},
-        signs=tuple(sign for sign, _ in signed),
-        motors=_frame(settings["frame"], signed) if motors else "",
+        signs=tuple(sign for sign, _ in signed_columns),
+        motors=_frame(settings["frame"], signed_columns) if motors else "",
     )
     signal = SIGNALS[name]
     if signal.columns != ("thruster",) and len(entry.columns) != max(1, len(signal.columns)):
@@ -170,12 +170,12 @@ def _columns(columns: Any) -> list[tuple[int, str]]:
     words = [columns] if isinstance(columns, str) else columns
     if not isinstance(words, list | tuple) or not words or not all(isinstance(word, str) for word in words):
         raise BadInput("columns", "be names of columns", words)
-    signed = []
+    signed_columns = []
     for word in words:
         negative = word.startswith("-")
         names = _spread(word[1:].replace("..-", "..") if negative else word)
-        signed += [(-1 if negative else 1, column) for column in names]
-    return signed
+        signed_columns += [(-1 if negative else 1, column) for column in names]
+    return signed_columns
 
 
 def _spread(name: str) -> list[str]:

@@ -96,10 +96,10 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
     dialect = _dialect()
     decoder, types = dialect.MAVLink(None), dialect.mavlink_map
     scan = _Scan({}, {}, Counter(), 0, 0)
-    at = lost = damaged_times = 0
+    offset = lost = damaged_times = 0
     before = None
-    while at < len(data):
-        frame = _frame_at(data, at)
+    while offset < len(data):
+        frame = _frame_at(data, offset)
         size = 0 if frame is None else 8 + len(frame.data)
         name = types[frame.kind].msgname if frame is not None and frame.kind in types else ""
         message = None
@@ -109,15 +109,15 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
             except Exception:  # whatever bytes may cause
                 name = ""
         if frame is not None and message is not None:
-            time = _likely_time(before, frame.time, _frame_at(data, at + size))
+            time = _likely_time(before, frame.time, _frame_at(data, offset + size))
             damaged_times += time != frame.time
             before = time
             _add(scan, name, frame._replace(time=time), message)
-        elif not size or not _begins(data, at + size):
+        elif not size or not _begins(data, offset + size):
             size, lost = 1, lost + 1
         elif not name:  # damaged, or of another dialect
             lost += size
-        at += size
+        offset += size
     return scan._replace(lost=lost, times=damaged_times)
 
 
@@ -128,11 +128,11 @@ def _requested(name: str, frame: _Frame, names: Collection[str], scan: _Scan) ->
     return (name, frame.sender) not in scan.fields
 
 
-def _frame_at(data: bytes, at: int) -> _Frame | None:
+def _frame_at(data: bytes, offset: int) -> _Frame | None:
     """The frame whose time stands at a place; None where there is none that ends within the file."""
-    begin = at + 8
+    begin = offset + 8
     overhead = _FRAMES.get(data[begin]) if begin + 10 <= len(data) else None
-    time = int.from_bytes(data[at:begin], "big")
+    time = int.from_bytes(data[offset:begin], "big")
     if overhead is None or time >= _LATEST:
         return None
     newer = overhead == _FRAMES[0xFD]
@@ -152,9 +152,9 @@ def _likely_time(before: int | None, time: int, following: _Frame | None) -> int
     return before if abs(time - before) > _LEAP and abs(after - before) < _LEAP else time
 
 
-def _begins(data: bytes, at: int) -> bool:
+def _begins(data: bytes, offset: int) -> bool:
     """Whether a frame seems to begin at a place, or the file ends there."""
-    return at == len(data) or _frame_at(data, at) is not None
+    return offset == len(data) or _frame_at(data, offset) is not None
 
 
 def _add(scan: _Scan, name: str, frame: _Frame, message: Any) -> None:

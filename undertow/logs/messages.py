@@ -64,11 +64,11 @@ class MessageForm:
         """JSON schema of the messages; `unit`, `description` and `origin` are ours."""
         properties: dict[str, Any] = {"time": {"type": "number", "unit": "s", "description": "time"}}
         for name, series in self._signals.items():
-            meant = {"unit": series.unit, "description": series.meaning, "origin": series.origin}
+            annotations = {"unit": series.unit, "description": series.meaning, "origin": series.origin}
             inner = _number_schema(series.values.dtype, series.values.shape[2:])
             if series.values.ndim > 1:
                 inner = {"type": "object", "properties": dict.fromkeys(_columns(series), inner)}
-            properties[name] = inner | {key: text for key, text in meant.items() if text}
+            properties[name] = inner | {key: text for key, text in annotations.items() if text}
         return json.dumps({"title": self.schema_name, "type": "object", "properties": properties})
 
     def of_sample(self, time: float, values: list[Any]) -> bytes:
@@ -81,17 +81,17 @@ class MessageForm:
         first = next(iter(self._signals.values()))
         matrix = np.concatenate([series.flat().astype(float) for series in self._signals.values()], axis=1)
         finite = np.atleast_1d(np.isfinite(matrix).all(axis=1))
-        for good, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
-            yield time, (self._template % (time, *row) if good else self._with_words(time, row)).encode()
+        for is_finite, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
+            yield time, (self._template % (time, *row) if is_finite else self._with_words(time, row)).encode()
 
     def _with_words(self, time: float, values: list[float]) -> str:
         """The message of a sample that has numbers that are not finite."""
         words = {np.inf: '"Infinity"', -np.inf: '"-Infinity"'}
-        marked = self._template.replace("%d", "%r")  # integers are always finite, but share the row
+        template = self._template.replace("%d", "%r")  # integers are always finite, but share the row
         printed = [
             _Word("null") if value != value else _Word(words[value]) if value in words else value for value in values
         ]
-        return marked % (time, *printed)
+        return template % (time, *printed)
 
 
 class _Word:
@@ -147,23 +147,27 @@ def signals_of(schema: Mapping[str, Any], messages: list[Mapping[str, Any]]) -> 
         KeyError, TypeError, ValueError, AttributeError: the messages have another form.
     """
     time, signals = np.array([number(message["time"]) for message in messages]), {}
-    for name, described in schema["properties"].items():
+    for name, signal_schema in schema["properties"].items():
         if name == "time":
             continue
-        columns = tuple(described.get("properties", ()))
+        columns = tuple(signal_schema.get("properties", ()))
         rows = [[message[name][column] for column in columns] if columns else message[name] for message in messages]
-        values = _array(rows, _type(described))
-        texts = (described.get("unit", "1"), described.get("description", ""), described.get("origin", ""))
+        values = _array(rows, _type(signal_schema))
+        texts = (signal_schema.get("unit", "1"), signal_schema.get("description", ""), signal_schema.get("origin", ""))
         signals[name] = Series(time, values, columns, *map(str, texts))
     return signals
 
 
-def _type(described: Mapping[str, Any]) -> type:
+def _type(number_schema: Mapping[str, Any]) -> type:
     """Type of the numbers that a schema describes, within its objects and arrays."""
-    while described.get("type") in ("object", "array"):
-        inner = described.get("properties", {}).values() if described["type"] == "object" else [described["items"]]
-        described = next(iter(inner), {})
-    return int if described.get("type") == "integer" else float
+    while number_schema.get("type") in ("object", "array"):
+        inner = (
+            number_schema.get("properties", {}).values()
+            if number_schema["type"] == "object"
+            else [number_schema["items"]]
+        )
+        number_schema = next(iter(inner), {})
+    return int if number_schema.get("type") == "integer" else float
 
 
 def _array(rows: list[Any], kind: type) -> np.ndarray:

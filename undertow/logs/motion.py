@@ -44,10 +44,10 @@ def inputs_of(log: LogSignals, names: tuple[str, ...] = _INPUTS, thruster_matrix
     inputs = next((log[name] for name in names if name in log), None)
     if inputs is None:
         raise missing(log, *names, hint=_input_hint(log))
-    good = np.isfinite(inputs.values).all(axis=1)
-    if good.sum() < 2:
-        raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(good.sum())}")
-    inputs = inputs._replace(time=inputs.time[good], values=inputs.values[good])
+    is_finite = np.isfinite(inputs.values).all(axis=1)
+    if is_finite.sum() < 2:
+        raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(is_finite.sum())}")
+    inputs = inputs._replace(time=inputs.time[is_finite], values=inputs.values[is_finite])
     frame = frame_of_columns(inputs.columns)
     return inputs if not frame else _of_thrusters(inputs, frame, thruster_matrix)
 
@@ -69,8 +69,8 @@ def _input_hint(log: LogSignals) -> str:
         return f"{example}, with the frame of the vehicle (FRAME_CONFIG); `supply` is in V"
     usual = DEFAULTS[log.format].signals.get(commands) if log.format in DEFAULTS else None
     columns, topic = (usual[0].columns, usual[0].topic) if usual else (("pwm1", "pwm2"), "TOPIC")
-    how = f"unit: {_COMMANDS[commands]}, supply: 16"
-    example = mapping_hint(log, "input", f"{columns[0]}, {columns[1]}, ...", how, topic)
+    unit_and_supply = f"unit: {_COMMANDS[commands]}, supply: 16"
+    example = mapping_hint(log, "input", f"{columns[0]}, {columns[1]}, ...", unit_and_supply, topic)
     return f"{example}, one column per thruster; `supply` is in V"
 
 
@@ -87,9 +87,9 @@ def motion_of(log: LogSignals) -> LoggedMotion:
     attitude = position._replace(values=position.values[:, 3:]) if is_pose else log["attitude"]
     turning = attitude._replace(values=without_jumps(attitude.values))
     velocity, rates = _velocities(log)
-    used = [position, turning, velocity, rates]
-    start = max(series.time[0] for series in used if len(series.time))
-    end = min(series.time[-1] for series in used if len(series.time))
+    signals = [position, turning, velocity, rates]
+    start = max(series.time[0] for series in signals if len(series.time))
+    end = min(series.time[-1] for series in signals if len(series.time))
     in_common = (position.time >= start) & (position.time <= end) & np.isfinite(position.values).all(axis=1)
     time = position.time[in_common]
     if len(time) < 2:
@@ -99,10 +99,10 @@ def motion_of(log: LogSignals) -> LoggedMotion:
     linear = at_times(time, velocity)
     if velocity.columns[:3] == ("north", "east", "down"):  # world axes
         linear = np.einsum("kij,ki->kj", frames.rotations(angles), linear[:, :3])
-    turned = at_times(time, rates)
+    angular = at_times(time, rates)
     if rates.values.shape[1] == 6:  # rates of the Euler angles
-        turned = frames.angular_velocity_of_rates(angles, turned[:, 3:])
-    return LoggedMotion(time, np.hstack([north_east_down, angles]), np.hstack([linear, turned]))
+        angular = frames.angular_velocity_of_rates(angles, angular[:, 3:])
+    return LoggedMotion(time, np.hstack([north_east_down, angles]), np.hstack([linear, angular]))
 
 
 def _velocities(log: LogSignals) -> tuple[Series, Series]:
@@ -117,15 +117,15 @@ def _velocities(log: LogSignals) -> tuple[Series, Series]:
 def without_jumps(angles: np.ndarray) -> np.ndarray:
     """Angles without jumps of a turn; rows that are not finite stay."""
     unwrapped = angles.copy()
-    good = np.isfinite(angles).all(axis=1)
-    unwrapped[good] = np.unwrap(angles[good], axis=0)
+    is_finite = np.isfinite(angles).all(axis=1)
+    unwrapped[is_finite] = np.unwrap(angles[is_finite], axis=0)
     return unwrapped
 
 
 def at_times(time: np.ndarray, series: Series) -> np.ndarray:
     """Values at other times, linear between samples that are finite; the samples themselves at their times."""
-    good = np.isfinite(series.values).all(axis=1)
-    sample_times, values = series.time[good], series.values[good]
+    is_finite = np.isfinite(series.values).all(axis=1)
+    sample_times, values = series.time[is_finite], series.values[is_finite]
     if not len(sample_times):
         return np.full((len(time), series.values.shape[1]), np.nan)
     return np.stack([np.interp(time, sample_times, column) for column in values.T], axis=1)

@@ -99,8 +99,8 @@ def _listed(recording: Recording) -> str:
 def _columns(table: TopicMessages) -> str:
     """Names of the columns of a table, or of the first of them."""
     names = list(itertools.islice(table.fields, _SHOWN_COLUMNS))
-    more = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []
-    return ", ".join([*names, *more]) or "no numbers"
+    ellipsis = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []
+    return ", ".join([*names, *ellipsis]) or "no numbers"
 
 
 def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Recording]:

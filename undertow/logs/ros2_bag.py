@@ -120,8 +120,8 @@ class _Topics:
     def start(self) -> int:
         """Time of the first message of the requested topics, or of any if none is, ns."""
         stamps = {topic: min(fields.stamps) for topic, fields in self.fields.items()}
-        used = [stamp for topic, stamp in stamps.items() if self.requested(topic, self.fields[topic].kind)]
-        return min(used or stamps.values())
+        requested_stamps = [stamp for topic, stamp in stamps.items() if self.requested(topic, self.fields[topic].kind)]
+        return min(requested_stamps or stamps.values())
 
 
 def _files(path: Path) -> Iterator[Path]:
@@ -174,11 +174,12 @@ def _of_sqlite(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Messa
             candidate for candidate in reader.connections if getattr(candidate.ext, "serialization_format", "") == "cdr"
         ]
         requested = [candidate for candidate in connections if topics.requested(candidate.topic, candidate.msgtype)]
-        for chosen in (requested, *([candidate] for candidate in connections if candidate not in requested)):
-            for connection, recorded, data in reader.messages(chosen) if chosen else ():
+        alone = [[candidate] for candidate in connections if candidate not in requested]
+        for connections_to_read in (requested, *alone):
+            for connection, recorded, data in reader.messages(connections_to_read) if connections_to_read else ():
                 definition = Definition(forms.get(connection.msgdef.format, ""), connection.msgdef.data)
                 yield _Message(connection.topic, connection.msgtype, definition, recorded, unpacked(bytes(data)))
-                if chosen is not requested:
+                if connections_to_read is not requested:
                     break
 
 

@@ -133,8 +133,8 @@ def time_together(motion: LoggedMotion, inputs: Series) -> float:
 
 def held(inputs: Series, times: np.ndarray) -> np.ndarray:
     """Inputs at times: those of the last sample until then."""
-    early = _EARLY * np.median(np.diff(inputs.time))
-    indices = np.searchsorted(inputs.time, times + early, side="right") - 1
+    tolerance = _EARLY * np.median(np.diff(inputs.time))
+    indices = np.searchsorted(inputs.time, times + tolerance, side="right") - 1
     return inputs.values[indices.clip(0, len(inputs.time) - 1)]
 
 

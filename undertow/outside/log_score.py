@@ -121,8 +121,8 @@ def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:
     Raises:
         BadInput: it does not.
     """
-    good = (np.abs(predicted) < _ENDLESS).all(axis=(0, 2))  # false for NaN
-    if not good.all():
-        got = f"{log.source}, with which it diverges within {after[np.argmin(good)]:.4g} s of a start"
+    is_bounded = (np.abs(predicted) < _ENDLESS).all(axis=(0, 2))  # false for NaN
+    if not is_bounded.all():
+        got = f"{log.source}, with which it diverges within {after[np.argmin(is_bounded)]:.4g} s of a start"
         hint = "Check the units of the inputs, and their order: pulses that are declared as volts are 1500 V"
         raise BadInput("log", "have motions and inputs with which the model stays finite", got, hint=hint)

@@ -81,8 +81,8 @@ def _best_set(error: np.ndarray, changes: np.ndarray) -> np.ndarray:
         sets = np.array(list(itertools.product((0.0, 1.0), repeat=number)))
     energy = error @ error + 2 * sets @ (changes @ error) + np.einsum("ki,ij,kj->k", sets, changes @ changes.T, sets)
     enough = energy.min() + _SPARE * (error @ error - energy.min())
-    fitting = np.flatnonzero(energy <= enough)
-    fewest = fitting[np.lexsort((energy[fitting], sets[fitting].sum(axis=1)))[0]]
+    good_sets = np.flatnonzero(energy <= enough)
+    fewest = good_sets[np.lexsort((energy[good_sets], sets[good_sets].sum(axis=1)))[0]]
     return sets[fewest] > 0
 
 

@@ -95,8 +95,8 @@ def _chance(summary: Mapping[str, Any]) -> list[Html]:
     chance = join("With ", str(max(completed)), " trials, 95 % of the correlations of unrelated quantities are within ")
     size = join(Html("&plusmn;"), number(min(1.96 / math.sqrt(max(completed) - 1), 1.0), 2), ".")
     hidden = len(summary["sensitivity"]) - len(shown_inputs(summary["sensitivity"]))
-    more = f" {hidden} further inputs with smaller correlations are in summary.json." if hidden else ""
-    return [tag("p", join(chance, size, more))]
+    omitted = f" {hidden} further inputs with smaller correlations are in summary.json." if hidden else ""
+    return [tag("p", join(chance, size, omitted))]
 
 
 def _choices(results: Results, summary: Mapping[str, Any]) -> list[Html]:
@@ -112,8 +112,8 @@ def _optional(identity: str, title: str, *content: Html) -> list[Html]:
 
 def _how(summary: Mapping[str, Any]) -> Html:
     order = "Failed trials come first, the earliest at the top, then those with the largest tracking rms."
-    again = "To repeat one, run `undertow simulate worst/trial-NUMBER.yaml` in the folder of this page."
-    return tag("p", prose(f"{order} {again} {by_xla(summary)}".rstrip()))
+    repeat_hint = "To repeat one, run `undertow simulate worst/trial-NUMBER.yaml` in the folder of this page."
+    return tag("p", prose(f"{order} {repeat_hint} {by_xla(summary)}".rstrip()))
 
 
 def _plots(results: Results, summary: Mapping[str, Any]) -> Plots:
@@ -196,12 +196,14 @@ def requirements(results: Results, summary: Mapping[str, Any]) -> Html:
         for requirement in combination["requirements"]:
             low, high = requirement["interval"]
             share = f"{100 * requirement['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-            of = f" in {100 * requirement['share']:g} % of the trials"
+            share_words = f" in {100 * requirement['share']:g} % of the trials"
             if requirement["formula"] is None:
                 bound = quantity(requirement["below"], results.unit(requirement["metric"]))
-                description = join(_metric(requirement["metric"]), " < ", bound, of)
+                description = join(_metric(requirement["metric"]), " < ", bound, share_words)
             else:
-                description = join(f"{requirement['metric']}: ", tag("code", prose(requirement["formula"])), of)
+                description = join(
+                    f"{requirement['metric']}: ", tag("code", prose(requirement["formula"])), share_words
+                )
             rows.append((description, named(combination), chip(requirement["verdict"]), share))
     head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
     return table(head, rows) if rows else Html("")
@@ -241,9 +243,11 @@ def worst(results: Results, summary: Mapping[str, Any]) -> Html:
             number(value, _DIGITS) if isinstance(value, float) else value for value in results.sampled(trial).values()
         ]
         completed = int(row["status"]) == int(Status.OK)
-        how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if completed else float(row["ended"])})
+        ended = ending(
+            {"status": ENDINGS[int(row["status"])], "diverged_at": None if completed else float(row["ended"])}
+        )
         errors = [_shown(results, name, float(row[name]) if completed else None) for name in results.tracking]
-        rows.append((str(trial), how, *errors, *swept, *sampled))
+        rows.append((str(trial), ended, *errors, *swept, *sampled))
     keys = [prose(f"`{key}`") for key in (*results.campaign.axes, *results.campaign.vary)]
     heads = [_headed(results, name) for name in results.tracking]
     return table(("trial", "ended", *heads, *keys), rows, numeric=range(2, 2 + len(heads)), wide=len(keys) > 1)

@@ -107,20 +107,25 @@ def write_comparison(
 
 
 def _lead(findings: Findings, subject: str) -> str:
-    of = f"{subject}: " if subject and not findings.differing else ""
+    prefix = f"{subject}: " if subject and not findings.differing else ""
     if findings.all_equal:
         trials = "one trial" if findings.trials == 1 else f"{findings.trials} trials, which are all equal,"
-        return f"{of}{trials} for each, because nothing in the scenario is random."
-    return f"{of}{findings.trials} trials for each, with the same samples and seeds."
+        return f"{prefix}{trials} for each, because nothing in the scenario is random."
+    return f"{prefix}{findings.trials} trials for each, with the same samples and seeds."
 
 
 def _alike(dataset: xr.Dataset, findings: Findings) -> str:
     """A sentence on the metrics that no figure shows, because they have one value only; empty without any."""
-    same = alike(dataset, findings)
-    each = ", ".join(
-        f"{titled(findings, metric)}: {value_in(value, findings.units[metric])}" for metric, value in same.items()
+    constant_metrics = alike(dataset, findings)
+    metrics_and_values = ", ".join(
+        f"{titled(findings, metric)}: {value_in(value, findings.units[metric])}"
+        for metric, value in constant_metrics.items()
     )
-    return f"The same in all completed trials, and therefore not shown in figures: {each}." if same else ""
+    return (
+        f"The same in all completed trials, and therefore not shown in figures: {metrics_and_values}."
+        if constant_metrics
+        else ""
+    )
 
 
 def _replayed(replays: Sequence[ReplayData], findings: Findings) -> str:
@@ -161,7 +166,7 @@ def _tuning(noun: str, tuning: Mapping[str, str]) -> Html:
 
 
 def _endings(findings: Findings) -> Html:
-    words = dict.fromkeys(word for each in findings.endings.values() for word in each)
+    words = dict.fromkeys(word for counts in findings.endings.values() for word in counts)
     rows = [
         (word.replace("_", " "), *(str(findings.endings[name].get(word, 0)) for name in findings.names))
         for word in words

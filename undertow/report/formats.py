@@ -71,13 +71,13 @@ def prose(content: Any) -> Html:
 
 
 def _typeset(words: str) -> Html:
-    marked = _TINY.sub(lambda match: _scientific(len(match[1]), match[2]), with_symbols(words))
-    marked = _POWER.sub(lambda match: _with_power(match[1], f"{match[2]}{match[3]}".lstrip("+")), marked)
-    marked = re.sub(r"\^(-?\d)", lambda match: f"<sup>{_minus(match[1])}</sup>", marked)
-    marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
+    markup = _TINY.sub(lambda match: _scientific(len(match[1]), match[2]), with_symbols(words))
+    markup = _POWER.sub(lambda match: _with_power(match[1], f"{match[2]}{match[3]}".lstrip("+")), markup)
+    markup = re.sub(r"\^(-?\d)", lambda match: f"<sup>{_minus(match[1])}</sup>", markup)
+    markup = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", markup))
     for sign, entity in _SIGNS.items():
-        marked = marked.replace(sign, entity)
-    return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
+        markup = markup.replace(sign, entity)
+    return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", markup))
 
 
 def _scientific(zeros: int, digits: str) -> Html:

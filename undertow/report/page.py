@@ -35,8 +35,8 @@ def marked(pattern: str, content: str, inside: Callable[[str], Html], outside: C
 
 def tag(name: str, *content: Any, **attributes: str) -> Html:
     """An element; `class_` stands for the attribute `class`."""
-    named = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
-    return Html(f"<{name}{named}>{join(*content)}</{name}>")
+    attribute_text = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
+    return Html(f"<{name}{attribute_text}>{join(*content)}</{name}>")
 
 
 def bullets(items: Sequence[Any]) -> Html:

@@ -90,20 +90,20 @@ def _page(
         sections.append(section("faults", "Faults", _table(fault_rows(facts.faults, input_names(run.series)))))
     if facts.transitions is not None:
         supervision = transition_rows(facts.transitions, lost_thrusters(run.series))
-        below = [tag("p", prose(sentence)) for sentence in supervision.sentences]
-        sections.append(section("supervision", supervision.title, _table(supervision), *below))
+        sentences = [tag("p", prose(sentence)) for sentence in supervision.sentences]
+        sections.append(section("supervision", supervision.title, _table(supervision), *sentences))
     if facts.navigation is not None:
-        assumed = navigation_rows(facts.navigation)
-        below = [tag("p", prose(sentence)) for sentence in assumed.sentences]
-        sections.append(section("navigation", assumed.title, _table(assumed), *below))
+        navigation = navigation_rows(facts.navigation)
+        sentences = [tag("p", prose(sentence)) for sentence in navigation.sentences]
+        sections.append(section("navigation", navigation.title, _table(navigation), *sentences))
     if certificate is not None:
         hypotheses = certificate_rows(certificate, facts.window)
-        below = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
-        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
+        sentences = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
+        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *sentences))
         if "memory" in certificate:
-            learnt = memory_rows(certificate)
-            below = [tag("p", prose(sentence)) for sentence in learnt.sentences]
-            sections.append(section("memory", learnt.title, _table(learnt), *below))
+            memory = memory_rows(certificate)
+            sentences = [tag("p", prose(sentence)) for sentence in memory.sentences]
+            sections.append(section("memory", memory.title, _table(memory), *sentences))
     plotted = [
         figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
         for name, picture in figures.items()

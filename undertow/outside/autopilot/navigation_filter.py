@@ -145,9 +145,9 @@ class NavigationFilter(Uncopied):
             raise BadInput("start", "be called before `step`", "not")
         received = self._received(readings, ages or {})
         before = self._clock.time
-        passed = self._clock.passed(dt)
-        on_time = passed == self.sampling_time  # then rounded as the times of a simulation are
-        return self._stepped(self._clock.time - before if on_time else passed, received)
+        elapsed = self._clock.passed(dt)
+        on_time = elapsed == self.sampling_time  # then rounded as the times of a simulation are
+        return self._stepped(self._clock.time - before if on_time else elapsed, received)
 
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step, such as the standard deviation of each output."""

@@ -167,17 +167,17 @@ class CProgram:
         name = self.system.name
         return f"void {name}_{function.what}({self.kind} t, {name}_{function.struct} *{function.struct})"
 
-    def _struct(self, what: str, members: list[Field]) -> str:
+    def _struct(self, struct: str, members: list[Field]) -> str:
         lines = [
             f"    {self._c99.TYPES[member.dtype]} {member.name}{''.join(f'[{size}]' for size in member.shape)};"
-            + (f" /* {meaning} */" if (meaning := self._meanings.get(f"{what}.{member.name}")) else "")
+            + (f" /* {meaning} */" if (meaning := self._meanings.get(f"{struct}.{member.name}")) else "")
             for member in members
             if member.size
         ]
         # C has no struct without a member.
         lines = lines or ["    char nothing;"]
-        head = f"/* {self._meanings[what]} */"
-        return "\n".join([head, "typedef struct {", *lines, f"}} {self.system.name}_{what};", ""])
+        head = f"/* {self._meanings[struct]} */"
+        return "\n".join([head, "typedef struct {", *lines, f"}} {self.system.name}_{struct};", ""])
 
     def _vectors(self) -> str:
         """Random steps and what the batch compiler gives for them."""

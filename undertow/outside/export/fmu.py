@@ -65,8 +65,8 @@ def export_fmu(
         BadInput: a format is unknown, or a part needs something that has no counterpart in C99.
     """
     form = Format(attitude, velocity)
-    chosen = checked(precision or built.scenario.precision, form)
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    checked_precision = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(checked_precision):
         functions = functions_of(built, form, output, esc)
         programs = {
             "controller": (controller_program(built, "controller", functions), _of_controller(built, functions)),
@@ -125,18 +125,18 @@ def compiled(sources: Mapping[str, str], name: str) -> tuple[bytes | None, str]:
     """The shared library of some sources, and why there is none; "" where there is one."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"no library is made on {sys.platform}, {platform.machine()}"
-    chosen = os.environ.get("CC", "")
-    command = shlex.split(chosen) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    compiler = os.environ.get("CC", "")
+    command = shlex.split(compiler) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
     if shutil.which(command[0]) is None:
-        return None, f"there is no C compiler on this machine ({chosen or 'cc, gcc or clang'})"
+        return None, f"there is no C compiler on this machine ({compiler or 'cc, gcc or clang'})"
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         files = [file for file in sources if file.endswith(".c")]
         command += [*_FLAGS, *files, "-o", f"{name}.so", "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise BadInput("CC", "", f"the C compiler {command[0]} failed on the unit {name}: {done.stderr}")
+        process = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if process.returncode != 0:
+            raise BadInput("CC", "", f"the C compiler {command[0]} failed on the unit {name}: {process.stderr}")
         return (Path(folder) / f"{name}.so").read_bytes(), ""
 
 

@@ -37,9 +37,9 @@ def export_navigation(built: Built, name: str = "navigation", *, precision: str 
     Raises:
         BadInput: the scenario's navigation is not a filter of readings, or needs something without counterpart in C99.
     """
-    chosen = precision or built.scenario.precision
-    checks.choice("precision", chosen, ("float64", "float32"))
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    chosen_precision = precision or built.scenario.precision
+    checks.choice("precision", chosen_precision, ("float64", "float32"))
+    with runtime.on_processor(), runtime.in_precision(chosen_precision):
         files = navigation_program(built, name).files()
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 

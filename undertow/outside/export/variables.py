@@ -53,13 +53,15 @@ class Names(NamedTuple):
             yield from group("position", struct, "motion_position", role, entries, units, position, start[0])
             yield from group("velocity", struct, "motion_velocity", role, entries, rates, velocity, start[2])
             return
-        turned, angle = (("w", "x", "y", "z"), "") if form.attitude == "quaternion" else (BODY_OUTPUTS[3:], "rad")
-        moving = {"body": BODY_AXES, "world": _WORLD, "rates": BODY_OUTPUTS}[form.velocity]
+        attitude_names, attitude_unit = (
+            (("w", "x", "y", "z"), "") if form.attitude == "quaternion" else (BODY_OUTPUTS[3:], "rad")
+        )
+        velocity_names = {"body": BODY_AXES, "world": _WORLD, "rates": BODY_OUTPUTS}[form.velocity]
         axes = {"body": ", body axes", "world": ", world axes", "rates": ", rates of position and Euler angles"}
         velocity += axes[form.velocity]
         yield from group("position", struct, "motion_position", role, BODY_OUTPUTS[:3], "m", position, start[0])
-        yield from group("attitude", struct, "motion_attitude", role, turned, angle, attitude, start[1])
-        yield from group("velocity", struct, "motion_velocity", role, moving, rates, velocity, start[2])
+        yield from group("attitude", struct, "motion_attitude", role, attitude_names, attitude_unit, attitude, start[1])
+        yield from group("velocity", struct, "motion_velocity", role, velocity_names, rates, velocity, start[2])
 
     def outputs(
         self, name: str, member: str, role: str, start: Any, meaning: str, order: int = 0

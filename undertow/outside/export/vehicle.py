@@ -78,8 +78,8 @@ def export_vehicle(
         BadInput: a format is unknown, or the plant or the disturbance needs something that has no counterpart in C99.
     """
     form = Format(attitude, velocity)
-    chosen = checked(precision or built.scenario.precision, form)
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    checked_precision = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(checked_precision):
         files = vehicle_program(built, name, form).files()
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
@@ -110,9 +110,11 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     truth = plant.output(jnp.zeros(()), plant.initial_state())
     zero, none = np.zeros(len(plant.outputs)), np.zeros(plant.inputs())
     initial = built.scenario.initial
-    at = lambda values: zero if values is None else np.asarray(values)
+    array_of = lambda values: zero if values is None else np.asarray(values)
     kind = jax.dtypes.canonicalize_dtype(float)
-    example = ExportedVehicleInput(InitialOutputs(at(initial.position), at(initial.velocity)), none, zero, np.zeros(()))
+    example = ExportedVehicleInput(
+        InitialOutputs(array_of(initial.position), array_of(initial.velocity)), none, zero, np.zeros(())
+    )
     inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), example)
     integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
 
@@ -153,8 +155,8 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         "output.status": "; ".join(f"{int(code)} {code.word}" for code in Status),
         "step": "A step of one sampling time from input->t on, with the command held.",
     }
-    what = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
-    about = made_from(f"{what}, under its disturbance", built.scenario.description)
+    kind_of_plant = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
+    about = made_from(f"{kind_of_plant}, under its disturbance", built.scenario.description)
     return System(name, about, meanings, start, step, inputs, sample, settings.dt)
 
 

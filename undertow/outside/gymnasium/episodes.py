@@ -181,7 +181,9 @@ class Episodes:
         numbers = [*(column[variant] for column in self._numbers), _keys(seeds)]
         with runtime.on_processor(), runtime.in_precision(self._precision):
             realized, (state, first_step) = self._starter(jax.tree.unflatten(self._form, numbers))
-        varying = [leaf for leaf, same in zip(jax.tree.leaves(realized), self._same, strict=True) if not same]
+        varying = [
+            leaf for leaf, is_constant in zip(jax.tree.leaves(realized), self._same, strict=True) if not is_constant
+        ]
         self._stepper.put("numbers", varying, indices)
         self._stepper.put("state", state, indices)
         return first_step

@@ -92,8 +92,8 @@ class MessageRequests:
 
     def _note_what_comes(self, now: float) -> None:
         """What comes often enough since it was asked for needs no answer: not every autopilot gives one."""
-        name, passed = self._asked, now - self._asked_at
-        if name is not None and self._received[name] >= _ENOUGH * passed / self._interval:
+        name, elapsed = self._asked, now - self._asked_at
+        if name is not None and self._received[name] >= _ENOUGH * elapsed / self._interval:
             self._asked = None
             self._open.remove(name)
 

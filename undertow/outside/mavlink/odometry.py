@@ -76,9 +76,11 @@ class OdometryReader:
             self._attitude = message
         if kind != "LOCAL_POSITION_NED" or self._attitude is None:
             return None
-        apart = (message.time_boot_ms - self._attitude.time_boot_ms) / 1e3
-        if abs(apart) > _APART:
-            raise BadInput("ATTITUDE_QUATERNION", f"be within {_APART:g} s of LOCAL_POSITION_NED", f"{apart:g} s apart")
+        time_between = (message.time_boot_ms - self._attitude.time_boot_ms) / 1e3
+        if abs(time_between) > _APART:
+            raise BadInput(
+                "ATTITUDE_QUATERNION", f"be within {_APART:g} s of LOCAL_POSITION_NED", f"{time_between:g} s apart"
+            )
         return of_local_position(message, self._attitude)
 
 

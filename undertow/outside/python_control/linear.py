@@ -67,8 +67,8 @@ def linear_closed_loop(
         BadInput: as of `linear_controller`.
     """
     built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
-    at, signals = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
-    plant, law = _plant(built, at, True, all_states), _controller(built, at, all_states)
+    point, signals = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
+    plant, law = _plant(built, point, True, all_states), _controller(built, point, all_states)
     ends = np.cumsum([len(signals.measured), len(signals.desired)])
     (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
     u_x, shown_outputs = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
@@ -103,33 +103,33 @@ def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
         if position is None:
             if load is not None:
                 raise BadInput("position", "be given with a load")
-            at = operating_point(built).mean
+            point = operating_point(built).mean
         else:
-            at = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
-    if not at.found:
+            point = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
+    if not point.found:
         raise BadInput(
-            "load", "leave the loop an equilibrium", f"one in which a state changes by {at.moving:.2g} per s"
+            "load", "leave the loop an equilibrium", f"one in which a state changes by {point.moving:.2g} per s"
         )
-    return at
+    return point
 
 
-def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
-    loop, signals = at.parts.loop, signals_of(built.closed_loop.plant)
+def _plant(built: Built, point: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
+    loop, signals = point.parts.loop, signals_of(built.closed_loop.plant)
     plant, zero = loop.plant, jnp.zeros(())
 
     def derivative(state: Any, u: Any) -> Any:
         unloaded = plant.no_load()
-        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(at.at["load"]))
-        return vector_of(plant.dynamics(zero, at.parts.plant_state(state), u, pushed))
+        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(point.at["load"]))
+        return vector_of(plant.dynamics(zero, point.parts.plant_state(state), u, pushed))
 
     def measurement(state: Any) -> Any:
-        return vector_of_measurement(plant.output(zero, at.parts.plant_state(state)))
+        return vector_of_measurement(plant.output(zero, point.parts.plant_state(state)))
 
     with computing(built):
-        state, u = jnp.asarray(at.at["plant"]), jnp.asarray(at.at["u"])
+        state, u = jnp.asarray(point.at["plant"]), jnp.asarray(point.at["u"])
         a, b = map(np.asarray, jax.jit(jax.jacfwd(derivative, argnums=(0, 1)))(state, u))
         c = np.asarray(jax.jit(jax.jacfwd(measurement))(state))
-        names = state_names(at.parts.plant_state(state), "plant")
+        names = state_names(point.parts.plant_state(state), "plant")
         matrices = StateSpaceMatrices(a, b, c, names)
         matrices = matrices if all_states else seen(with_angles(matrices, np.asarray(state)))
     system = ct.ss(matrices.a, matrices.b, matrices.c, np.zeros((len(c), b.shape[1])))
@@ -145,24 +145,24 @@ def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct
     )
 
 
-def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpace:
-    loop, signals = at.parts.loop, signals_of(built.closed_loop.plant)
+def _controller(built: Built, point: Equilibrium, all_states: bool) -> ct.StateSpace:
+    loop, signals = point.parts.loop, signals_of(built.closed_loop.plant)
     law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
     sizes = np.cumsum([len(signals.measured), len(signals.desired)])
 
     def update_and_command(state: Any, inputs_of_law: Any) -> Any:
         measured, desired, applied = jnp.split(inputs_of_law, sizes)
-        z, y, r = at.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
+        z, y, r = point.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
         return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
 
     with computing(built):
-        x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
-        state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
-        inputs_of_law = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
+        x = point.parts.plant_state(jnp.asarray(point.at["plant"]))
+        state, y = jnp.asarray(point.at["law"]), loop.plant.output(jnp.zeros(()), x)
+        inputs_of_law = jnp.concatenate([vector_of_measurement(y), *point.parts.target, jnp.asarray(point.at["u"])])
         (a, b), (c, d) = jax.tree.map(
             np.asarray, jax.jit(jax.jacfwd(update_and_command, argnums=(0, 1)))(state, inputs_of_law)
         )
-        names = state_names(at.parts.law_state(state), "law")
+        names = state_names(point.parts.law_state(state), "law")
     matrices = StateSpaceMatrices(a, b, c, names)
     matrices = matrices if all_states else seen(matrices)
     inputs = signals.measured | signals.desired | signals.applied

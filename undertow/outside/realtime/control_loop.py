@@ -66,12 +66,12 @@ class RealTimeLoop:
         self._report_due, self._steps_reported = clock.now() + every, 0
         self._looked: float | None = None  # when measurements were looked for last, s
         self._period = autopilot.sampling_time
-        chosen = LoopSettings() if settings is None else settings
-        self._settings = chosen.checked(autopilot.plant.inputs())
-        self._deadline = self._period if chosen.deadline is None else chosen.deadline
-        self._standstill = max(chosen.max_age, _STANDSTILL * self._period)
+        loop_settings = LoopSettings() if settings is None else settings
+        self._settings = loop_settings.checked(autopilot.plant.inputs())
+        self._deadline = self._period if loop_settings.deadline is None else loop_settings.deadline
+        self._standstill = max(loop_settings.max_age, _STANDSTILL * self._period)
         safe = self._settings.safe
-        self.session = ControlSession(autopilot, link.form, chosen.max_age, safe, chosen.from_safe)
+        self.session = ControlSession(autopilot, link.form, loop_settings.max_age, safe, loop_settings.from_safe)
         self.statistics = LoopStatistics()
 
     def run(self, steps: float = math.inf, periods: float = math.inf) -> Reason:
@@ -95,17 +95,17 @@ class RealTimeLoop:
             return self._why_no_start()
         self._begun()
         clock, period, statistics = self._clock, self._period, self.statistics
-        begin = started = last = clock.now()
-        planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
+        loop_start = started = last = clock.now()
+        planned, instant, elapsed, waited = 0, 0.0, 0.0, 0.0
         while True:
-            begun = clock.now()
+            computing_start = clock.now()
             self._link.send(self._command(received, elapsed))
-            answered = clock.now()
+            command_sent = clock.now()
             self._autopilot.log_step()  # after the command is on its way
-            following = max(planned + 1, math.floor((clock.now() - begin) / period) + 1)
-            self._count(answered - begin - planned * period, following - planned - 1, received is not None)
-            statistics.computing.add(answered - begun)
-            statistics.lateness.add(started - begin - planned * period)
+            following = max(planned + 1, math.floor((clock.now() - loop_start) / period) + 1)
+            self._count(command_sent - loop_start - planned * period, following - planned - 1, received is not None)
+            statistics.computing.add(command_sent - computing_start)
+            statistics.lateness.add(started - loop_start - planned * period)
             statistics.longest_stale = max(statistics.longest_stale, waited)
             if statistics.steps > 1 and started - last < 1.5 * period:
                 statistics.jitter.add(abs(started - last - period))
@@ -113,12 +113,12 @@ class RealTimeLoop:
                 return Reason.COMPLETED
 
             planned, last = following, started
-            clock.sleep_until(begin + planned * period)
+            clock.sleep_until(loop_start + planned * period)
             if self._stop():
                 return Reason.STOPPED
             started = clock.now()
-            before, at = at, self._instant(started - begin)
-            elapsed = (at - before) * period
+            before, instant = instant, self._instant(started - loop_start)
+            elapsed = (instant - before) * period
             if elapsed > self._standstill:
                 return Reason.STALLED
             received = self._link.receive(elapsed)
@@ -128,11 +128,11 @@ class RealTimeLoop:
             if waited > self._settings.max_age:
                 return Reason.LINK_LOST
 
-    def _count(self, answered: float, missed: int, fresh: bool) -> None:
+    def _count(self, response_time: float, missed: int, fresh: bool) -> None:
         """Count a step whose command came `answered` (s) after its planned beginning."""
         statistics = self.statistics
         statistics.steps += 1
-        statistics.overruns += answered >= self._deadline
+        statistics.overruns += response_time >= self._deadline
         statistics.missed += missed
         statistics.stale += not fresh
 
@@ -154,16 +154,16 @@ class RealTimeLoop:
 
         The safe output is sent meanwhile.
         """
-        begin, planned = self._clock.now(), 0
+        wait_start, planned = self._clock.now(), 0
         while not self._stop() and not self._link.ended:
             received = self._link.receive(self._period if planned else 0.0)
             if received is not None and not received.missing():
                 return received
-            if self._clock.now() - begin > self._settings.patience:
+            if self._clock.now() - wait_start > self._settings.patience:
                 return None
             self._link.await_measurement(self._settings.safe)
             planned += 1
-            self._clock.sleep_until(begin + planned * self._period)
+            self._clock.sleep_until(wait_start + planned * self._period)
         return None
 
     def _why_no_start(self) -> Reason:
@@ -172,10 +172,10 @@ class RealTimeLoop:
         return Reason.STOPPED if self._stop() else Reason.NO_START
 
     def _by_measurements(self, link: AbstractPacingLink, steps: float, periods: float) -> Reason:
-        begin = self._clock.now()
+        loop_start = self._clock.now()
         while not self._stop():
             self.turn(link, LOOK)
-            if self.statistics.steps >= steps or self._clock.now() - begin >= periods * self._period:
+            if self.statistics.steps >= steps or self._clock.now() - loop_start >= periods * self._period:
                 return Reason.COMPLETED
             if link.ended:
                 return Reason.LINK_ENDED
@@ -190,7 +190,7 @@ class RealTimeLoop:
         self._looked = now
         if elapsed > self._standstill + LOOK:
             link.discard()
-        begun, was_running = self._clock.now(), self.session.running
+        computing_start, was_running = self._clock.now(), self.session.running
         measurement = link.receive(elapsed)
         objection = link.objection()
         command = self.session.follow(measurement, now, objection)
@@ -199,7 +199,7 @@ class RealTimeLoop:
                 link.note_begin()
             self.statistics.steps += 1  # whoever sees the command sees it counted
             link.send(command)
-            self.statistics.computing.add(self._clock.now() - begun)
+            self.statistics.computing.add(self._clock.now() - computing_start)
             self._autopilot.log_step()
         elif was_running and not self.session.running:
             link.note_stop(self.session.state(objection))

@@ -67,10 +67,10 @@ class ControlSession:
         measured = self._nothing if measurement is None else measurement
         return self._given_to(self._autopilot.step, measured, applied=measured.applied, dt=dt)
 
-    def _given_to(self, method: Callable[..., np.ndarray], measured: LinkMeasurement, **more: Any) -> np.ndarray:
+    def _given_to(self, method: Callable[..., np.ndarray], measured: LinkMeasurement, **options: Any) -> np.ndarray:
         motion = measured.position, measured.velocity, measured.attitude
-        more |= {"target": measured.target, "propellers": measured.propellers, "health": measured.health}
-        return method(*motion, **more)
+        options |= {"target": measured.target, "propellers": measured.propellers, "health": measured.health}
+        return method(*motion, **options)
 
     def follow(self, measurement: LinkMeasurement | None, now: float, objection: str = "") -> np.ndarray | None:
         """The command that answers a measurement; None where there is none. Call it often, also without one.
@@ -163,9 +163,9 @@ class ControlSession:
 
     def _passed(self, measurement: LinkMeasurement) -> float | None:
         """Time since the last step, s; None for the sampling time, and where the clock of the sender was set."""
-        passed = measurement.stamp - self._stepped
-        was_set = measurement.elapsed == 0 or passed <= 0
-        return None if was_set or abs(passed - self._period) <= _EXACT else passed / _SECOND
+        elapsed = measurement.stamp - self._stepped
+        was_set = measurement.elapsed == 0 or elapsed <= 0
+        return None if was_set or abs(elapsed - self._period) <= _EXACT else elapsed / _SECOND
 
 
 def _nothing_measured(autopilot: Autopilot, form: Format | None) -> LinkMeasurement:

@@ -51,9 +51,9 @@ class SenderClock:
         """Whether another offset has gone on for long enough; that of a message that comes again and again grows."""
         if self._other is not None:
             since, first = self._other
-            passed = now - since
-            if abs(offset - first) <= 0.5 * passed + _STEADY:
-                return passed >= _SETTLES
+            elapsed = now - since
+            if abs(offset - first) <= 0.5 * elapsed + _STEADY:
+                return elapsed >= _SETTLES
         self._other = now, offset
         return False
 

@@ -252,9 +252,9 @@ def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
 def _quality(reliability: str) -> Qos:
     """Quality of service: the default of ROS 2, but for the reliability."""
     reliable = Policy.Reliability.Reliable(duration(milliseconds=100))
-    chosen = reliable if reliability == "reliable" else Policy.Reliability.BestEffort
+    reliability_policy = reliable if reliability == "reliable" else Policy.Reliability.BestEffort
     representation = Policy.DataRepresentation(use_cdrv0_representation=True)
-    return Qos(chosen, Policy.Durability.Volatile, Policy.History.KeepLast(_DEPTH), representation)
+    return Qos(reliability_policy, Policy.Durability.Volatile, Policy.History.KeepLast(_DEPTH), representation)
 
 
 @functools.cache

@@ -56,8 +56,8 @@ def read_rosbag2(
     for topic, errors in refused.items():
         warnings.warn(f"Left out: {len(errors)} messages of {topic}. The first: {errors[0]}", stacklevel=2)
     if not rows:
-        which = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
-        raise BadInput(str(path), f"have messages that can be used {which}", "without")
+        topics_or_types = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
+        raise BadInput(str(path), f"have messages that can be used {topics_or_types}", "without")
     return {name: _series(name, samples) for name, samples in rows.items()}
 
 

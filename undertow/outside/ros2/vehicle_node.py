@@ -152,8 +152,8 @@ class VehicleNode:
         until = time.monotonic() + self._settings.patience
         while not self._take_command():
             if time.monotonic() > until:
-                of = f"the odometry of {self._time / SECOND:g} s"
-                why = f"no command came for {of} within {self._settings.patience:g} s"
+                awaited = f"the odometry of {self._time / SECOND:g} s"
+                why = f"no command came for {awaited} within {self._settings.patience:g} s"
                 raise BadInput("", "", why)
             self._link.wait(WAIT)
             self._reporter.status(self.status, self._commands)

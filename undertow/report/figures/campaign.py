@@ -90,8 +90,8 @@ def distributions_figure(
                 linestyle=look.dashes,
                 linewidth=look.width,
             )
-        everything = np.concatenate(list(values[metric].values()))
-        if everything.min() > 0 and everything.max() > _WIDE * everything.min():
+        all_values = np.concatenate(list(values[metric].values()))
+        if all_values.min() > 0 and all_values.max() > _WIDE * all_values.min():
             panel.set_xscale("log")
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1.04)  # the line at 1 in its whole width

@@ -37,13 +37,13 @@ def comparison_plots(dataset: xr.Dataset, findings: Findings) -> dict[str, Calla
 
 def alike(dataset: xr.Dataset, findings: Findings) -> dict[str, float]:
     """Metrics that are the same in every completed trial of every controller, and their value; no figure shows them."""
-    same = {}
+    constant_metrics = {}
     for metric in findings.medians:
         values = np.concatenate([_values(dataset, findings, metric, name) for name in findings.names])
         values = values[~np.isnan(values)]
         if values.size and (values == values[0]).all():
-            same[metric] = float(values[0])
-    return same
+            constant_metrics[metric] = float(values[0])
+    return constant_metrics
 
 
 def _differing(dataset: xr.Dataset, findings: Findings) -> list[str]:
@@ -52,8 +52,8 @@ def _differing(dataset: xr.Dataset, findings: Findings) -> list[str]:
     paired = {
         difference.metric for difference in findings.differences if difference.baseline == first and difference.pairs
     }
-    same = alike(dataset, findings)
-    return [metric for metric in findings.units if metric in paired and metric not in same]
+    constant_metrics = alike(dataset, findings)
+    return [metric for metric in findings.units if metric in paired and metric not in constant_metrics]
 
 
 def differences_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
@@ -132,11 +132,11 @@ def histories_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
 
 def _distributions(dataset: xr.Dataset, findings: Findings) -> Figure:
     """Empirical CDFs of the metrics that have them."""
-    same = alike(dataset, findings)
+    constant_metrics = alike(dataset, findings)
     units = {metric: for_people(1.0, unit) for metric, unit in findings.units.items()}
     scaled = {}
     for metric in findings.units:
-        if metric in same:
+        if metric in constant_metrics:
             continue
         by_candidate = {name: _values(dataset, findings, metric, name) for name in findings.names}
         finite = {name: values[np.isfinite(values)] for name, values in by_candidate.items()}

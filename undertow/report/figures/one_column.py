@@ -134,7 +134,7 @@ def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, 
     left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
     sides = left, right, max(outer.y1 - inner.y1, letters / 2), inner.y0 - outer.y0
     edge = (_EDGE, 0.0, 0.0, 0.0)
-    return tuple(max(side, 0.0) / panel.figure.dpi + more for side, more in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
+    return tuple(max(side, 0.0) / panel.figure.dpi + extra for side, extra in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
 
 
 def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:

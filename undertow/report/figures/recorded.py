@@ -41,8 +41,8 @@ def per_input(run: xr.Dataset, quantity: str) -> list[str]:
 
 def curve(run: xr.Dataset, name: str, signal: str, look: Look) -> Curve:
     """A signal of a dataset, up to the end of the run."""
-    lived = run["time"].values <= run.attrs.get("ended", np.inf)
-    return Curve(name, run["time"].values[lived], run[signal].values[lived], look)
+    is_valid = run["time"].values <= run.attrs.get("ended", np.inf)
+    return Curve(name, run["time"].values[is_valid], run[signal].values[is_valid], look)
 
 
 def difference(run: xr.Dataset, name: str, signal: str, other: str, look: Look) -> Curve:

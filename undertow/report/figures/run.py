@@ -89,8 +89,8 @@ def _apart(run: xr.Dataset) -> list[Block]:
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
     failed = run.attrs.get("status", "completed") != "completed"
     peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
-    early = [early_size(curve.time, curve.values) for curve in curves]
-    runaway = failed and max(peaks) > _RUNAWAY * max(early)
+    early_peaks = [early_size(curve.time, curve.values) for curve in curves]
+    runaway = failed and max(peaks) > _RUNAWAY * max(early_peaks)
     scale = "symlog" if runaway else "linear"
     return Block(curves, quantities, 1.4, scale=scale, limits_from=0.0 if failed else start, titled=True)
 

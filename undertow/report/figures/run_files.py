@@ -38,6 +38,6 @@ def _picture(vector: bytes, raster: bytes) -> str | bytes:
         return vector.decode()
     data = io.BytesIO()
     with Image.open(io.BytesIO(raster)) as image:
-        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        few.save(data, "PNG", compress_level=6)
+        quantized = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        quantized.save(data, "PNG", compress_level=6)
     return data.getvalue()

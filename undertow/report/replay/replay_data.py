@@ -218,8 +218,8 @@ def hull_size(vehicle: VehicleModel, dimensions: Sequence[float] | None) -> np.n
     if dimensions is not None:
         return np.asarray(dimensions, dtype=float)
     facts = facts_of(vehicle)
-    about = np.diag(facts.inertia)
-    sides = np.sqrt(np.maximum(6 * (about.sum() - 2 * about) / facts.mass, 0.0))
+    moments_of_inertia = np.diag(facts.inertia)
+    sides = np.sqrt(np.maximum(6 * (moments_of_inertia.sum() - 2 * moments_of_inertia) / facts.mass, 0.0))
     return np.maximum(sides, _THINNEST * max(float(sides.max()), facts.scale))
 
 
