@@ -38,7 +38,7 @@ class MavlinkPeer(AbstractPeer):
         self._channels = channels_of_vehicle(np.asarray(plant.thruster_matrix))
         self._dead_band = float((plant.power.esc or esc()).dead_band)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._foreign_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def begin(self, chance: random.Random) -> None:
         self._chance, self._alive_at = chance, -np.inf
@@ -76,7 +76,7 @@ class MavlinkPeer(AbstractPeer):
     def from_another(self, measured: Measured, time: float) -> None:
         away = measured._replace(position=measured.position + 50.0)
         self._transmit(self._socket, self._odometry(away, time).pack(self._camera))
-        self._transmit(self._other, self._odometry(away, time).pack(self._wire))
+        self._transmit(self._foreign_socket, self._odometry(away, time).pack(self._wire))
 
     def take(self, longest: float) -> tuple[np.ndarray | None, int]:
         count = 0
@@ -92,7 +92,7 @@ class MavlinkPeer(AbstractPeer):
 
     def close(self) -> None:
         self._socket.close()
-        self._other.close()
+        self._foreign_socket.close()
 
     def _note(self, message: Any) -> bool:
         """Take the pulses of a command; whether it was one."""

@@ -24,7 +24,7 @@ class UdpPeer(AbstractPeer):
     def __init__(self, out: str):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
-        self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._foreign_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._received = DatagramFilter(COMMAND, _THRUSTERS)
         address = f"127.0.0.1:{self._socket.getsockname()[1]}"
         self.arguments = [
@@ -67,7 +67,7 @@ class UdpPeer(AbstractPeer):
 
     def from_another(self, measured: Measured, time: float) -> None:
         foreign_sender = Sender(MEASUREMENT, _THRUSTERS, self._chance.getrandbits(32))
-        self._transmit(self._other, foreign_sender.pack(_numbers(measured), round(1e9 * time), 0))
+        self._transmit(self._foreign_socket, foreign_sender.pack(_numbers(measured), round(1e9 * time), 0))
 
     def take(self, longest: float) -> tuple[np.ndarray | None, int]:
         newest, count = None, 0
@@ -81,7 +81,7 @@ class UdpPeer(AbstractPeer):
 
     def close(self) -> None:
         self._socket.close()
-        self._other.close()
+        self._foreign_socket.close()
 
     def _receive(self, longest: float) -> bytes | None:
         self._socket.settimeout(longest)

@@ -313,7 +313,7 @@ class Autopilot(Uncopied):
             BadInput: `start` was not called.
         """
         self._check_started("save")
-        return packed(self._identity(), self._kept())
+        return packed(self._identity(), self._state_arrays())
 
     def restore(self, state: bytes) -> None:
         """Go on from a state that `save` gave.
@@ -321,9 +321,9 @@ class Autopilot(Uncopied):
         Raises:
             BadInput: it is damaged, or of another controller; everything stays as it was.
         """
-        restore_arrays(self._kept(), state, self._identity())
+        restore_arrays(self._state_arrays(), state, self._identity())
 
-    def _kept(self) -> list[np.ndarray]:
+    def _state_arrays(self) -> list[np.ndarray]:
         """Everything that changes from step to step."""
         steps = self._go_on.state, self._go_on.outputs, self._at.numbers, self._convert.outputs
         arrays = self._command, self._before, self._blended, self._started, self._broken, self._restarts

@@ -171,7 +171,7 @@ class NavigationFilter(Uncopied):
         """The state; a filter that is made alike goes on from it with the same bits."""
         if not self._started:
             raise BadInput("start", "be called before `save`", "not")
-        return packed(self._identity(), self._kept())
+        return packed(self._identity(), self._state_arrays())
 
     def restore(self, state: bytes) -> None:
         """Go on from a state that `save` gave.
@@ -179,9 +179,9 @@ class NavigationFilter(Uncopied):
         Raises:
             BadInput: it is damaged, or of another filter; everything stays as it was.
         """
-        restore_arrays(self._kept(), state, self._identity())
+        restore_arrays(self._state_arrays(), state, self._identity())
 
-    def _kept(self) -> list[np.ndarray]:
+    def _state_arrays(self) -> list[np.ndarray]:
         steps = jax.tree.leaves((self._go_on.state, self._go_on.outputs))
         return [*steps, self._started, self._clock.numbers]
 

@@ -64,7 +64,7 @@ class RealTimeLoop:
         self._autopilot, self._link, self._clock, self._stop, self._begun = autopilot, link, clock, stop, begun
         self._report, self._every = report, every
         self._report_due, self._steps_reported = clock.now() + every, 0
-        self._looked: float | None = None  # when measurements were looked for last, s
+        self._last_look: float | None = None  # when measurements were looked for last, s
         self._period = autopilot.sampling_time
         loop_settings = LoopSettings() if settings is None else settings
         self._settings = loop_settings.checked(autopilot.plant.inputs())
@@ -186,8 +186,8 @@ class RealTimeLoop:
         """Wait at most so long (s) for a measurement and answer it, or send the safe output where that is due."""
         link.wait(longest)
         now = link.time(self._clock.now())
-        elapsed = now - (now if self._looked is None else self._looked)
-        self._looked = now
+        elapsed = now - (now if self._last_look is None else self._last_look)
+        self._last_look = now
         if elapsed > self._standstill + LOOK:
             link.discard()
         computing_start, was_running = self._clock.now(), self.session.running

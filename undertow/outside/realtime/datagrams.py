@@ -125,7 +125,7 @@ class DatagramFilter:
         names += ("repeated", "far ahead", "left unread")
         self.counts: dict[str, int] = dict.fromkeys(names, 0)
         self.newest: Datagram | None = None
-        self._far = 0  # sequence number of the last datagram that was ahead
+        self._far_ahead = 0  # sequence number of the last datagram that was ahead
 
     def take(self, data: bytes) -> Datagram | None:
         """The datagram, if it can be used; otherwise it is counted."""
@@ -152,10 +152,10 @@ class DatagramFilter:
             ahead = (sequence - self.newest.sequence) % _SEQUENCES
             if not 0 < ahead <= _SEQUENCES // 2:
                 raise Refused("repeated")
-            if ahead > _WINDOW and not 0 < (sequence - self._far) % _SEQUENCES <= _WINDOW:
-                self._far = sequence
+            if ahead > _WINDOW and not 0 < (sequence - self._far_ahead) % _SEQUENCES <= _WINDOW:
+                self._far_ahead = sequence
                 raise Refused("far ahead")
-        self._far = sequence
+        self._far_ahead = sequence
 
 
 class Sender:

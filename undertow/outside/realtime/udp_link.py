@@ -48,7 +48,7 @@ class UdpVehicleLink(AbstractLink):
         self._socket.setblocking(False)
         self._received = DatagramFilter(MEASUREMENT, self._actuators)
         self._sender = Sender(COMMAND, self._actuators, int.from_bytes(os.urandom(4), "little"))
-        self._sent = self._unsent = self._others = 0
+        self._sent = self._unsent = self._foreign = 0
         self._watchdog: Watchdog | None = None
         self._safe = np.zeros(self._actuators)
 
@@ -64,7 +64,7 @@ class UdpVehicleLink(AbstractLink):
             except OSError:  # nothing there, or the vehicle does not listen
                 break
             if sender != self._peer:
-                self._others += 1
+                self._foreign += 1
                 continue
             datagram = self._received.take(data)
             newest = newest if datagram is None else datagram
@@ -103,7 +103,7 @@ class UdpVehicleLink(AbstractLink):
         self._socket.close()
 
     def counts(self) -> dict[str, int]:
-        return {"sent": self._sent, "not sent": self._unsent, "another sender": self._others} | self._received.counts
+        return {"sent": self._sent, "not sent": self._unsent, "another sender": self._foreign} | self._received.counts
 
 
 class UdpVehicleServer:

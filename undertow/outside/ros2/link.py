@@ -140,7 +140,7 @@ class Link:
             raise BadInput("", "", f"no DDS participant could be made in domain {domain}: {error}", hint=hint) from None
         self._waiting: Any = WaitSet(self._participant)
         self._announced: Any = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
-        self._kept: list[Any] = []
+        self._dds_entities: list[Any] = []
         self._writers: list[DataWriter] = []
 
     def __enter__(self) -> "Link":
@@ -181,7 +181,7 @@ class Link:
         reader = DataReader(self._participant, self._topic(topic, kind), qos)
         condition = ReadCondition(reader, ViewState.Any | SampleState.NotRead | InstanceState.Any)
         self._waiting.attach(condition)
-        self._kept += [reader, condition]
+        self._dds_entities += [reader, condition]
         return Inlet(self, topic, reader)
 
     def wait(self, seconds: float) -> bool:
@@ -224,7 +224,7 @@ class Link:
             must = "be a name of ROS 2, such as /odom: letters, digits, underscores, and a slash before each part"
             raise BadInput("topic", must, repr(topic))
         dds_topic = Topic(self._participant, f"rt{topic}", kind, self._qos)
-        self._kept.append(dds_topic)
+        self._dds_entities.append(dds_topic)
         return dds_topic
 
 
