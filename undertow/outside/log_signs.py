@@ -50,6 +50,8 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
     if not np.isfinite(residuals).all():
         return ()
     mapped, without = (residuals[:2] ** 2).sum(axis=1)
+    # Effects of single thrusters, as mapped and turned. Over so short a time they nearly add up: the errors of all sets
+    # follow from them, and only the best ones are predicted again.
     as_mapped, turned = residuals[2:].reshape(2, number, -1) - residuals[1]
     to_turn = _best_set(residuals[1] + as_mapped.sum(axis=0), turned - as_mapped)
     if to_turn.any():

@@ -115,7 +115,9 @@ class CProgram:
         self._state, results = jax.eval_shape(system.start, system.inputs)
         self.fields = {"state": fields(self._state), "input": fields(system.inputs), "output": fields(results)}
         state_names, input_names, output_names = (places(struct, members) for struct, members in self.fields.items())
-        written_names, name = [*state_names, *output_names], system.name
+        name = system.name
+        # Both functions write state and output. Only the step reads the state, which nothing has set before the start.
+        written_names = [*state_names, *output_names]
         arguments = f"{name}_state *state, const {name}_input *input, {name}_output *output"
         step_inputs = (self._state, system.inputs)
         self._source.add(

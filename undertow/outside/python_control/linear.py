@@ -67,14 +67,22 @@ def linear_closed_loop(
         BadInput: as of `linear_controller`.
     """
     built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
-    point, signals = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
-    plant, law = _plant(built, point, True, all_states), _controller(built, point, all_states)
+    point = _equilibrium(built, position, load)
+    signals = signals_of(built.closed_loop.plant)
+    plant = _plant(built, point, True, all_states)
+    law = _controller(built, point, all_states)
+    # The inputs of the law are the measurement y, the reference r and the applied input u. Inside the limits u is the
+    # command, which does not depend on u itself: u = D_y C_plant x + C_law z + D_r r, with the states x and z.
     ends = np.cumsum([len(signals.measured), len(signals.desired)])
-    (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
-    u_x, shown_outputs = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
-    uncoupled = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
-    a, b = uncoupled + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
-    c, d = np.vstack([shown_outputs, u_x]), np.vstack([np.zeros((len(shown_outputs), len(signals.desired))), d_r])
+    b_y, b_r, b_u = np.split(law.B, ends, axis=1)
+    d_y, d_r, _ = np.split(law.D, ends, axis=1)
+    u_of_states = np.hstack([d_y @ plant.C, law.C])
+    y_of_states = np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
+    without_u = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
+    a = without_u + np.vstack([plant.B, b_u]) @ u_of_states
+    b = np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
+    c = np.vstack([y_of_states, u_of_states])
+    d = np.vstack([np.zeros((len(y_of_states), len(signals.desired))), d_r])
     outputs, states = signals.measured | signals.command, plant.state_labels + law.state_labels
     system = ct.ss(a, b, c, d, built.scenario.loop.dt)
     return _named(system, "closed_loop", signals.desired | outputs, list(signals.desired), list(outputs), states)

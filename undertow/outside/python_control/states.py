@@ -105,6 +105,8 @@ def _seen_of_group(system: StateSpaceMatrices, group: NDArray) -> NDArray:
     rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), np.finfo(float).tiny)
     unseen = _null_space(rows[:, group])
     a_group = system.a[np.ix_(group, group)]
+    # What nothing reads directly may be read later: directions that A turns into others are dropped, until A maps the
+    # rest into itself. That is the unobservable subspace of the group.
     while unseen.shape[1]:
         leaving = a_group @ unseen - unseen @ (unseen.T @ a_group @ unseen)
         stays = _null_space(leaving / max(np.abs(a_group).max(), np.finfo(float).tiny))

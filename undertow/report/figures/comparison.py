@@ -60,7 +60,8 @@ def differences_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
     """Difference of each candidate from the first one: a point per pair, and the median with its 95 % interval."""
     first, *candidates = findings.names
     metrics = _differing(dataset, findings)
-    rows, panel_height = -(-len(metrics) // _COLUMNS), 0.35 + 0.3 * len(candidates)
+    rows = -(-len(metrics) // _COLUMNS)
+    panel_height = 0.35 + 0.3 * len(candidates)
     left = min(2.4, 0.3 + 0.068 * max(map(len, candidates)))
     figure = style.blank(9.6, 0.45 + rows * (panel_height + 0.75))
     style.head(figure, f"Paired differences from {first}", {})
@@ -74,20 +75,16 @@ def differences_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
         panel.axvline(0.0, color=style.INK, linewidth=0.8)
         for position, name in enumerate(candidates):
             difference = next(difference for difference in findings.against(name, first) if difference.metric == metric)
-            look, scale = looks_of(findings.names)[name], for_people(1.0, findings.units[metric])[0]
+            look = looks_of(findings.names)[name]
+            scale = for_people(1.0, findings.units[metric])[0]
             differences = scale * (_values(dataset, findings, metric, name) - _values(dataset, findings, metric, first))
             differences = differences[np.isfinite(differences)]
             jittered = position + 0.28 * (chance.random(differences.size) - 0.5)
             panel.plot(differences, jittered, ".", color=look.colour, markersize=3, alpha=0.45)
-            panel.plot(
-                scale * difference.median, position, "D", color=look.colour, markersize=5, markeredgecolor="white"
-            )
-            panel.plot(
-                [scale * difference.low, scale * difference.high],
-                [position, position],
-                color=look.colour,
-                linewidth=2.2,
-            )
+            median = scale * difference.median
+            panel.plot(median, position, "D", color=look.colour, markersize=5, markeredgecolor="white")
+            interval = [scale * difference.low, scale * difference.high]
+            panel.plot(interval, [position, position], color=look.colour, linewidth=2.2)
         panel.set_ylim(len(candidates) - 0.4, -0.6)
         panel.set_yticks(range(len(candidates)), candidates if column == 0 else [""] * len(candidates))
         panel.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))

@@ -71,19 +71,14 @@ def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
     heights = [max(min(1.0, room / sum(heights)) * height, min(height, _LOWEST)) for height in heights]
     figure.set_size_inches(figure.get_size_inches()[0], key + sum(above) + sum(below) + sum(heights) + _GAP * len(rows))
     top = key
-    for row, margin_above, tall, margin_below in zip(rows, above, heights, below, strict=True):
+    for row, margin_above, panel_height, margin_below in zip(rows, above, heights, below, strict=True):
         for column, i in enumerate(row):
-            _move(
-                panels[i],
-                column * (left + panel_width + right + _GAP) + left + indents[i],
-                top + margin_above,
-                panel_width - indents[i],
-                tall,
-            )
+            panel_left = column * (left + panel_width + right + _GAP) + left + indents[i]
+            _move(panels[i], panel_left, top + margin_above, panel_width - indents[i], panel_height)
             if indents[i]:
                 panels[i].xaxis.label.set_horizontalalignment("right")
                 panels[i].xaxis.set_label_coords(1.0, 0.0, transform=_lifted(panels[i], -0.2))
-        top += margin_above + tall + margin_below + _GAP
+        top += margin_above + panel_height + margin_below + _GAP
     _key(figure, canvas)
     return figure
 

@@ -33,10 +33,8 @@ def _plot(panel: Axes, findings: Findings, front: Front) -> None:
     for name, look in looks_of(findings.names).items():
         if name not in front.points:
             continue
-        (x, *x_interval), (y, *y_interval) = (
-            scaled_medians(name, front.effort, scales[0][0]),
-            scaled_medians(name, front.error, scales[1][0]),
-        )
+        x, *x_interval = scaled_medians(name, front.effort, scales[0][0])
+        y, *y_interval = scaled_medians(name, front.error, scales[1][0])
         strong = name in front.front
         alpha, fill = (1.0 if strong else _PALE), ("white" if name in front.incomplete else look.colour)
         panel.plot(x_interval, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)

@@ -24,15 +24,8 @@ def tuning_figure(results: Mapping[str, Any]) -> Figure:
     panel.step(tried, costs, where="post", color=style.SOLID.colour, linewidth=style.SOLID.width)
     for name, look in (("train_cost", style.SOLID), ("held_out_cost", style.DASHED)):
         for evaluations, gains_name in ((0, "given"), (end, "tuned")):
-            panel.plot(
-                evaluations,
-                results["gains"][gains_name][name],
-                "o",
-                color=look.colour,
-                markersize=4,
-                clip_on=False,
-                zorder=5,
-            )
+            cost = results["gains"][gains_name][name]
+            panel.plot(evaluations, cost, "o", color=look.colour, markersize=4, clip_on=False, zorder=5)
     panel.set_xlim(0, end)
     style.label(panel, "evaluations", "cost")
     return figure
