@@ -66,7 +66,8 @@ def soak(command: SoakCommand) -> int:
     """Attack undertow itself; the exit code is 1 if there was a never-event."""
     if command.replay is not None:
         return _replayed(command.replay)
-    amounts, parts = soaking.SHORT if command.short else soaking.Amounts(), command.parts or []
+    amounts = soaking.SHORT if command.short else soaking.Amounts()
+    parts = command.parts or []
     for name in ("inputs", "kills", "hours", "faults", "links"):
         value = getattr(command, name)
         if value is not None:

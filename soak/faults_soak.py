@@ -157,7 +157,8 @@ def run_faulted(
         until: time of `time.monotonic` after which no further program begins.
         watch: called with the numbers of runs and of failures so far.
     """
-    began, all_programs = time.monotonic(), programs()
+    began = time.monotonic()
+    all_programs = programs()
     runs = sampled(number, seed, all_programs)
     endings: Counter[str] = Counter()
     states: Counter[str] = Counter()
@@ -178,7 +179,9 @@ def run_faulted(
         failures += _other_bytes(
             program, repeats, dict(zip((run.seed for run in runs_of_program), judged, strict=True)), seed
         )
-        done, compiled, repeated = done + len(runs_of_program), compiled + 1, repeated + len(repeats)
+        done += len(runs_of_program)
+        compiled += 1
+        repeated += len(repeats)
         watch(done, len(failures))
     seconds = time.monotonic() - began
     return Faulted(done, dict(endings), dict(states), dict(modes), compiled, repeated, failures, seconds)

@@ -86,7 +86,10 @@ def simulate_hours(
         until: time of `time.monotonic` after which no further loop begins.
         watch: called with the hours that are done.
     """
-    began, rows, failures, done = time.monotonic(), [], [], 0.0
+    began = time.monotonic()
+    rows = []
+    failures = []
+    done = 0.0
     hours_of_each_loop = hours / len(SCENARIOS)
     longest = min(LONGEST, hours_of_each_loop)
     number = max(1, round(hours_of_each_loop / longest))
@@ -112,7 +115,8 @@ def judged_run(run: Judged, identity: str, whole_day: bool) -> list[Failure]:
     if run.status is not Status.OK:
         failures.append(Failure("N3", identity, f"ended at {run.ended:.0f} s: {run.status.sentence}"))
     elif whole_day:
-        rms, weights = run.rms(), run.counts.weights
+        rms = run.rms()
+        weights = run.counts.weights
         first, last = _size(rms[0]), _size(rms[-1])
         if last / first - 1 > _CHANGE:  # less than at first is the weather
             failures.append(Failure("N4", identity, f"rms of the last hour {last:.4g} m, of the first {first:.4g} m"))

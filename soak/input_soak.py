@@ -54,7 +54,8 @@ class _Worker:
         self._process.start()
         sender.close()
         self.asked: tuple[str, int] | None = None
-        self.since, self._tried = time.monotonic(), 0
+        self.since = time.monotonic()
+        self._tried = 0
 
     def ask(self, task: tuple[str, int]) -> None:
         """Let it try an input."""
@@ -105,10 +106,13 @@ def try_inputs(
         until: time of `time.monotonic` after which no more are tried.
         watch: called with the numbers of inputs and failures so far.
     """
-    began, tasks = time.monotonic(), iter(planned(number))
+    began = time.monotonic()
+    tasks = iter(planned(number))
     counts: dict[str, Counter[str]] = {}
     failures: list[tuple[Failure, Attack]] = []
-    slowest, messages, total = 0.0, set(), 0
+    slowest = 0.0
+    messages = set()
+    total = 0
     processes = [_Worker(run, seed, material, folder / f"w{i}") for i in range(workers)]
     try:
         for hostile_input, outcome in _answers(processes, tasks, seed, material, until):

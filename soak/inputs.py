@@ -156,7 +156,8 @@ def _store(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[s
         f"out/{name.removeprefix('store/')}": data for name, data in material.items() if name.startswith("store/")
     }
     for _ in range(chance.choice((1, 1, 2, 5))):
-        name, draw = chance.choice(sorted(store)), chance.random()
+        name = chance.choice(sorted(store))
+        draw = chance.random()
         if draw < 0.5:
             store[name] = spoilt_bytes(store[name] or b"", chance)
         elif draw < 0.75 and len(store) > 1:

@@ -56,7 +56,8 @@ class Judged(NamedTuple):
 
     def events(self) -> list[tuple[str, str]]:
         """Never-events of the run, and what happened in each."""
-        counts, events = self.counts, []
+        counts = self.counts
+        events = []
         if counts.undefined_inputs > 0:
             events.append(("N1", f"an input that is not finite at {int(counts.undefined_inputs)} steps"))
         if counts.exceeded_limits > 0:

@@ -70,7 +70,8 @@ def kill_campaigns(
         until: time of `time.monotonic` after which no further campaign begins.
         watch: called with the number of kills.
     """
-    began, chance = time.monotonic(), random.Random(f"kills/{seed}")
+    began = time.monotonic()
+    chance = random.Random(f"kills/{seed}")
     path = folder / "c.yaml"
     data = load(specimens.CAMPAIGN, "", "")[0] | {"trials": trials, "chunk": 5}
     path.write_text(dump(data), encoding="utf-8")
@@ -84,7 +85,8 @@ def kill_campaigns(
     campaigns = 0
     while sabotage.kills < kills and time.monotonic() < until:
         campaigns += 1
-        identity, out = f"kills/{seed}/{campaigns}", folder / "killed"
+        identity = f"kills/{seed}/{campaigns}"
+        out = folder / "killed"
         for event, message in sabotage.one_campaign(out, kills, watch):
             failures.append(Failure(event, identity, message))
         contents = _contents(out)
@@ -130,7 +132,8 @@ class _Sabotage:
 
     def _kill(self, process: subprocess.Popen, out: Path) -> int | None:
         """End a process some time after its store grew; how it ended, None where it ended by itself."""
-        before, began = _size(out), time.monotonic()
+        before = _size(out)
+        began = time.monotonic()
         while _size(out) == before and process.poll() is None and time.monotonic() - began < _LATEST:
             time.sleep(0.01)
         if self._chance.random() < _SECOND and process.poll() is None:
@@ -160,7 +163,8 @@ class _Sabotage:
             return
         self.damaged += 1
         chunk = self._chance.choice(chunks)
-        data, draw = bytearray(chunk.read_bytes()), self._chance.random()
+        data = bytearray(chunk.read_bytes())
+        draw = self._chance.random()
         if draw < 0.4 and data:
             data[self._chance.randrange(len(data))] ^= 1 << self._chance.randrange(8)
             chunk.write_bytes(bytes(data))

@@ -75,10 +75,12 @@ def attack_links(
         until: time of `time.monotonic` after which no further run begins.
         watch: called with the number of runs that are done, by link, and the never-events of the last ones.
     """
-    began, left_out = time.monotonic(), {}
+    began = time.monotonic()
+    left_out = {}
     runs: dict[str, list[LinkRun]] = {}
     pipes: dict[Any, str] = {}
-    processes, context = [], multiprocessing.get_context("spawn")
+    processes = []
+    context = multiprocessing.get_context("spawn")
     for link in links:
         if missing := [package for package in _PACKAGES.get(link, ()) if importlib.util.find_spec(package) is None]:
             left_out[link] = f"{missing[0]} is not installed"
@@ -161,12 +163,15 @@ def _runner(link: str, command: CommandProcess, folder: Path, seed: int) -> Runn
     scenario.write_text(SCENARIO, encoding="utf-8")
     if link == "ardupilot":
         return ArdupilotRunner(command, scenario).run
-    vehicle, log = DrivenVehicle(scenario), None
+    vehicle = DrivenVehicle(scenario)
+    log = None
     if link == "run":
-        peer, log = UdpPeer(str(folder / "out")), folder / "out" / "run.mcap"
+        peer = UdpPeer(str(folder / "out"))
+        log = folder / "out" / "run.mcap"
     elif link == "ros2":
         domain = random.Random(f"{seed}/{os.getpid()}").choice(_DOMAINS)
-        peer, log = Ros2Peer(domain, str(folder / "bag")), folder / "bag"
+        peer = Ros2Peer(domain, str(folder / "bag"))
+        log = folder / "bag"
     else:
         peer = MavlinkPeer(vehicle.vehicle, _OUTPUTS[link])
     return LinkRunner(command, peer, vehicle, scenario, log, stops_itself=link == "ros2").run

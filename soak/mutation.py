@@ -158,7 +158,8 @@ def _places(node: Any, path: Path_ = ()) -> Iterator[Path_]:
 
 def _misspelt(word: str, chance: random.Random) -> str:
     position = chance.randrange(len(word) + 1)
-    left, right = word[:position], word[position:]
+    left = word[:position]
+    right = word[position:]
     swapped = left[:-1] + right[:1] + left[-1:] + right[1:]
     return chance.choice(
         (left + right[1:], left + "e" + right, swapped, word.upper(), word + " ", word.replace("_", ""))
@@ -225,7 +226,8 @@ def spoilt_bytes(data: bytes, chance: random.Random) -> bytes:
     """Bytes with what a disk, a cable or another program does to them."""
     if not data:
         return data
-    spoilt, draw = bytearray(data), chance.random()
+    spoilt = bytearray(data)
+    draw = chance.random()
     position = chance.randrange(len(data))
     if draw < 0.4:
         for _ in range(chance.choice((1, 1, 2, 8, 60))):
@@ -252,7 +254,8 @@ def spoilt_words(words: list[str], chance: random.Random) -> list[str]:
     """A command line with a word misspelt, removed, doubled, replaced or added."""
     spoilt = list(words)
     for _ in range(chance.choice((1, 1, 2))):
-        position, draw = chance.randrange(len(spoilt) + 1), chance.random()
+        position = chance.randrange(len(spoilt) + 1)
+        draw = chance.random()
         inside = min(position, len(spoilt) - 1)
         if draw < 0.3 and spoilt:
             spoilt[inside] = _misspelt(spoilt[inside], chance)

@@ -40,10 +40,12 @@ class ArdupilotRunner:
 
     def run(self, plan: Plan) -> LinkRun:
         """What happens by a plan."""
-        self._chance, self._plan = random.Random(plan.seed), plan
+        self._chance = random.Random(plan.seed)
+        self._plan = plan
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle_socket:
             port = free_port()
-            self._address, self._socket = ("127.0.0.1", port), vehicle_socket
+            self._address = ("127.0.0.1", port)
+            self._socket = vehicle_socket
             self._command.begin(["ardupilot", str(self._scenario), "--port", str(port)], plan.disk)
             failures = self._talk() if self._begins() else [("N3", "the physics did not begin")]
             ended_at = time.monotonic()
@@ -61,9 +63,11 @@ class ArdupilotRunner:
     def _talk(self) -> list[tuple[str, str]]:
         """Frames until the end of the plan; never-events."""
         failures: list[tuple[str, str]] = []
-        sent, before = [self._packet(0)], 0.0
+        sent = [self._packet(0)]
+        before = 0.0
         for step in range(1, self._plan.last):
-            frame_start, packet = time.monotonic(), self._packet(step)
+            frame_start = time.monotonic()
+            packet = self._packet(step)
             now = [event for event in self._plan.events if event.covers(step)]
             for kind in sorted({_OLD if event.kind in _OLD_KINDS else event.kind for event in now}):
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
@@ -140,7 +144,8 @@ class ArdupilotRunner:
         if ending in ("stop", "silence"):
             time.sleep(STATED[ending])
             self._command.send(signal.SIGKILL if ending == "stop" else signal.SIGTERM)
-        self._code, self._ended_at = self._command.wait(), time.monotonic()
+        self._code = self._command.wait()
+        self._ended_at = time.monotonic()
         printed = self._command.printed()
         if self._code is None:
             self._command.kill()

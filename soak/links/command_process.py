@@ -27,7 +27,8 @@ class CommandProcess:
     """
 
     def __init__(self, run: Run, folder: Path):
-        self._run, self._printed = run, folder / "printed.txt"
+        self._run = run
+        self._printed = folder / "printed.txt"
         self._process: Any = None
 
     def begin(self, arguments: Sequence[str], disk: int | None = None) -> None:

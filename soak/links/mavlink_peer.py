@@ -41,7 +41,8 @@ class MavlinkPeer(AbstractPeer):
         self._foreign_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def begin(self, chance: random.Random) -> None:
-        self._chance, self._alive_at = chance, -np.inf
+        self._chance = chance
+        self._alive_at = -np.inf
         self._wire = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._camera = mavlink.MAVLink(None, srcSystem=1, srcComponent=_CAMERA)
         self._pulses = np.full(16, _NEUTRAL)

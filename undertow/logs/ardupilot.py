@@ -90,7 +90,9 @@ def read_ardupilot(path: Path) -> Recording:
     data = path.read_bytes()
     if not data.startswith(_HEAD):
         raise BadInput("log", "be a .bin file of ArduPilot", f"{path.name}, which does not begin like one")
-    scan, tables, parameters = _scanned(data), {}, {}
+    scan = _scanned(data)
+    tables = {}
+    parameters = {}
     for kind, places in scan.places.items():
         if kind.fields.names is None or kind.fields.names[0] != "TimeUS":
             continue
@@ -118,7 +120,9 @@ def _parameters(kind: _Kind, rows: np.ndarray) -> dict[str, float]:
 
 def _scanned(data: bytes) -> _Scan:
     assert _OF_FMT is not None
-    kinds, places, numbered = {_FMT: _OF_FMT}, {}, dict(_NUMBERED)
+    kinds = {_FMT: _OF_FMT}
+    places = {}
+    numbered = dict(_NUMBERED)
     offset = lost = 0
     while offset < len(data):
         kind = kinds.get(data[offset + 2]) if data[offset : offset + 2] == _HEAD and offset + 2 < len(data) else None
@@ -153,7 +157,8 @@ def _number(data: bytes, offset: int, kind: _Kind, kinds: dict[int, _Kind], numb
     fields = np.frombuffer(data, kind.fields, 1, offset + 3)[0]
     if not {"FmtType", "UnitIds"} <= set(kind.fields.names or ()):
         return
-    about, units = kinds.get(int(fields["FmtType"])), bytes(fields["UnitIds"])
+    about = kinds.get(int(fields["FmtType"]))
+    units = bytes(fields["UnitIds"])
     index = units.find(b"#")
     if about is not None and about.fields.names and 0 <= index < len(about.fields.names):
         numbered[about.name] = about.fields.names[index]

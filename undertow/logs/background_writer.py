@@ -48,7 +48,8 @@ class BackgroundWriter:
     """
 
     def __init__(self, start: Callable[[], Recorder], capacity: int = CAPACITY):
-        self._start, self._entries = start, queue.Queue[Any](capacity)
+        self._start = start
+        self._entries = queue.Queue[Any](capacity)
         self.dropped, self.failure = 0, ""
         self._refused: list[BaseException] = []
         self._started = threading.Event()

@@ -40,7 +40,8 @@ def read_csv(path: Path) -> Log | Recording:
 
 
 def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray, notes: tuple[str, ...]) -> Log:
-    times, columns_by_signal = numbers[:, 0], {}
+    times = numbers[:, 0]
+    columns_by_signal = {}
     for i, name in enumerate(header[1:], start=1):
         match = _OURS.fullmatch(name)
         assert match is not None, "`read_csv` has looked"
@@ -63,7 +64,8 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str]
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput("log", "be a CSV text file", f"{path.name}: {error.reason} at byte {error.start}") from None
-    lines, notes = text.splitlines(), ()
+    lines = text.splitlines()
+    notes = ()
     if text.startswith(TIME) and "\r\n" in text and not text.endswith(("\r", "\n")):
         lines, notes = lines[:-1], (f"the file ends early, within line {len(lines)}, which is left out",)
     try:

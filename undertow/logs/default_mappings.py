@@ -132,10 +132,12 @@ def usual_mapping(recording: Recording) -> tuple[LogMapping, tuple[str, ...]]:
     mapping = DEFAULTS.get(recording.format, LogMapping({}))
     if recording.format not in ("ArduPilot", "MAVLink"):
         return mapping, ()
-    signals, notes = dict(mapping.signals), []
+    signals = dict(mapping.signals)
+    notes = []
     if recording.format == "ArduPilot":
         entries, note = _depth(recording)
-        signals["depth"], notes = entries + signals["depth"], [note] if note else []
+        signals["depth"] = entries + signals["depth"]
+        notes = [note] if note else []
     entries, note = _pulses(recording)
     signals["pulses"] = entries + signals["pulses"]
     return mapping._replace(signals=signals), tuple(notes + [note] if note else notes)

@@ -101,7 +101,8 @@ class LogSignals:
     def sampling(self, name: str) -> SamplingStatistics:
         """How a signal was sampled."""
         series = self[name]
-        time, steps = series.time, np.diff(series.time)
+        time = series.time
+        steps = np.diff(series.time)
         median = float(np.median(steps)) if steps.size else np.nan
         gaps = steps[steps > _GAP * median]
         numbers = np.asarray(series.values, dtype=float)

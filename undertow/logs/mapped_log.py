@@ -19,7 +19,8 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
     Raises:
         BadInput: a topic or a column is missing, a time does not increase, or a frame is not the one named.
     """
-    notes, signals = list(recording.notes), {}
+    notes = list(recording.notes)
+    signals = {}
     for name, entries in mapping.signals.items():
         with within("signals"), within(name):
             entries = tuple(_with_motors(entry, recording) for entry in entries)
@@ -110,17 +111,22 @@ def _series(
     name: str, entry: SignalMapping, topic: str, table: TopicMessages, recording: Recording
 ) -> tuple[str, Series]:
     """A signal in our unit and frame, and its name: quaternions become an attitude."""
-    signal, source = SIGNALS[name], recording.source
+    signal = SIGNALS[name]
+    source = recording.source
     columns = [np.asarray(_column(table, column, source), dtype=float) for column in entry.columns]
     values = factor_of(name, entry) * _signed(np.stack(columns, axis=1), entry, signal)
-    unit, ours, titles = signal.unit, name, signal.columns
+    unit = signal.unit
+    ours = name
+    titles = signal.columns
     if signal.columns == ("thruster",):
         titles = motor_columns(entry.motors) if entry.motors else thruster_columns(len(columns))
         unit = "N" if entry.unit == "N" else unit
         if name in INPUTS and entry.supply is not None:
             values = volts(values, entry, entry.supply)
     elif signal.kind == "quaternion":
-        ours, unit, titles = "attitude", "rad", SIGNALS["attitude"].columns
+        ours = "attitude"
+        unit = "rad"
+        titles = SIGNALS["attitude"].columns
         values = frames.attitudes_of_quaternions(values, *entry.frame)
     else:
         values = _in_our_frame(values, signal, entry.frame)

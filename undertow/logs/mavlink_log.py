@@ -94,7 +94,8 @@ def _dialect() -> Any:
 
 def _scanned(data: bytes, names: Collection[str]) -> _Scan:
     dialect = _dialect()
-    decoder, types = dialect.MAVLink(None), dialect.mavlink_map
+    decoder = dialect.MAVLink(None)
+    types = dialect.mavlink_map
     scan = _Scan({}, {}, Counter(), 0, 0)
     offset = lost = damaged_times = 0
     before = None
@@ -114,7 +115,8 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
             before = time
             _add(scan, name, frame._replace(time=time), message)
         elif not size or not _begins(data, offset + size):
-            size, lost = 1, lost + 1
+            size = 1
+            lost += 1
         elif not name:  # damaged, or of another dialect
             lost += size
         offset += size

@@ -72,7 +72,8 @@ def read_mcap(path: Path) -> Log | Recording:
 
 
 def _our_log(path: Path, contents: _Contents) -> Log:
-    facts, signals = dict(contents.facts), {}
+    facts = dict(contents.facts)
+    signals = {}
     for topic, messages in contents.ours.items():
         try:
             signals |= signals_of(contents.schemas[topic][1], messages)
@@ -155,8 +156,10 @@ def records(path: Path, notes: list[str]) -> Iterator[Any]:
     from mcap.stream_reader import StreamReader
 
     data = path.read_bytes()
-    size, stream = len(data), io.BytesIO(_without_zeros(path, data))
-    unpacked, most = 0, most_unpacked(size)
+    size = len(data)
+    stream = io.BytesIO(_without_zeros(path, data))
+    unpacked = 0
+    most = most_unpacked(size)
     end = stream.getbuffer().nbytes
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST)
     records = iter(reader.records)

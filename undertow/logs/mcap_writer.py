@@ -33,7 +33,9 @@ class _Writer:
     def __init__(self, stream: IO[bytes], chunk: int, facts: Mapping[str, str]):
         from mcap.writer import Writer
 
-        self._stream, self._writer, self._ids = stream, Writer(stream, chunk_size=chunk), {}
+        self._stream = stream
+        self._writer = Writer(stream, chunk_size=chunk)
+        self._ids = {}
         self._writer.start(profile="", library="undertow")
         self._writer.add_metadata(METADATA, {key: str(value) for key, value in facts.items()})
 
@@ -164,7 +166,8 @@ class LiveLog:
                 (self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(signals_of_topic))
             )
         self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
-        self._pose, self._begun = _pose_names(signals), False
+        self._pose = _pose_names(signals)
+        self._begun = False
 
     def write(self, entry: tuple[float, Mapping[str, Any]]) -> None:
         """Write one step: its time, s, and the values of all signals by name."""

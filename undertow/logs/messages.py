@@ -56,7 +56,8 @@ class MessageForm:
     """
 
     def __init__(self, group: str, signals: Mapping[str, Series]):
-        self.schema_name, self._signals = _OUR_SCHEMA + group, dict(signals)
+        self.schema_name = _OUR_SCHEMA + group
+        self._signals = dict(signals)
         parts = ", ".join(f"{_key(name)}: {_template(series)}" for name, series in signals.items())
         self._template = '{"time": %r, ' + parts + "}"
 
@@ -146,7 +147,8 @@ def signals_of(schema: Mapping[str, Any], messages: list[Mapping[str, Any]]) -> 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: the messages have another form.
     """
-    time, signals = np.array([number(message["time"]) for message in messages]), {}
+    time = np.array([number(message["time"]) for message in messages])
+    signals = {}
     for name, signal_schema in schema["properties"].items():
         if name == "time":
             continue

@@ -83,7 +83,8 @@ class _Topics:
     def __init__(self, names: Collection[str]):
         self.fields: dict[str, MessageFields] = {}
         self.place = "at its beginning"
-        self._names, self._decoder = names, Decoder()
+        self._names = names
+        self._decoder = Decoder()
         self._errors: dict[str, list[str]] = {}  # of each topic and type
 
     def requested(self, topic: str, kind: str) -> bool:

@@ -71,7 +71,8 @@ def predict(
         limited: whether the inputs are commands, which the vehicle limits, rather than what was applied.
         factors: on the input of each thruster, a row per variant.
     """
-    plant, loop = vehicle_of(built), built.scenario.loop
+    plant = vehicle_of(built)
+    loop = built.scenario.loop
     before = round(RUN_IN / loop.dt)
     times = starts[:, None] + loop.dt * np.arange(-before, steps)
     with on_processor():
@@ -160,7 +161,8 @@ def _predicted(
 ):
     """Outputs and body velocity after every stride of each window, with each row of factors on the inputs."""
     before, stride, method, substeps = settings
-    plant, integrate = realization.loop.plant, METHODS[method]
+    plant = realization.loop.plant
+    integrate = METHODS[method]
 
     def step(x: VehicleState, time_and_input: tuple[Any, Inputs]):
         t, u = time_and_input

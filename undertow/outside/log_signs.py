@@ -32,7 +32,8 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
         inputs: of the thrusters.
         limited: as in `predict`.
     """
-    dt, number = built.scenario.loop.dt, inputs.values.shape[1]
+    dt = built.scenario.loop.dt
+    number = inputs.values.shape[1]
     steps = max(1, round(_HORIZON / dt))
     starts = starts_of(motion, inputs, dt * steps, _HORIZON)
     if 6 * len(starts) < 4 * number:  # too few numbers to tell sets of thrusters apart

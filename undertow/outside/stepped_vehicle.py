@@ -138,7 +138,8 @@ def _state_of(realization: Realization, t, x: VehicleState, u: Inputs) -> Vehicl
     pose = plant.pose(x)
     acceleration = plant.acceleration(t, x, u, realization.load(t, x))[:3]
     force = matvec(pose.rotation.T, acceleration - as_array((0.0, 0.0, STANDARD_GRAVITY)))
-    report, battery = plant.thruster.report(x.thrusters), plant.power.battery
+    report = plant.thruster.report(x.thrusters)
+    battery = plant.power.battery
     electrical = ()
     if battery is not None:
         power = plant.thruster.electrical_power(x.thrusters, u).sum()

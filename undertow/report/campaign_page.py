@@ -118,7 +118,8 @@ def _how(summary: Mapping[str, Any]) -> Html:
 
 def _plots(results: Results, summary: Mapping[str, Any]) -> Plots:
     """What makes each figure; nothing where there is nothing to sample."""
-    values, units = _values(results, summary), {name: _people(results, name)[1] for name in results.metrics}
+    values = _values(results, summary)
+    units = {name: _people(results, name)[1] for name in results.metrics}
     varied = sum(key in results.campaign.vary for key in summary["sensitivity"])
     ran = {
         named(combination): combination["trials"] - combination["invalid"] for combination in summary["combinations"]
@@ -223,7 +224,8 @@ def distributions(results: Results, summary: Mapping[str, Any]) -> Html:
 
 def by_choice(results: Results, summary: Mapping[str, Any]) -> list[Html]:
     """For each choice, a table of the median and the 5 % to 95 % range."""
-    tables, metrics = [], [*results.tracking, "input_rms"]
+    tables = []
+    metrics = [*results.tracking, "input_rms"]
     for key, entries in summary["choices"].items():
         rows = []
         for word, statistics in entries.items():
@@ -238,7 +240,8 @@ def worst(results: Results, summary: Mapping[str, Any]) -> Html:
     """The worst trials with their sampled values."""
     rows = []
     for trial in summary["worst"]:
-        row, swept = results.rows.sel(trial=trial), results.swept(trial)
+        row = results.rows.sel(trial=trial)
+        swept = results.swept(trial)
         sampled = [
             number(value, _DIGITS) if isinstance(value, float) else value for value in results.sampled(trial).values()
         ]
@@ -255,7 +258,8 @@ def worst(results: Results, summary: Mapping[str, Any]) -> Html:
 
 def asked(results: Results) -> list[Html]:
     """The configuration: sampling, versions and the campaign file."""
-    campaign, attributes = results.campaign, results.rows.attrs
+    campaign = results.campaign
+    attributes = results.rows.attrs
     rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
     rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.axes.items()]
     sampling = f"{campaign.trials} samples ({campaign.design}), seed {campaign.seed}"

@@ -145,7 +145,8 @@ def outcome(words: str, completed: bool, within: bool | None) -> Html:
 
 def ending(entry: Mapping[str, Any]) -> str:
     """Status of a run, with the time if it ended early."""
-    word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
+    word = str(entry.get("status", "completed")).replace("_", " ")
+    when = entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
 
 

@@ -101,7 +101,8 @@ def _points(prediction: Prediction) -> PredictionTable:
 
 
 def _margins(prediction: Prediction) -> PredictionTable:
-    margins, dt = prediction.margins, prediction.operating_point.linear.dt
+    margins = prediction.margins
+    dt = prediction.operating_point.linear.dt
     rows = [
         ("sampling limit at these gains", _time(margins["sampling_time"]), f"sampling time {_time(dt)}"),
         ("delay margin, controller to actuators", _time(margins["delay"]), "beyond the nominal model"),
@@ -131,7 +132,8 @@ _SHOWN = (0.1, 1.0, 10.0)  # rad/s
 
 
 def _errors(prediction: Prediction) -> PredictionTable:
-    frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
+    frequency = prediction.frequency
+    names = prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
         error, estimation = prediction.error[:, i], prediction.estimation[:, i]
@@ -154,7 +156,8 @@ def _errors(prediction: Prediction) -> PredictionTable:
 
 
 def _noise(prediction: Prediction) -> PredictionTable:
-    noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
+    noise = prediction.noise
+    unit = prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [
         (f"input, {unit}, for 1 cm/s or 0.01 rad/s of noise", _number(0.01 * noise.of_input.max())),
         ("estimate, m/s^2 or rad/s^2, for the same noise", _number(0.01 * noise.of_estimate.max())),
@@ -181,8 +184,10 @@ def _closed_forms(prediction: Prediction) -> PredictionTable:
 
 
 def _authority(prediction: Prediction) -> PredictionTable:
-    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
-    force, most = force_label(plant).replace("force", "", 1), int(authority.demand.argmax())
+    authority = prediction.authority
+    plant = prediction.operating_point.built.closed_loop.plant
+    force = force_label(plant).replace("force", "", 1)
+    most = int(authority.demand.argmax())
     finite = np.isfinite(authority.high).any()
     rows = [
         ("share of the time in which the demand is met", _percent(authority.held)),

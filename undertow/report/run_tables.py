@@ -102,7 +102,8 @@ def fault_rows(faults: Sequence[Mapping[str, Any]], inputs: Sequence[str]) -> Ru
     seconds = lambda value: f"{value:g} s" if isinstance(value, int | float) else f"{value[0]:g} to {value[1]:g} s"
     rows: list[tuple[str | float, ...]] = []
     for fault in faults:
-        target, number = fault["target"], fault.get("number", "")
+        target = fault["target"]
+        number = fault.get("number", "")
         if target == "thruster" and isinstance(number, int):
             number = inputs[number - 1]
         target = f"{target} {number}".rstrip()

@@ -49,12 +49,16 @@ class Session:
     """
 
     def __init__(self, vehicle: SteppedVehicle, channels: Channels):
-        self.vehicle, self._channels, self._depth = vehicle, channels, vehicle.depth or 0.0
+        self.vehicle = vehicle
+        self._channels = channels
+        self._depth = vehicle.depth or 0.0
         self._neutral = float(vehicle.esc.neutral)
         self.counts = dict.fromkeys(_COUNTS, 0)
         self.complaint, self.ended, self.frame_rate, self.undriven = "", False, 0, 0
         self.sender: Any = None
-        self._last, self._received, self._answer = -1, -np.inf, b""
+        self._last = -1
+        self._received = -np.inf
+        self._answer = b""
         self._smaller: int | None = None  # frame count that was smaller than the last one
 
     def answer(self, datagram: bytes, sender: Any, now: float) -> bytes | None:
@@ -84,7 +88,9 @@ class Session:
                 self.counts["late"] += 1
                 return None
         self._smaller = None
-        previous_sender, self.sender, self._received = self.sender, sender, now
+        previous_sender = self.sender
+        self.sender = sender
+        self._received = now
         if packet.frame_count == self._last and not from_another:
             self.counts["repeated"] += 1
             return self._answer

@@ -110,7 +110,10 @@ class Autopilot(Uncopied):
         checks.positive("blend", blend, "s")
         form = Format(attitude, velocity)
         form.check()
-        self._loop, self.precision, self.sampling_time, self._blend = loop, precision, float(period), float(blend)
+        self._loop = loop
+        self.precision = precision
+        self.sampling_time = float(period)
+        self._blend = float(blend)
         conversion = output_of(output, loop.plant, loop.controller, esc)
         self.unit, self.plant = conversion.unit, loop.plant
         with runtime.on_processor(), runtime.in_precision(precision):
@@ -365,7 +368,8 @@ class Autopilot(Uncopied):
         """
         self._check_started("request")
         checks.choice("request", what, tuple(known_request.name.lower() for known_request in Request))
-        supervised, request = self._supervised("request"), Request[what.upper()]
+        supervised = self._supervised("request")
+        request = Request[what.upper()]
         supervised.request[...] = int(request)
         if request is Request.RUN:
             supervised.place.held[...] = 0
@@ -480,7 +484,8 @@ class Autopilot(Uncopied):
     def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
         low, high, most = transfer(self._loop.controller)
-        begun, command = np.clip(applied, low, high), self._go_on.outputs.command
+        begun = np.clip(applied, low, high)
+        command = self._go_on.outputs.command
         beyond = begun - command
         supervised.beyond[...] = beyond - np.clip(beyond, -most, most)
         command[...] += supervised.beyond
@@ -518,7 +523,8 @@ def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tupl
     """Closed loop, precision and sampling time of what an autopilot is made from."""
     if isinstance(scenario, ClosedLoop):
         return scenario, "float64", None
-    built, placed = scenario, isinstance(scenario, Built)
+    built = scenario
+    placed = isinstance(scenario, Built)
     if not isinstance(built, Built):
         built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
     if built.scenario.loop.kind != "sampled":

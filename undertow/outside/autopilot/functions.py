@@ -44,7 +44,9 @@ class Functions:
     """
 
     def __init__(self, loop: ClosedLoop, form: Format, output: Output):
-        self.controller, self.output, self.reference = loop.controller, output, loop.reference
+        self.controller = loop.controller
+        self.output = output
+        self.reference = loop.reference
         truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
         self.form = None if truth.body is None else form
         kind = jax.dtypes.canonicalize_dtype(float)
@@ -78,7 +80,8 @@ def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
         return np.ones(loop.plant.inputs(), dtype=jax.dtypes.canonicalize_dtype(float))
     if loop.faults is None:
         return None
-    faults, key = loop.faults, key_of_seed(0)
+    faults = loop.faults
+    key = key_of_seed(0)
 
     def health(truth: Measurement):
         realization = faults.realize(key)

@@ -67,10 +67,12 @@ class NavigationFilter(Uncopied):
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
         self.sampling_time = built.scenario.loop.dt
-        self._clock, self._started = StepClock(self.sampling_time), np.zeros((), dtype=bool)
+        self._clock = StepClock(self.sampling_time)
+        self._started = np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))
-        declared, values = self.declared_signals(), self._go_on.outputs.signals
+        declared = self.declared_signals()
+        values = self._go_on.outputs.signals
         make_log = lambda path: StepLog(path, filter_signals(declared, values), self.sampling_time, self)
         self._log = None if log is None else make_log(log)
 
@@ -80,7 +82,9 @@ class NavigationFilter(Uncopied):
             self._log.close()
 
     def _compile(self, functions: FilterFunctions) -> None:
-        self.sensors, self._delays, self._signals = functions.sensors, functions.delays, functions.filter.signals()
+        self.sensors = functions.sensors
+        self._delays = functions.delays
+        self._signals = functions.filter.signals()
         self._begin = step_of(
             lambda navigation, _, pose: ((), functions.first(navigation, pose)), functions.filter, (), functions.pose
         )

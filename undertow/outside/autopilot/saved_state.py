@@ -29,10 +29,12 @@ def unpacked(state: Any, identity: bytes, like: Sequence[np.ndarray]) -> list[np
     """
     if not isinstance(state, bytes | bytearray | memoryview):
         raise BadInput("state", "be the bytes that `save` gives", f"a {type(state).__name__}")
-    data, header_size = bytes(state), len(_MAGIC) + _HASH
+    data = bytes(state)
+    header_size = len(_MAGIC) + _HASH
     if not data.startswith(_MAGIC):
         raise BadInput("state", "be the bytes that `save` gives", f"{len(data)} other bytes")
-    content, checksum = data[:-_SUM], data[-_SUM:]
+    content = data[:-_SUM]
+    checksum = data[-_SUM:]
     if zlib.crc32(content).to_bytes(_SUM, "little") != checksum:
         raise BadInput("state", "be undamaged", "damaged: its checksum is wrong")
     sizes = [array.nbytes for array in like]

@@ -107,7 +107,9 @@ class StepLog:
     ):
         path = _free(Path(path))
         self.path = path
-        self._period, self._offset, self._last = period, 0.0, -np.inf
+        self._period = period
+        self._offset = 0.0
+        self._last = -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
         facts = {"sampling_time": f"{period!r} s"} | dict(facts or {})
@@ -164,11 +166,13 @@ def law_signals(
         declared: signals of the law.
         values: examples of them.
     """
-    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    outputs = plant.outputs
+    inputs = thruster_columns(plant.inputs())
     axes = law.model.coordinates.axes or outputs
     series = {}
     for name, signal in (_STEPS | dict(declared)).items():
-        ours, first = name in _STEPS, next(iter(signal.dimensions), "")
+        ours = name in _STEPS
+        first = next(iter(signal.dimensions), "")
         shape = (len(inputs if first == "actuator" else outputs),) if ours else np.shape(values[name])
         columns = {"axis": outputs if ours else axes, "actuator": inputs}.get(first, ())
         unit = signal.unit_for(plant.output_units, plant.input_unit)
@@ -184,7 +188,8 @@ def received_signals(plant: AbstractPlant, form: Format | None, numbers: Mapping
         form: of the measured motion; None for a plant that is no vehicle.
         numbers: examples, of `ReceivedStep.numbers`.
     """
-    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    outputs = plant.outputs
+    inputs = thruster_columns(plant.inputs())
     names = MeasuredMotion(outputs, (), outputs) if form is None else form.columns()
     columns = {
         f"received_{name}": column_names for name, column_names in zip(MeasuredMotion._fields, names, strict=True)

@@ -145,14 +145,17 @@ class Vehicle(Uncopied):
         built = scenario
         if not isinstance(built, Built):
             built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
-        settings, self._loop = built.scenario.loop, built.closed_loop
+        settings = built.scenario.loop
+        self._loop = built.closed_loop
         self.sampling_time = float(settings.dt if sampling_time is None else sampling_time)
         self.duration = float(settings.duration)
         self.plant, self.esc, self.unit = self._loop.plant, None, self._loop.plant.input_unit
         if command == "pulses":
             driven = pulse_driven(self.plant, battery_suffices=True)
-            self.esc, self.unit = esc or driven.power.esc or usual_esc(), "us"
-        self.thrusters, self.precision = self.plant.inputs(), built.scenario.precision
+            self.esc = esc or driven.power.esc or usual_esc()
+            self.unit = "us"
+        self.thrusters = self.plant.inputs()
+        self.precision = built.scenario.precision
         self._integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
         self._substeps = settings.substeps
         with runtime.on_processor(), runtime.in_precision(self.precision):
@@ -180,7 +183,8 @@ class Vehicle(Uncopied):
 
     def _next(self, realization_and_esc: tuple[Realization, ESC | None], state: PlantState, step_inputs: _Given):
         realization, speed_controllers = realization_and_esc
-        plant, t = realization.loop.plant, step_inputs.t
+        plant = realization.loop.plant
+        t = step_inputs.t
         if speed_controllers is None:
             applied = plant.admissible(state.plant, step_inputs.command)
         else:
@@ -196,7 +200,8 @@ class Vehicle(Uncopied):
         return new, self._shown(observation._replace(status=status), before, step_inputs.dt)
 
     def _shown(self, observation: PlantObservation, before: Measurement, dt: Any) -> _Shown:
-        truth, force = observation.truth, ()
+        truth = observation.truth
+        force = ()
         if self._form is not None:
             force = motion_of(truth, before.velocity[:3], dt).specific_force
         measured, true = (motion_in(self._form, motion) for motion in (observation.measurement, truth))

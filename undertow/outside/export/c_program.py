@@ -83,7 +83,8 @@ class Exported(NamedTuple):
         """
         existing = [name for name in self.files if (folder / name).exists()]
         if existing and not overwrite:
-            must, got = "be a folder without the files of an export", f"one with {existing[0]}"
+            must = "be a folder without the files of an export"
+            got = f"one with {existing[0]}"
             raise BadInput(option, must, got, hint="Use --overwrite")
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self.files.items():
@@ -111,7 +112,9 @@ class CProgram:
         check_compiler()
         from simdjit import c99
 
-        self.system, self._c99, self._source = system, c99, c99.Source()
+        self.system = system
+        self._c99 = c99
+        self._source = c99.Source()
         self._state, results = jax.eval_shape(system.start, system.inputs)
         self.fields = {"state": fields(self._state), "input": fields(system.inputs), "output": fields(results)}
         state_names, input_names, output_names = (places(struct, members) for struct, members in self.fields.items())
@@ -126,13 +129,15 @@ class CProgram:
         self._source.add(
             f"void {name}_step({arguments})", system.step, step_inputs, [*state_names, *input_names], written_names
         )
-        self._functions, self._meanings = functions, dict(system.meanings)
+        self._functions = functions
+        self._meanings = dict(system.meanings)
         time = np.zeros((), dtype=_real(system.inputs))
         self.kind = c99.TYPES[str(time.dtype)]
         for function in functions:
             self.fields[function.struct] = fields(jax.eval_shape(function.of, time))
             self._meanings[function.struct] = function.meaning
-            signature, target = self._signature(function), places(function.struct, self.fields[function.struct])
+            signature = self._signature(function)
+            target = places(function.struct, self.fields[function.struct])
             self._source.add(signature, function.of, (time,), ["t"], target, ("t",))
 
     def files(self) -> dict[str, str]:
@@ -149,7 +154,8 @@ class CProgram:
 
     def header(self) -> str:
         """The header file."""
-        system, name = self.system, self.system.name
+        system = self.system
+        name = self.system.name
         structs = [self._struct(struct, members) for struct, members in self.fields.items()]
         further = [f"/* {function.comment} */\n{self._signature(function)};\n" for function in self._functions]
         return _HEADER.format(
@@ -183,13 +189,15 @@ class CProgram:
 
     def _vectors(self) -> str:
         """Random steps and what the batch compiler gives for them."""
-        system, chance = self.system, np.random.default_rng(0)
+        system = self.system
+        chance = np.random.default_rng(0)
         zero_state = jax.tree.map(lambda leaf: np.zeros(leaf.shape, leaf.dtype), self._state)
         first = CompiledStep(lambda _, __, inputs: ((), system.start(inputs)), (), (), system.inputs)
         later = CompiledStep(lambda _, state, inputs: system.step(state, inputs), (), zero_state, system.inputs)
         rows_of_inputs, rows_of_outputs = [], []
         for k in range(_VECTORS):
-            compiled, inputs = (later if k else first), system.sample(chance, k)
+            compiled = later if k else first
+            inputs = system.sample(chance, k)
             put(compiled.inputs, inputs)
             compiled()
             if k == 0:

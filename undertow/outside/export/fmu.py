@@ -82,7 +82,8 @@ def export_fmu(
 
 def _of_controller(built: Built, functions: Functions) -> list[Variable]:
     plant, motion = built.closed_loop.plant, functions.given.motion
-    names, goal = Names(plant, functions.form), functions.given.target.position
+    names = Names(plant, functions.form)
+    goal = functions.given.target.position
     meaning = "whether the target is that of the scenario's reference, which begins at the start of the simulation"
     variables = [
         Variable("scenario_reference", ("model", "scenario_reference", 0), "tunable", "Boolean", "", meaning, True),
@@ -104,7 +105,8 @@ def _of_controller(built: Built, functions: Functions) -> list[Variable]:
 
 def _of_vehicle(built: Built, functions: Functions) -> list[Variable]:
     plant, start = built.closed_loop.plant, built.scenario.initial
-    names, zero = Names(plant, functions.form), [0.0] * len(plant.outputs)
+    names = Names(plant, functions.form)
+    zero = [0.0] * len(plant.outputs)
     report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
     status = "0 while the motion is valid: " + ", ".join(f"{int(code)} {code.word}" for code in Status if code)
     position, speed = start.position or zero, start.velocity or zero

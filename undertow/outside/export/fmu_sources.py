@@ -29,7 +29,8 @@ def sources_of(
     sources = {f"{system.name}.c": program.text(), f"{system.name}.h": program.header(), "fmu_model.h": model}
     sources |= {name: (_HERE / name).read_text("utf-8") for name in ("fmi2.c", "fmi2.h")}
     digest = hashlib.sha256(repr((sorted(sources.items()), list(variables))).encode()).digest()
-    guid, identity = f"{{{uuid.UUID(bytes=digest[:16])}}}", int.from_bytes(digest[16:24], "little")
+    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
+    identity = int.from_bytes(digest[16:24], "little")
     sources["fmu_model.h"] = model.replace("@GUID@", guid).replace("@IDENTITY@", f"{identity}ULL")
     compiled_ones = [name for name in sources if name.endswith(".c")]
     return sources, ModelDescription(system.name, guid, system.about, variables, compiled_ones, system.period, duration)

@@ -82,7 +82,8 @@ class Names(NamedTuple):
         for word, unit in units.items():
             value = getattr(report, word, None)
             if value is not None:
-                description, member = f"{meaning} {word} of the propeller of", f"actuator_{word}"
+                description = f"{meaning} {word} of the propeller of"
+                member = f"actuator_{word}"
                 yield from numbered(f"propeller_{word}", struct, member, role, unit, description, self._owners())
 
     def wrench(self, name: str, struct: str, member: str, role: str, meaning: str) -> Iterator[Variable]:

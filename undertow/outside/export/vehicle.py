@@ -106,7 +106,8 @@ def vehicle_program(built: Built, name: str, form: Format) -> CProgram:
 
 
 def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization: Any) -> System:
-    plant, settings = loop.plant, built.scenario.loop
+    plant = loop.plant
+    settings = built.scenario.loop
     truth = plant.output(jnp.zeros(()), plant.initial_state())
     zero, none = np.zeros(len(plant.outputs)), np.zeros(plant.inputs())
     initial = built.scenario.initial
@@ -116,7 +117,8 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         InitialOutputs(array_of(initial.position), array_of(initial.velocity)), none, zero, np.zeros(())
     )
     inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), example)
-    integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
+    integrate = COMPACT_METHODS[settings.method]
+    dt = jnp.asarray(settings.dt, dtype=float)
 
     def shown(t: Any, x: Any, applied: Any) -> ExportedVehicleOutput:
         truth, values = plant.output(t, x), plant.diagnostics(x, applied)
@@ -130,7 +132,8 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     def step(x: Any, inputs: ExportedVehicleInput):
         disturbance = _WithOutsideWrench(loop.disturbance, inputs.external_wrench)
         part = Realization(dataclasses.replace(loop, disturbance=disturbance), realization, ())
-        applied, before = plant.admissible(x, inputs.command), PlantState(x, (), ())
+        applied = plant.admissible(x, inputs.command)
+        before = PlantState(x, (), ())
         after = hold(part, before, inputs.t, dt, applied, integrate, settings.substeps).plant
         return after, shown(inputs.t + dt, after, applied)
 

@@ -134,7 +134,8 @@ class Episodes:
         if settings.kind != "sampled":
             raise BadInput("loop.kind", "be sampled for an environment", settings.kind)
         weights = _cost(cost)
-        self.dt, self.steps = settings.dt, round(settings.duration / settings.dt)
+        self.dt = settings.dt
+        self.steps = round(settings.duration / settings.dt)
         self._precision = built.scenario.precision
         self.dtype = np.dtype(self._precision)
         with runtime.on_processor(), runtime.in_precision(self._precision):
@@ -195,7 +196,8 @@ class Episodes:
 
 
 def _begin(plan: EpisodeSettings, realization: Realization, start: Any) -> tuple[_State, EpisodeStep]:
-    zero, action = jnp.zeros(()), plan.interface.first()
+    zero = jnp.zeros(())
+    action = plan.interface.first()
     vehicle, plant_observation = plant_step.begin(realization, start)
     r = realization.loop.reference.at(zero)
     blank = jnp.concatenate([jnp.zeros(len(plan.interface.bounds())), action])
@@ -207,8 +209,11 @@ def _begin(plan: EpisodeSettings, realization: Realization, start: Any) -> tuple
 
 def _step(plan: EpisodeSettings, realization: Realization, state: _State, action: Any) -> tuple[_State, EpisodeStep]:
     """As `sampled.control_step`, with the command of an action in place of a law's."""
-    loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
-    t, before = instant(state.step, dt), state.vehicle
+    loop = realization.loop
+    dt = jnp.asarray(plan.dt)
+    interface = plan.interface
+    t = instant(state.step, dt)
+    before = state.vehicle
     action = interface.within_bounds(action)
     command = interface.command(action)
     applied = loop.plant.admissible(before.plant, command)

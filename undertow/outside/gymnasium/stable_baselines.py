@@ -28,7 +28,9 @@ def for_stable_baselines(env: VectorEnv) -> Any:
         """Of `for_stable_baselines`."""
 
         def __init__(self) -> None:
-            self.vector, self._seeds, self.reset_infos = env, None, [{} for _ in range(env.num_envs)]
+            self.vector = env
+            self._seeds = None
+            self.reset_infos = [{} for _ in range(env.num_envs)]
             super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
         def seed(self, seed: int | None = None) -> list[int | None]:

@@ -38,7 +38,8 @@ def variants_of(built: Built, vary: Vary, count: int) -> tuple[list[Variant], li
     else:
         data = {"scenario": dict(built.text.data), "vary": dict(vary), "trials": count}
         text = Text(data, "", built.text.folder, {})
-        campaign_trials, cache = trials(validate(text), text), PartCache()
+        campaign_trials = trials(validate(text), text)
+        cache = PartCache()
         variants = [
             _variant(build_data(campaign_trials, cache, campaign_trials.data(number))) for number in range(count)
         ]

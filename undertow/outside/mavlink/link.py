@@ -47,7 +47,9 @@ class UdpLink:
         self.codec = MessageCodec(system, component, key)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
-        self.unsent, self._fixed, self._signed = 0, kind == "udpout", key is not None
+        self.unsent = 0
+        self._fixed = kind == "udpout"
+        self._signed = key is not None
         self._caller: Any = None  # who sent last while the vehicle is unknown
         try:
             if kind == "udpout":

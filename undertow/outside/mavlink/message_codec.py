@@ -41,7 +41,8 @@ class MessageCodec:
         """As `packed`, for datagrams that a watchdog sends later, instead of what is sent meanwhile."""
         if self._signing is None:
             return self.packed(messages)
-        before, self._signing.timestamp = self._signing.timestamp, ahead_of(self._signing)
+        before = self._signing.timestamp
+        self._signing.timestamp = ahead_of(self._signing)
         datagrams = self.packed(messages)
         self._signing.timestamp = before
         return datagrams

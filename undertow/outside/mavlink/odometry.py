@@ -120,7 +120,8 @@ def of_local_position(position: Any, attitude: Any) -> MavlinkOdometry:
 
 def in_body_axes(quaternion: NDArray, world: NDArray) -> NDArray:
     """A vector in body axes from one in world axes; the quaternion (w, x, y, z) is body -> world."""
-    w, v = quaternion[0], -quaternion[1:]
+    w = quaternion[0]
+    v = -quaternion[1:]
     twice = 2 * np.cross(v, world)
     return world + w * twice + np.cross(v, twice)
 

@@ -124,7 +124,8 @@ class Submerged:
 
         Nothing is called here that could make the engine complain: inside a callback MuJoCo 4.0.0 then hangs.
         """
-        data, added_mass = self.data, self._hydrodynamics.added_mass
+        data = self.data
+        added_mass = self._hydrodynamics.added_mass
         data.ctrl[:] = thrust
         mass_matrix, levers = np.empty((6, 6)), np.empty((self.model.nu, 6))
         mujoco.mj_fullM(self.model, data, mass_matrix)

@@ -83,7 +83,8 @@ def linear_closed_loop(
     b = np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
     c = np.vstack([y_of_states, u_of_states])
     d = np.vstack([np.zeros((len(y_of_states), len(signals.desired))), d_r])
-    outputs, states = signals.measured | signals.command, plant.state_labels + law.state_labels
+    outputs = signals.measured | signals.command
+    states = plant.state_labels + law.state_labels
     system = ct.ss(a, b, c, d, built.scenario.loop.dt)
     return _named(system, "closed_loop", signals.desired | outputs, list(signals.desired), list(outputs), states)
 
@@ -100,7 +101,8 @@ def _without_ledger(built: Built, all_states: bool) -> Built:
 
 
 def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
-    loop, dt = built.closed_loop, built.scenario.loop.dt
+    loop = built.closed_loop
+    dt = built.scenario.loop.dt
     axes = len(loop.plant.outputs)
     for name, value in (("position", position), ("load", load)):
         if value is not None and np.shape(value) != (axes,):
@@ -122,8 +124,10 @@ def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
 
 
 def _plant(built: Built, point: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
-    loop, signals = point.parts.loop, signals_of(built.closed_loop.plant)
-    plant, zero = loop.plant, jnp.zeros(())
+    loop = point.parts.loop
+    signals = signals_of(built.closed_loop.plant)
+    plant = loop.plant
+    zero = jnp.zeros(())
 
     def derivative(state: Any, u: Any) -> Any:
         unloaded = plant.no_load()
@@ -154,18 +158,23 @@ def _plant(built: Built, point: Equilibrium, sampled: bool, all_states: bool) ->
 
 
 def _controller(built: Built, point: Equilibrium, all_states: bool) -> ct.StateSpace:
-    loop, signals = point.parts.loop, signals_of(built.closed_loop.plant)
-    law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
+    loop = point.parts.loop
+    signals = signals_of(built.closed_loop.plant)
+    law = loop.controller
+    dt = jnp.asarray(built.scenario.loop.dt)
     sizes = np.cumsum([len(signals.measured), len(signals.desired)])
 
     def update_and_command(state: Any, inputs_of_law: Any) -> Any:
         measured, desired, applied = jnp.split(inputs_of_law, sizes)
-        z, y, r = point.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
+        z = point.parts.law_state(state)
+        y = measurement_of(loop, measured)
+        r = target_of(desired)
         return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
 
     with computing(built):
         x = point.parts.plant_state(jnp.asarray(point.at["plant"]))
-        state, y = jnp.asarray(point.at["law"]), loop.plant.output(jnp.zeros(()), x)
+        state = jnp.asarray(point.at["law"])
+        y = loop.plant.output(jnp.zeros(()), x)
         inputs_of_law = jnp.concatenate([vector_of_measurement(y), *point.parts.target, jnp.asarray(point.at["u"])])
         (a, b), (c, d) = jax.tree.map(
             np.asarray, jax.jit(jax.jacfwd(update_and_command, argnums=(0, 1)))(state, inputs_of_law)

@@ -61,7 +61,8 @@ def vector_of(tree: Any) -> Any:
 def tree_of(like: Any) -> Callable[[Any], Any]:
     """The way back from `vector_of` to trees like one."""
     leaves, form = jax.tree.flatten(like)
-    shapes, types = [np.shape(leaf) for leaf in leaves], [jnp.asarray(leaf).dtype for leaf in leaves]
+    shapes = [np.shape(leaf) for leaf in leaves]
+    types = [jnp.asarray(leaf).dtype for leaf in leaves]
     ends = np.cumsum([0, *(np.prod(shape, dtype=int) for shape in shapes)])
 
     def whole(vector: Any) -> Any:

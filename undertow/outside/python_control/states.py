@@ -45,7 +45,8 @@ def seen(system: StateSpaceMatrices) -> StateSpaceMatrices:
         _seen_of_group(system, np.array([stem_of_state == stem for stem_of_state in stems]))
         for stem in dict.fromkeys(stems)
     ]
-    basis, names = np.hstack(bases), []
+    basis = np.hstack(bases)
+    names = []
     for stem, group in zip(dict.fromkeys(stems), bases, strict=True):
         names_of_group = [name for name, stem_of_name in zip(system.names, stems, strict=True) if stem_of_name == stem]
         names += names_of_group[: group.shape[1]]
@@ -60,7 +61,8 @@ def with_angles(system: StateSpaceMatrices, values: NDArray) -> StateSpaceMatric
         values: of its states, about which it is linear.
     """
     forth, back, names = [], [], []
-    columns, indices = np.eye(len(system.names)), iter(range(len(system.names)))
+    columns = np.eye(len(system.names))
+    indices = iter(range(len(system.names)))
     for index in indices:
         match = _QUATERNION.fullmatch(system.names[index])
         if match is None:

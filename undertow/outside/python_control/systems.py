@@ -87,7 +87,8 @@ def controller(scenario: Scenario) -> ct.NonlinearIOSystem:
             return state_from(state), measurement_of(loop, measured), target_of(desired), applied
 
         def advanced(realization: Realization, t: Any, state: Any, u: Any):
-            law, (z, y, r, applied) = realization.loop.controller, taken(realization.loop, state, u)
+            law = realization.loop.controller
+            z, y, r, applied = taken(realization.loop, state, u)
             return vector_of(law.advance(z, y, r, applied, dt))
 
         def commanded(realization: Realization, t: Any, state: Any, u: Any):
@@ -133,18 +134,21 @@ def closed_loop(scenario: Scenario) -> ct.NonlinearIOSystem:
         realization, states = _begun(built)
         settings = built.scenario.loop
         start, state_from = vector_of(states), tree_of(states)
-        integrate, dt = METHODS[settings.method], jnp.asarray(settings.dt)
+        integrate = METHODS[settings.method]
+        dt = jnp.asarray(settings.dt)
 
         def following(realization: Realization, u: Any) -> Realization:
             loop = eqx.tree_at(lambda loop: loop.reference, realization.loop, _Held(target_of(u)))
             return realization._replace(loop=loop)
 
         def stepped(realization: Realization, k: Any, state: Any, u: Any):
-            carry, with_reference = (state_from(state), (), going()), following(realization, u)
+            carry = (state_from(state), (), going())
+            with_reference = following(realization, u)
             return vector_of(sampled.control_step(with_reference, (), dt, integrate, settings.substeps, carry, k)[0])
 
         def shown(realization: Realization, k: Any, state: Any, u: Any):
-            t, (x, z, measuring) = instant(k, dt), state_from(state)
+            t = instant(k, dt)
+            x, z, measuring = state_from(state)
             truth = realization.loop.plant.output(t, x)
             applied = following(realization, u).decide(t, x, z, measuring).applied
             return jnp.concatenate([truth.position, truth.velocity, applied])
@@ -186,7 +190,8 @@ def reference(scenario: Scenario, time: Any) -> NDArray:
     Raises:
         BadInput: the scenario cannot be used, or the instants are no list of numbers.
     """
-    built, instants = built_of(scenario), numbers("time", time, (np.size(time),))
+    built = built_of(scenario)
+    instants = numbers("time", time, (np.size(time),))
     checks.finite("time", instants, "s")
     with computing(built):
         desired = lambda part, _, t: ((), jnp.concatenate(part.at(t)))
@@ -248,7 +253,8 @@ def _sampled_plant(built: Built) -> ct.NonlinearIOSystem:
         settings = built.scenario.loop
         first = PlantState(states[0], states[2].navigation, states[2].faults)
         start, state_from = vector_of(first), tree_of(first)
-        integrate, dt = METHODS[settings.method], jnp.asarray(settings.dt)
+        integrate = METHODS[settings.method]
+        dt = jnp.asarray(settings.dt)
 
         def measured(realization: Realization, t: Any, state: Any):
             x, navigation, faults = state_from(state)
@@ -302,7 +308,9 @@ def _system(
         at, state, u = step.inputs
 
         def call(t: float, x: NDArray, input_vector: NDArray, params: Any) -> NDArray:
-            at[...], state[...], u[...] = _number(t, period) if by_number else t, x, input_vector
+            at[...] = _number(t, period) if by_number else t
+            state[...] = x
+            u[...] = input_vector
             step()
             return step.outputs.astype(float)
 
@@ -312,7 +320,8 @@ def _system(
     system: Any = ct.nlsys(
         updated, output, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
     )
-    system.units, system.start = inputs | outputs, np.asarray(start, dtype=float)
+    system.units = inputs | outputs
+    system.start = np.asarray(start, dtype=float)
     return system
 
 
@@ -326,7 +335,9 @@ def _number(t: float, dt: float) -> int:
 
 def _begun(built: Built) -> tuple[Realization, tuple[Any, Any, MeasurementState]]:
     """The loop with its random parts sampled, and the states of plant, law and measuring at t = 0, as in a run."""
-    loop, key, start = built.closed_loop, key_of_seed(built.scenario.seed), _start(built)
+    loop = built.closed_loop
+    key = key_of_seed(built.scenario.seed)
+    start = _start(built)
     sampled_once = lambda loop, key: eqx.filter(loop.realize(key)[1:], eqx.is_array)
     first = lambda loop, key: sampled.begin(loop.realize(key), start, ())[0]
     step = step_of(lambda loop, _, key: ((), (sampled_once(loop, key), first(loop, key))), loop, (), key)

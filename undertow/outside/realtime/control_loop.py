@@ -63,7 +63,8 @@ class RealTimeLoop:
     ):
         self._autopilot, self._link, self._clock, self._stop, self._begun = autopilot, link, clock, stop, begun
         self._report, self._every = report, every
-        self._report_due, self._steps_reported = clock.now() + every, 0
+        self._report_due = clock.now() + every
+        self._steps_reported = 0
         self._last_look: float | None = None  # when measurements were looked for last, s
         self._period = autopilot.sampling_time
         loop_settings = LoopSettings() if settings is None else settings
@@ -117,7 +118,8 @@ class RealTimeLoop:
             if self._stop():
                 return Reason.STOPPED
             started = clock.now()
-            before, instant = instant, self._instant(started - loop_start)
+            before = instant
+            instant = self._instant(started - loop_start)
             elapsed = (instant - before) * period
             if elapsed > self._standstill:
                 return Reason.STALLED
@@ -154,7 +156,8 @@ class RealTimeLoop:
 
         The safe output is sent meanwhile.
         """
-        wait_start, planned = self._clock.now(), 0
+        wait_start = self._clock.now()
+        planned = 0
         while not self._stop() and not self._link.ended:
             received = self._link.receive(self._period if planned else 0.0)
             if received is not None and not received.missing():
@@ -190,7 +193,8 @@ class RealTimeLoop:
         self._last_look = now
         if elapsed > self._standstill + LOOK:
             link.discard()
-        computing_start, was_running = self._clock.now(), self.session.running
+        computing_start = self._clock.now()
+        was_running = self.session.running
         measurement = link.receive(elapsed)
         objection = link.objection()
         command = self.session.follow(measurement, now, objection)

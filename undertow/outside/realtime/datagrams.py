@@ -90,7 +90,8 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
     """
     if len(data) != size_of(kind, actuators):
         raise Refused("wrong size")
-    checked, (checksum,) = data[: -_SUM.size], _SUM.unpack(data[-_SUM.size :])
+    checked = data[: -_SUM.size]
+    (checksum,) = _SUM.unpack(data[-_SUM.size :])
     if zlib.crc32(checked) != checksum:
         raise Refused("damaged")
     magic, version, kind_received, flags, count, session, sequence, time, answered = _HEADER.unpack_from(checked)

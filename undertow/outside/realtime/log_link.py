@@ -64,7 +64,8 @@ class LogLink(AbstractLink):
         rows = {name: log[name].values[:steps] for name in used}
         self._motion, self._target = [rows[name] for name in names], [rows[name] for name in targets]
         self._applied, self._elapsed, self._expected = rows["applied_input"], rows["elapsed"], rows["commanded_input"]
-        self._health, self._time = rows.get("received_health"), log["elapsed"].time[:steps]
+        self._health = rows.get("received_health")
+        self._time = log["elapsed"].time[:steps]
         self._reports = self._split(rows["received_report"]) if "received_report" in rows else None
         self._found = np.full_like(self._expected, np.nan)
         self._row = self._answered = 0
@@ -92,7 +93,8 @@ class LogLink(AbstractLink):
             raise BadInput("--link", "name a log that begins with the start of the controller", str(path), hint=_HINT)
 
     def receive(self, elapsed: float) -> LinkMeasurement | None:
-        k, self._row = self._row, self._row + 1
+        k = self._row
+        self._row += 1
         if k >= len(self._time):
             self.ended = "the log ended"
             return None

@@ -19,7 +19,8 @@ class Durations:
     def __init__(self) -> None:
         self._counts = np.zeros(_INTERVALS + 1, dtype=np.int64)
         self._sum = self._square = 0.0
-        self._least, self._largest = np.inf, -np.inf
+        self._least = np.inf
+        self._largest = -np.inf
         self.number = 0
 
     def add(self, duration: float) -> None:

@@ -39,7 +39,8 @@ class UdpVehicleLink(AbstractLink):
     def __init__(self, address: str, built: Built):
         _check_vehicle(built)
         host, port = address_of(address, "--link")
-        self.form, self._actuators = Format("quaternion", "body"), built.closed_loop.plant.inputs()
+        self.form = Format("quaternion", "body")
+        self._actuators = built.closed_loop.plant.inputs()
         try:
             self._peer = socket.gethostbyname(host), port
         except (OSError, UnicodeError):
@@ -72,7 +73,8 @@ class UdpVehicleLink(AbstractLink):
             self._received.counts["left unread"] += 1
         if newest is None:
             return None
-        motion, applied = newest.values[:MOTION], newest.values[MOTION:]
+        motion = newest.values[:MOTION]
+        applied = newest.values[MOTION:]
         return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if newest.flag else None)
 
     def guard(self, safe: np.ndarray, longest: float) -> None:
@@ -124,7 +126,8 @@ class UdpVehicleServer:
 
     def __init__(self, built: Built, address: str):
         _check_vehicle(built)
-        self._period, self._actuators = float(built.scenario.loop.dt), built.closed_loop.plant.inputs()
+        self._period = float(built.scenario.loop.dt)
+        self._actuators = built.closed_loop.plant.inputs()
         self._received = DatagramFilter(COMMAND, self._actuators)
         self._sender = Sender(MEASUREMENT, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

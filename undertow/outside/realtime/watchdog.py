@@ -94,7 +94,8 @@ def watch(connection: socket.socket, timeout: float, pipe: int) -> None:
             if message == _DONE:
                 return
             if message is not None:
-                address, datagrams = tuple(message[0]), [bytes.fromhex(encoded) for encoded in message[1]]
+                address = tuple(message[0])
+                datagrams = [bytes.fromhex(encoded) for encoded in message[1]]
 
 
 def _send(connection: socket.socket, address: Any, datagrams: Sequence[bytes]) -> None:

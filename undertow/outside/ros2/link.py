@@ -130,7 +130,8 @@ class Link:
         checks.choice("reliability", reliability, RELIABILITIES)
         self.now: Callable[[], int] = time.time_ns
         self.on_trouble: Callable[[str, str], None] = lambda event, sentence: None
-        self._bag, self._qos = bag, _quality(reliability)
+        self._bag = bag
+        self._qos = _quality(reliability)
         try:
             if localhost:
                 _loopback(domain)
@@ -151,7 +152,8 @@ class Link:
 
     def close(self) -> None:
         """Leave the domain: the participant ends, with all that was made of it."""
-        participant, self._participant = self._participant, None
+        participant = self._participant
+        self._participant = None
         if participant is not None:
             participant.__del__()  # CycloneDDS has no other way; references among its objects keep them alive
 
@@ -234,7 +236,8 @@ DIFFERENT_NETWORKS = "Is the domain right, and --localhost given to both sides o
 
 def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     """Why nothing arrives at a subscriber, in a sentence."""
-    types_by_topic, expected = link.topics(), ros_type(kind)
+    types_by_topic = link.topics()
+    expected = ros_type(kind)
     if inlet.topic in types_by_topic and types_by_topic[inlet.topic] != expected:
         return f"{inlet.topic} is published as {types_by_topic[inlet.topic]}, but {expected} is expected"
     if inlet.incompatible():

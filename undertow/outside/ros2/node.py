@@ -52,7 +52,8 @@ class Reporter:
     """
 
     def __init__(self, say: Callable[[str], None]):
-        self._say, self.counts = say, Counter[str]()
+        self._say = say
+        self.counts = Counter[str]()
         self._explained_at: dict[str, float] = {}  # when each was explained last, s
         self._next = time.monotonic() + STATUS_PERIOD
 

@@ -75,14 +75,17 @@ class VehicleNode:
         self._imu = link.publisher(topics.imu, ros.Imu)
         self._time = 0  # ns
         link.now = lambda: self._time
-        self._command, self._last = np.zeros(self._vehicle.thrusters), time.monotonic()
+        self._command = np.zeros(self._vehicle.thrusters)
+        self._last = time.monotonic()
 
     def run(self) -> Status:
         """Run to the end, or until KeyboardInterrupt; how the run ended."""
         lock_step = self._settings.pace == "lock-step"
         if lock_step:
             self._await_controller()
-        observed, k, begun = self._vehicle.restart(), 0, time.monotonic()
+        observed = self._vehicle.restart()
+        k = 0
+        begun = time.monotonic()
         while True:
             if lock_step and self._commands.take():
                 self._reporter.trouble("unasked commands", "a command came before its odometry: it is ignored")
@@ -95,7 +98,8 @@ class VehicleNode:
             if k >= self._steps or observed.status is not Status.OK:
                 self._link.flush(0.5)
                 return observed.status
-            observed, k = self._vehicle.step(self._command), k + 1
+            observed = self._vehicle.step(self._command)
+            k += 1
 
     def status(self) -> str:
         """Time and counts in one line."""
@@ -115,7 +119,8 @@ class VehicleNode:
     def _publish(self, observed: VehicleOutput, k: int) -> None:
         """Send the time, then what is observed at it."""
         self._time = round(k * self._vehicle.sampling_time * SECOND)
-        stamp, frames = stamp_of(self._time), self._settings.frames
+        stamp = stamp_of(self._time)
+        frames = self._settings.frames
         motion = PoseAndVelocity(observed.position, observed.attitude, observed.velocity)
         self._clock.publish(ros.Clock(stamp))
         self._imu.publish(imu_of(motion, observed.specific_force, stamp, frames))
@@ -133,7 +138,8 @@ class VehicleNode:
                 self._reporter.trouble(f"ignored ({error.name})", f"{error}. The command is ignored")
         if command is None:
             return False
-        self._command, self._last = command, time.monotonic()
+        self._command = command
+        self._last = time.monotonic()
         self._reporter.over("stopped")
         return True
 

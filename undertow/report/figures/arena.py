@@ -29,9 +29,11 @@ def arena_plots(board: Board) -> Mapping[str, Callable[[], Figure]]:
 
 def tasks_figure(board: Board) -> Figure:
     """A cell for every law and task, its colour and number the error in tolerances."""
-    laws, tasks = [standing.entry.name for standing in board.standings], board.tasks
+    laws = [standing.entry.name for standing in board.standings]
+    tasks = board.tasks
     errors = np.array([[standing.score.mean(board.of_task(task)) for task in tasks] for standing in board.standings])
-    left, top = 0.25 + 0.075 * max(map(len, laws)), 1.35
+    left = 0.25 + 0.075 * max(map(len, laws))
+    top = 1.35
     cell = (min(0.6, (_PAGE - left - _SLANTED) / len(tasks)), 0.24)
     figure = style.blank(_PAGE, top + cell[1] * len(laws) + 0.2)
     style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
@@ -85,7 +87,8 @@ def _line(panel: Axes, standing: Standing, name: str, look: style.Look) -> None:
     curve = standing.robustness[name]
     lost = np.flatnonzero(curve.high >= LOST)
     end = int(lost[0]) if len(lost) else len(curve.levels)
-    levels, errors = np.array(curve.levels), np.where(np.arange(len(curve.levels)) < end, curve.middle, LOST)
+    levels = np.array(curve.levels)
+    errors = np.where(np.arange(len(curve.levels)) < end, curve.middle, LOST)
     panel.plot(levels[: end + 1], errors[: end + 1], **look.line)
     if end < len(levels):
         panel.plot(levels[end], LOST, "x", color=look.colour, markersize=5, zorder=look.order)

@@ -116,8 +116,10 @@ def sensitivity_figure(correlations: Mapping[str, Mapping[str, float]], varied: 
     inputs = shown_inputs(correlations)
     metrics = list(dict.fromkeys(metric for name in inputs for metric in correlations[name]))
     longest = lambda names: _LETTER * max(map(len, names))
-    left, above = longest(inputs) + 0.2, 0.35 + 0.9 * longest(metrics)
-    wide, tall = max(0.36 * len(metrics), 2.0), 0.24 * len(inputs)
+    left = longest(inputs) + 0.2
+    above = 0.35 + 0.9 * longest(metrics)
+    wide = max(0.36 * len(metrics), 2.0)
+    tall = 0.24 * len(inputs)
     figure = style.blank(max(left + wide + 0.6, 6.0), above + tall + 0.15)
     style.head(figure, "Rank correlation of metrics with inputs", {})
     panel = style.place(figure, left, above, wide, tall)

@@ -34,7 +34,8 @@ def certificate(run: xr.Dataset, title: str, bound: float) -> Figure:
         bound: largest size that a weight may have; infinite where it may have any.
     """
     valid_run = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
-    time, values_of = valid_run["time"].values, lambda name: valid_run[name].values
+    time = valid_run["time"].values
+    values_of = lambda name: valid_run[name].values
     rows = 3 if "weights_peak" in run else 2
     figure = style.blank(_WIDTH, _TOP + rows * _TALL + (rows - 1) * _GAP + _FOOT)
     acting = {"input at a limit": values_of("saturated").max(-1) > 0}

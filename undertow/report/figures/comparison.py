@@ -102,7 +102,8 @@ def histories_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
     """
     units = dataset["axis"].attrs["unit_of_each"].split(", ")
     groups = output_groups(units) or {"tracking": ("", list(range(len(units))))}
-    looks, height = looks_of(findings.names), 2.0
+    looks = looks_of(findings.names)
+    height = 2.0
     key = key_height(looks)
     figure = style.blank(9.6, 0.5 + key + (height + 0.55) * len(groups))
     style.head(figure, "Tracking error per axis: first trial (line), 5 % to 95 % of all trials (area)", {})

@@ -20,7 +20,8 @@ def search_figure(results: Mapping[str, Any]) -> Figure:
     Args:
         results: contents of falsify.json.
     """
-    vary, robustness = results["vary"], np.array(results["evaluations"]["robustness"], dtype=float)
+    vary = results["vary"]
+    robustness = np.array(results["evaluations"]["robustness"], dtype=float)
     figure = style.blank(6.4, 0.4 + (1 + len(vary)) * (_TALL + _GAP))
     style.head(figure, "Search for a violation", {})
     runs = np.arange(1, len(robustness) + 1)

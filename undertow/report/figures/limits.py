@@ -26,7 +26,8 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
         return
     low, high = float(late_values.min()), float(late_values.max())
     margin = 0.08 * (high - low) or 0.08 * max(abs(high), 1e-12)
-    low, high = low - margin, high + margin
+    low -= margin
+    high += margin
     panel.set_ylim(low, high)
     _shorten(panel)
     beyond = {}

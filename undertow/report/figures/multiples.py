@@ -62,7 +62,8 @@ def small_multiples(
     shares = np.array([block.width for block in blocks]) / sum(block.width for block in blocks)
     for index, name in enumerate(names):
         row, column = divmod(index, columns)
-        left, top = column * cell, _HEAD + row * tall
+        left = column * cell
+        top = _HEAD + row * tall
         lowest = index + columns >= len(names)
         for number, block in enumerate(blocks):
             width = cell * (shares[number] if beside else 1.0)

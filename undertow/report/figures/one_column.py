@@ -31,7 +31,8 @@ def one_column(figure: Figure) -> Figure:
     Panels keep their order, their height where the page is tall enough, and the size of their text. A panel with long
     names beside it, or a matrix, may need more than the width of a column.
     """
-    resolution, figure.dpi = figure.dpi, _FINE
+    resolution = figure.dpi
+    figure.dpi = _FINE
     try:
         return _rearranged(figure, FigureCanvasAgg(figure))
     finally:
@@ -41,7 +42,8 @@ def one_column(figure: Figure) -> Figure:
 def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
     for title in list(figure.texts):
         title.remove()
-    panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
+    panels = figure.axes
+    across = 2 if len(figure.axes) > _FEW else 1
     _label_last(panels, across)
     for panel in panels:
         for title in panel.findobj(Text):
@@ -120,13 +122,15 @@ def _lifted(panel: Axes, up: float) -> Transform:
 def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, float]:
     """Space that labels take at the left, at the right, above and below, in."""
     renderer, inner = canvas.get_renderer(), panel.get_window_extent()
-    outer, beside = panel.get_tightbbox(renderer), panel.yaxis.get_tightbbox(renderer)
+    outer = panel.get_tightbbox(renderer)
+    beside = panel.yaxis.get_tightbbox(renderer)
     ticks = [label.get_window_extent(renderer).x1 for label in panel.get_xticklabels() if label.get_visible()]
     if outer is None:
         return 0.0, 0.0, 0.0, 0.0
     # Where a panel is moved to, a tick may stand at its upper edge.
     letters = max((label.get_window_extent(renderer).height for label in panel.get_yticklabels()), default=0.0)
-    left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
+    left = inner.x0 - beside.x0 if beside else 0.0
+    right = min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
     sides = left, right, max(outer.y1 - inner.y1, letters / 2), inner.y0 - outer.y0
     edge = (_EDGE, 0.0, 0.0, 0.0)
     return tuple(max(side, 0.0) / panel.figure.dpi + extra for side, extra in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
@@ -137,7 +141,8 @@ def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:
     wide, tall = figure.get_size_inches()
     top = 0.0
     for old in list(figure.legends):
-        handles, words = old.legend_handles, [text.get_text() for text in old.get_texts()]
+        handles = old.legend_handles
+        words = [text.get_text() for text in old.get_texts()]
         old.remove()
         for columns in range(len(words), 0, -1):
             new = figure.legend(

@@ -36,7 +36,8 @@ def _plot(panel: Axes, findings: Findings, front: Front) -> None:
         x, *x_interval = scaled_medians(name, front.effort, scales[0][0])
         y, *y_interval = scaled_medians(name, front.error, scales[1][0])
         strong = name in front.front
-        alpha, fill = (1.0 if strong else _PALE), ("white" if name in front.incomplete else look.colour)
+        alpha = 1.0 if strong else _PALE
+        fill = "white" if name in front.incomplete else look.colour
         panel.plot(x_interval, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)
         panel.plot([x, x], y_interval, color=look.colour, alpha=alpha, linewidth=1.2)
         panel.plot(x, y, "o", color=look.colour, markerfacecolor=fill, alpha=alpha, markersize=5)

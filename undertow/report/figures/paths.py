@@ -78,7 +78,8 @@ def plan_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
 
 def _laid_out(views: list[_View], paths: int) -> tuple[Figure, list[list[tuple[float, float]]]]:
     """An empty figure, and the left upper corner of each panel, in: the views beside each other where there is room."""
-    across, (left, top) = min(paths, _ABREAST), (_LEFT, _HEAD)
+    across = min(paths, _ABREAST)
+    left, top = _LEFT, _HEAD
     corners_of_views, bottom = [], _HEAD
     for view in views:
         width, height = view.sides(paths)

@@ -75,7 +75,8 @@ def _frequency(prediction: Prediction) -> Figure:
 
 
 def _actuators(prediction: Prediction) -> Figure:
-    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
+    authority = prediction.authority
+    plant = prediction.operating_point.built.closed_loop.plant
     looks = {"largest demand": style.SOLID, "forward limit": _FORWARD, "reverse limit": _REVERSE}
     figure = style.blank(9.6, 2.9)
     style.head(figure, "Largest force demanded from each actuator, and its limits", looks)

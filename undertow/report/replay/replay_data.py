@@ -112,7 +112,8 @@ def replay_of(
 def _replay_of(
     run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, seed: int, size: np.ndarray, label: str
 ) -> ReplayData:
-    time, frames = run["time"].values, _frames(run["time"].values)
+    time = run["time"].values
+    frames = _frames(run["time"].values)
     records = run.isel(time=frames)
     position, reference = records["position"].values, records["reference"].values
     surroundings = environment(loop, seed, records["time"].values, position, records["velocity"].values)
@@ -120,7 +121,8 @@ def _replay_of(
     thrust = _finite_values(thrust_along(plant.thruster, run["input"].values, step)[frames])
     if surroundings.thrust_share is not None:
         thrust = thrust * surroundings.thrust_share
-    error, energy = records["error"].values, _energy(run)[frames]
+    error = records["error"].values
+    energy = _energy(run)[frames]
     series = {
         "position": position[:, :3],
         "attitude": _attitude(position[:, 3:]),
@@ -159,7 +161,8 @@ def _energy(run: xr.Dataset) -> np.ndarray:
     """Electrical energy since the start, J, as the metric `energy` has it: of the ledger, or by the trapezium rule."""
     if "energy_source" in run:
         return run["energy_source"].values
-    time, power = run["time"].values, run["power"].values.sum(-1)
+    time = run["time"].values
+    power = run["power"].values.sum(-1)
     return np.concatenate([[0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2)])
 
 
