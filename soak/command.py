@@ -15,10 +15,10 @@ from soak.inputs import BUILD
 from soak.kept_commands import kept
 from soak.page import soak_page
 from undertow.cli import exit_codes
-from undertow.cli.commands.command import Command
-from undertow.cli.commands.options import Overwrite, results
 from undertow.cli.interruptible import interruptible
 from undertow.cli.main import run
+from undertow.cli.options.command import Command
+from undertow.cli.options.shared import Overwrite, results
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.core.checks import not_negative
 from undertow.core.errors import BadInput
@@ -66,17 +66,18 @@ def soak(command: SoakCommand) -> int:
     """Attack undertow itself; the exit code is 1 if there was a never-event."""
     if command.replay is not None:
         return _replayed(command.replay)
-    amounts, parts = soaking.SHORT if command.short else soaking.Amounts(), command.parts or []
+    amounts = soaking.SHORT if command.short else soaking.Amounts()
+    parts = command.parts or []
     for name in ("inputs", "kills", "hours", "faults", "links"):
         value = getattr(command, name)
         if value is not None:
             amounts = amounts._replace(**{name: _count(name, value)})
-    asked = [part for part in soaking.check_parts(parts) if getattr(amounts, part, 1)]
-    if not asked:
+    nonempty_parts = [part for part in soaking.check_parts(parts) if getattr(amounts, part, 1)]
+    if not nonempty_parts:
         raise BadInput("PART", "be a part of which there is more than nothing", ", ".join(parts) or None)
     seed = int(time.time()) if command.seed is None else command.seed
     limit = float("inf") if command.minutes is None else _count("minutes", command.minutes)
-    return _soak(asked, amounts, seed, limit, command.out, command.overwrite)
+    return _soak(nonempty_parts, amounts, seed, limit, command.out, command.overwrite)
 
 
 def attacked(arguments: Sequence[str]) -> int:
@@ -100,18 +101,18 @@ def _soak(parts: Sequence[str], amounts: Any, seed: int, minutes: float, out: Pa
         output_folder(out, Path("runs") / "soak") as folder,
         results_folder(folder, _WRITTEN, "soak.json", overwrite) as draft,
     ):
-        found = interruptible(lambda: soaking.soak(attacked, parts, amounts, seed, minutes, progress, kept))
-        (draft.path / "soak.json").write_text(json.dumps(found.summary, indent=1) + "\n", encoding="utf-8")
-        (draft.path / "soak.html").write_text(soak_page(found.summary), encoding="utf-8")
-        for failure, given in found.attacks:
-            _keep(draft.path / "failures" / given.identity.replace("/", "-"), failure.says, given)
-    _print(found.summary, folder)
-    return exit_codes.DONE if found.passed else exit_codes.RUN_FAILED
+        result = interruptible(lambda: soaking.soak(attacked, parts, amounts, seed, minutes, progress, kept))
+        (draft.path / "soak.json").write_text(json.dumps(result.summary, indent=1) + "\n", encoding="utf-8")
+        (draft.path / "soak.html").write_text(soak_page(result.summary), encoding="utf-8")
+        for failure, hostile_input in result.attacks:
+            _keep(draft.path / "failures" / hostile_input.identity.replace("/", "-"), failure.says, hostile_input)
+    _print(result.summary, folder)
+    return exit_codes.DONE if result.passed else exit_codes.RUN_FAILED
 
 
-def _keep(folder: Path, says: str, given: Any) -> None:
+def _keep(folder: Path, message: str, hostile_input: Any) -> None:
     """The files of a hostile input, and command.txt with its command line and what happened."""
-    for name, data in given.files.items():
+    for name, data in hostile_input.files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if data is None:
@@ -119,15 +120,17 @@ def _keep(folder: Path, says: str, given: Any) -> None:
         else:
             path.write_bytes(data)
     folder.mkdir(parents=True, exist_ok=True)
-    words = json.dumps(list(given.arguments))
-    (folder / "command.txt").write_text(f"{given.identity}\n{words}\n{says}\n", encoding="utf-8", errors="replace")
+    words = json.dumps(list(hostile_input.arguments))
+    (folder / "command.txt").write_text(
+        f"{hostile_input.identity}\n{words}\n{message}\n", encoding="utf-8", errors="replace"
+    )
 
 
 def _print(summary: dict[str, Any], folder: Path) -> None:
     for event, count in summary["events"].items():
         print(f"{event:<8}{count:>6}  {summary['meanings'][event]}")
-    for one in summary["failures"][:_SHOWN]:
-        print(exit_codes.printable(f"{one['event']} {one['identity']}: {one['says']}"))
+    for failure in summary["failures"][:_SHOWN]:
+        print(exit_codes.printable(f"{failure['event']} {failure['identity']}: {failure['says']}"))
     if len(summary["failures"]) > _SHOWN:
         print(f"{len(summary['failures']) - _SHOWN} more are in soak.json")
     print(f"Seed {summary['seed']}, {summary['seconds']:g} s. Page: {folder / 'soak.html'}")

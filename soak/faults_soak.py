@@ -91,27 +91,27 @@ class FaultProgram(NamedTuple):
 
     def scenario(self, faults: Mapping[int, Mapping[str, Any]], seed: int) -> dict[str, Any]:
         """The scenario of a run with faults, by their places among the kinds."""
-        never = (self._entry(place) for place in range(len(self.kinds)))
-        entries = [{**entry, **faults.get(place, {})} for place, entry in enumerate(never)]
+        never = (self._entry(index) for index in range(len(self.kinds)))
+        entries = [{**entry, **faults.get(index, {})} for index, entry in enumerate(never)]
         return LOOPS[self.loop] | _COMMON | {"faults": entries, "seed": seed}
 
-    def _entry(self, place: int) -> dict[str, Any]:
-        kind = self.kinds[place]
+    def _entry(self, index: int) -> dict[str, Any]:
+        kind = self.kinds[index]
         target = f"{kind.target} 1" if kind.target in _NUMBERED else kind.target
-        announced = {"announced": True} if kind.can_be_announced and place % 3 == 0 else {}
-        return {"target": target, "mode": kind.mode, "onset": _NEVER + place} | announced
+        announced = {"announced": True} if kind.can_be_announced and index % 3 == 0 else {}
+        return {"target": target, "mode": kind.mode, "onset": _NEVER + index} | announced
 
     def sample(self, chance: np.random.Generator) -> dict[int, dict[str, Any]]:
         """Random faults of a run by their places: one, or two."""
         count = 2 if len(self.kinds) > 1 and chance.uniform() < _PAIRS else 1
-        found = {}
-        for place in map(int, chance.choice(len(self.kinds), count, replace=False)):
-            entry = random_fault(chance, self.kinds[place], self.width, _DURATION)
+        faults = {}
+        for index in map(int, chance.choice(len(self.kinds), count, replace=False)):
+            entry = random_fault(chance, self.kinds[index], self.width, _DURATION)
             entry.pop("announced", None)  # that, and the length of a delay line, belong to the program
             if "longest" in inspect.signature(catalogue.find("faults", entry["mode"])).parameters:
                 entry.pop("severity", None)
-            found[place] = entry
-        return found
+            faults[index] = entry
+        return faults
 
 
 _NUMBERED = ("thruster", "input")
@@ -119,12 +119,12 @@ _NUMBERED = ("thruster", "input")
 
 def programs() -> list[FaultProgram]:
     """Programs with all kinds of faults of all loops."""
-    found = []
+    fault_programs = []
     for name, loop in LOOPS.items():
         built = build({**loop, **_COMMON, "supervisor": None}).closed_loop
         for target in targets_of(built.plant, built.navigation).values():
-            found.append(FaultProgram(name, tuple(list_kinds([target])), target.width))
-    return found
+            fault_programs.append(FaultProgram(name, tuple(list_kinds([target])), target.width))
+    return fault_programs
 
 
 class Sampled(NamedTuple):
@@ -135,15 +135,15 @@ class Sampled(NamedTuple):
     seed: int
 
 
-def sampled(number: int, seed: int, several: Sequence[FaultProgram]) -> list[Sampled]:
+def sampled(number: int, seed: int, all_programs: Sequence[FaultProgram]) -> list[Sampled]:
     """So many runs with random faults, spread over programs in proportion to their kinds."""
-    shares = np.array([len(one.kinds) for one in several], dtype=float)
-    found = []
+    shares = np.array([len(program.kinds) for program in all_programs], dtype=float)
+    samples = []
     for i in range(number):
         chance = np.random.default_rng([seed, 20, i])
-        which = int(chance.choice(len(several), p=shares / shares.sum()))
-        found.append(Sampled(which, several[which].sample(chance), i))
-    return found
+        program_index = int(chance.choice(len(all_programs), p=shares / shares.sum()))
+        samples.append(Sampled(program_index, all_programs[program_index].sample(chance), i))
+    return samples
 
 
 def run_faulted(
@@ -157,26 +157,31 @@ def run_faulted(
         until: time of `time.monotonic` after which no further program begins.
         watch: called with the numbers of runs and of failures so far.
     """
-    began, several = time.monotonic(), programs()
-    runs = sampled(number, seed, several)
+    began = time.monotonic()
+    all_programs = programs()
+    runs = sampled(number, seed, all_programs)
     endings: Counter[str] = Counter()
     states: Counter[str] = Counter()
     modes: Counter[str] = Counter()
     failures: list[Failure] = []
     done = compiled = repeated = 0
-    for place, program in enumerate(several):
-        own = [run for run in runs if run.program == place]
-        if not own or time.monotonic() > until:
+    for index, program in enumerate(all_programs):
+        runs_of_program = [run for run in runs if run.program == index]
+        if not runs_of_program or time.monotonic() > until:
             continue
-        found = judge(runs_with_faults(program, own), watch=partial(_shown, watch, done, len(failures)))
-        for run, one in zip(own, found, strict=True):
-            failures += [Failure(event, f"faults/{seed}/{run.seed}", says) for event, says in one.events()]
-            endings[one.status.word] += 1
-            states[one.state] += 1
+        judged = judge(runs_with_faults(program, runs_of_program), watch=partial(_shown, watch, done, len(failures)))
+        for run, judged_run in zip(runs_of_program, judged, strict=True):
+            failures += [Failure(event, f"faults/{seed}/{run.seed}", message) for event, message in judged_run.events()]
+            endings[judged_run.status.word] += 1
+            states[judged_run.state] += 1
             modes.update(f"{program.kinds[k].target} {program.kinds[k].mode}" for k in run.faults)
-        again = own[: _MOST_REPEATED * _REPEATED : _REPEATED]
-        failures += _other_bytes(program, again, dict(zip((run.seed for run in own), found, strict=True)), seed)
-        done, compiled, repeated = done + len(own), compiled + 1, repeated + len(again)
+        repeats = runs_of_program[: _MOST_REPEATED * _REPEATED : _REPEATED]
+        failures += _other_bytes(
+            program, repeats, dict(zip((run.seed for run in runs_of_program), judged, strict=True)), seed
+        )
+        done += len(runs_of_program)
+        compiled += 1
+        repeated += len(repeats)
         watch(done, len(failures))
     seconds = time.monotonic() - began
     return Faulted(done, dict(endings), dict(states), dict(modes), compiled, repeated, failures, seconds)
@@ -190,11 +195,11 @@ def runs_with_faults(program: FaultProgram, runs: Sequence[Sampled]) -> list[Pre
     """The runs of a program, which is built once; the numbers of their faults are then set in its parts."""
     prepared = watched(build(program.scenario({}, 0)), windows=1)
     with runtime.in_precision(prepared.precision):
-        return [prepared._replace(run=_with_faults(prepared.run, one)) for one in runs]
+        return [prepared._replace(run=_with_faults(prepared.run, sample)) for sample in runs]
 
 
 def _with_faults(run: LoopRun, sampled: Sampled) -> LoopRun:
-    entries = {_NEVER + place: entry for place, entry in sampled.faults.items()}
+    entries = {_NEVER + index: entry for index, entry in sampled.faults.items()}
 
     def changed(part: Any) -> Any:
         if isinstance(part, Occurrence):
@@ -211,8 +216,8 @@ def _with_faults(run: LoopRun, sampled: Sampled) -> LoopRun:
 
 def _occurrence_with(occurrence: Occurrence, entry: Mapping[str, Any]) -> Occurrence:
     numbers = {name: entry[name] for name in ("onset", "duration", "severity") if name in entry}
-    alike = {name: np.full_like(getattr(occurrence, name), number) for name, number in numbers.items()}
-    return dataclasses.replace(occurrence, **alike)
+    arrays = {name: np.full_like(getattr(occurrence, name), number) for name, number in numbers.items()}
+    return dataclasses.replace(occurrence, **arrays)
 
 
 def _input_fault_with(fault: InputFault, entry: Mapping[str, Any]) -> InputFault:
@@ -224,24 +229,30 @@ def _input_fault_with(fault: InputFault, entry: Mapping[str, Any]) -> InputFault
 
 
 def _other_bytes(
-    program: FaultProgram, runs: Sequence[Sampled], found: Mapping[int, Judged], seed: int
+    program: FaultProgram, runs: Sequence[Sampled], judged: Mapping[int, Judged], seed: int
 ) -> list[Failure]:
     """N6: runs whose bytes differ when they are built from their scenarios and run in the opposite order."""
     runs = runs[::-1]
-    again = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
-    pairs = [(run, one) for run, one in zip(runs, again, strict=True) if one.digest != found[run.seed].digest]
+    repeated_runs = judged_runs([program.scenario(run.faults, run.seed) for run in runs])
+    pairs = [
+        (run, repeated)
+        for run, repeated in zip(runs, repeated_runs, strict=True)
+        if repeated.digest != judged[run.seed].digest
+    ]
     return [
         Failure(
-            "N6", f"faults/{seed}/{run.seed}", f"digest {found[run.seed].digest}, and {one.digest} when it was repeated"
+            "N6",
+            f"faults/{seed}/{run.seed}",
+            f"digest {judged[run.seed].digest}, and {repeated.digest} when it was repeated",
         )
-        for run, one in pairs
+        for run, repeated in pairs
     ]
 
 
 def replay(identity: str) -> tuple[dict[str, Any], Judged]:
     """Scenario and run of an identity once more: `faults/SEED/NUMBER`."""
     _, seed, number = identity.split("/")
-    several = programs()
-    run = sampled(int(number) + 1, int(seed), several)[-1]
-    scenario = several[run.program].scenario(run.faults, run.seed)
+    all_programs = programs()
+    run = sampled(int(number) + 1, int(seed), all_programs)[-1]
+    scenario = all_programs[run.program].scenario(run.faults, run.seed)
     return scenario, judged_runs([scenario])[0]

@@ -86,45 +86,49 @@ def simulate_hours(
         until: time of `time.monotonic` after which no further loop begins.
         watch: called with the hours that are done.
     """
-    began, rows, failures, done = time.monotonic(), [], [], 0.0
-    each = hours / len(SCENARIOS)
-    longest = min(LONGEST, each)
-    number = max(1, round(each / longest))
+    began = time.monotonic()
+    rows = []
+    failures = []
+    done = 0.0
+    hours_of_each_loop = hours / len(SCENARIOS)
+    longest = min(LONGEST, hours_of_each_loop)
+    number = max(1, round(hours_of_each_loop / longest))
     before = _memory()
     for name in SCENARIOS:
         if time.monotonic() > until:
             break
-        asked = [scenario(name, longest, seed + i) for i in range(number)]
+        scenarios = [scenario(name, longest, seed + i) for i in range(number)]
         windows = max(2, round(longest))
-        found = judged_runs(asked, windows)
-        rows.append(_row(name, found, longest))
-        for i, one in enumerate(found):
+        judged = judged_runs(scenarios, windows)
+        rows.append(_row(name, judged, longest))
+        for i, run in enumerate(judged):
             identity = f"hours/{list(SCENARIOS).index(name)}/{longest:g}/{seed + i}"
-            failures += judged_run(one, identity, longest >= LONGEST)
+            failures += judged_run(run, identity, longest >= LONGEST)
         done += number * longest
         watch(done)
     return Hours(done, rows, failures, (before, _memory()), time.monotonic() - began)
 
 
-def judged_run(one: Judged, identity: str, whole_day: bool) -> list[Failure]:
+def judged_run(run: Judged, identity: str, whole_day: bool) -> list[Failure]:
     """Never-events of a long run; that it failed, and for a whole day that something grew, are failures as well."""
-    found = [Failure(event, identity, says) for event, says in one.events()]
-    if one.status is not Status.OK:
-        found.append(Failure("N3", identity, f"ended at {one.ended:.0f} s: {one.status.sentence}"))
+    failures = [Failure(event, identity, message) for event, message in run.events()]
+    if run.status is not Status.OK:
+        failures.append(Failure("N3", identity, f"ended at {run.ended:.0f} s: {run.status.sentence}"))
     elif whole_day:
-        rms, weights = one.rms(), one.counts.weights
+        rms = run.rms()
+        weights = run.counts.weights
         first, last = _size(rms[0]), _size(rms[-1])
         if last / first - 1 > _CHANGE:  # less than at first is the weather
-            found.append(Failure("N4", identity, f"rms of the last hour {last:.4g} m, of the first {first:.4g} m"))
+            failures.append(Failure("N4", identity, f"rms of the last hour {last:.4g} m, of the first {first:.4g} m"))
         if weights[-1] > (1 + _GROWTH) * weights[:-1].max():
-            found.append(Failure("N4", identity, f"weights grew to {weights[-1]:.3g} from {weights[:-1].max():.3g}"))
-    return found
+            failures.append(Failure("N4", identity, f"weights grew to {weights[-1]:.3g} from {weights[:-1].max():.3g}"))
+    return failures
 
 
 def replay(identity: str) -> Judged:
     """The run of an identity once more: `hours/LOOP/HOURS/SEED`."""
-    _, place, hours, seed = identity.split("/")
-    name = list(SCENARIOS)[int(place)]
+    _, index, hours, seed = identity.split("/")
+    name = list(SCENARIOS)[int(index)]
     return judged_runs([scenario(name, float(hours), int(seed))], max(2, round(float(hours))))[0]
 
 
@@ -133,22 +137,22 @@ def _size(rms: np.ndarray) -> float:
     return float(np.sqrt((rms[:3] ** 2).sum()))
 
 
-def _row(name: str, found: list[Judged], hours: float) -> dict[str, Any]:
-    sizes = [(_size(one.rms()[0]), _size(one.rms()[-1])) for one in found]
-    weights = [(one.counts.weights[0], one.counts.weights[-1]) for one in found]
-    mean = lambda values, place: float(np.mean([pair[place] for pair in values]))
+def _row(name: str, runs: list[Judged], hours: float) -> dict[str, Any]:
+    sizes = [(_size(run.rms()[0]), _size(run.rms()[-1])) for run in runs]
+    weights = [(run.counts.weights[0], run.counts.weights[-1]) for run in runs]
+    mean = lambda values, index: float(np.mean([pair[index] for pair in values]))
     row: Mapping[str, Any] = {
         "loop": name,
-        "runs": len(found),
+        "runs": len(runs),
         "hours": hours,
-        "completed": sum(one.status is Status.OK for one in found),
-        "alarms": sum(one.alarms for one in found),
+        "completed": sum(run.status is Status.OK for run in runs),
+        "alarms": sum(run.alarms for run in runs),
         "first_rms": mean(sizes, 0),
         "last_rms": mean(sizes, 1),
         "largest_change": float(max(abs(last / first - 1) for first, last in sizes)),
         "first_weights": mean(weights, 0),
         "last_weights": mean(weights, 1),
-        "backend": found[0].backend,
+        "backend": runs[0].backend,
     }
     return dict(row)
 

@@ -49,20 +49,21 @@ class _Worker:
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self.pipe, other = context.Pipe()
-        self._process = context.Process(target=work, args=(*self._arguments, other), daemon=True)
+        self.pipe, sender = context.Pipe()
+        self._process = context.Process(target=work, args=(*self._arguments, sender), daemon=True)
         self._process.start()
-        other.close()
+        sender.close()
         self.asked: tuple[str, int] | None = None
-        self.since, self._tried = time.monotonic(), 0
+        self.since = time.monotonic()
+        self._tried = 0
 
-    def ask(self, one: tuple[str, int]) -> None:
+    def ask(self, task: tuple[str, int]) -> None:
         """Let it try an input."""
         if self._tried >= _FRESH:
             self.end()
             self._start()
-        self.asked, self.since, self._tried = one, time.monotonic(), self._tried + 1
-        self.pipe.send(one)
+        self.asked, self.since, self._tried = task, time.monotonic(), self._tried + 1
+        self.pipe.send(task)
 
     def restart(self) -> str:
         """End the process and start another; how it ended."""
@@ -105,36 +106,43 @@ def try_inputs(
         until: time of `time.monotonic` after which no more are tried.
         watch: called with the numbers of inputs and failures so far.
     """
-    began, tasks = time.monotonic(), iter(planned(number))
+    began = time.monotonic()
+    tasks = iter(planned(number))
     counts: dict[str, Counter[str]] = {}
     failures: list[tuple[Failure, Attack]] = []
-    slowest, messages, total = 0.0, set(), 0
-    several = [_Worker(run, seed, material, folder / f"w{i}") for i in range(workers)]
+    slowest = 0.0
+    messages = set()
+    total = 0
+    processes = [_Worker(run, seed, material, folder / f"w{i}") for i in range(workers)]
     try:
-        for given, done in _answers(several, tasks, seed, material, until):
-            failure = judged(given.identity, given.arguments, given.files, done)
-            ending = "failed" if failure else "refused" if done.code in REFUSED else "accepted"
-            counts.setdefault(given.identity.split("/")[1], Counter())[ending] += 1
+        for hostile_input, outcome in _answers(processes, tasks, seed, material, until):
+            failure = judged(hostile_input.identity, hostile_input.arguments, hostile_input.files, outcome)
+            ending = "failed" if failure else "refused" if outcome.code in REFUSED else "accepted"
+            counts.setdefault(hostile_input.identity.split("/")[1], Counter())[ending] += 1
             total += 1
             if failure:
-                failures.append((failure, given))
+                failures.append((failure, hostile_input))
             elif ending == "refused":
-                slowest = max(slowest, done.seconds[0])
-                messages.add(_shape(done.err))
+                slowest = max(slowest, outcome.seconds[0])
+                messages.add(_shape(outcome.err))
             watch(total, len(failures))
     finally:
-        for one in several:
-            one.end()
+        for process in processes:
+            process.end()
     plain = {kind: dict(counted) for kind, counted in sorted(counts.items())}
     return Tried(plain, failures, slowest, len(messages), time.monotonic() - began)
 
 
 def _answers(
-    several: Sequence[_Worker], tasks: Iterator[tuple[str, int]], seed: int, material: Mapping[str, bytes], until: float
+    processes: Sequence[_Worker],
+    tasks: Iterator[tuple[str, int]],
+    seed: int,
+    material: Mapping[str, bytes],
+    until: float,
 ) -> Iterator[tuple[Attack, Done]]:
     """Every input with what it did, as they end."""
     busy: dict[Any, _Worker] = {}
-    idle = list(several)
+    idle = list(processes)
     while True:
         while idle and time.monotonic() < until and (task := next(tasks, None)) is not None:
             worker = idle.pop()
@@ -143,25 +151,25 @@ def _answers(
         if not busy:
             return
         ready: list[Connection] = wait(list(busy), 1.0)  # pyright: ignore[reportAssignmentType]
-        late = [pipe for pipe, worker in busy.items() if time.monotonic() - worker.since > _LATEST]
-        for pipe in {*ready, *late}:
+        overdue = [pipe for pipe, worker in busy.items() if time.monotonic() - worker.since > _LATEST]
+        for pipe in {*ready, *overdue}:
             worker = busy.pop(pipe)
-            asked = worker.asked
-            assert asked is not None
+            task_of_worker = worker.asked
+            assert task_of_worker is not None
             try:
                 if pipe not in ready:
                     raise EOFError
                 answer = worker.pipe.recv()
             except (EOFError, OSError):
                 elapsed = time.monotonic() - worker.since
-                how = worker.restart()
-                answer = attack(*_known(asked, seed), material), Done(None, "", how, (elapsed, elapsed), ())
+                cause = worker.restart()
+                answer = attack(*_known(task_of_worker, seed), material), Done(None, "", cause, (elapsed, elapsed), ())
             idle.append(worker)
             yield answer
 
 
-def _known(asked: tuple[str, int], seed: int) -> tuple[str, int, int]:
-    return asked[0], seed, asked[1]
+def _known(task: tuple[str, int], seed: int) -> tuple[str, int, int]:
+    return task[0], seed, task[1]
 
 
 def _shape(err: str) -> str:

@@ -54,12 +54,12 @@ def attack(kind: str, seed: int, number: int, material: Mapping[str, bytes]) -> 
 
 def planned(number: int) -> list[tuple[str, int]]:
     """Kind and number of each of so many inputs, kinds mixed so that an interrupted soak has some of each."""
-    whole = sum(kind.share for kind in KINDS.values())
-    found = []
+    total_share = sum(kind.share for kind in KINDS.values())
+    ordered = []
     for name, kind in KINDS.items():
-        count = max(1, round(number * kind.share / whole))
-        found += [((i + 0.5) / count, name, i) for i in range(count)]
-    return [(name, i) for _, name, i in sorted(found)][:number]
+        count = max(1, round(number * kind.share / total_share))
+        ordered += [((i + 0.5) / count, name, i) for i in range(count)]
+    return [(name, i) for _, name, i in sorted(ordered)][:number]
 
 
 def _encoded(text: str) -> bytes:
@@ -81,8 +81,10 @@ def _vehicle(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict
 
 
 def _table(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[str, bytes | None], list[str]]:
-    whole = _encoded(specimens.TABLE)
-    table = spoilt_bytes(whole, chance) if chance.random() < 0.5 else _encoded(spoilt_text(specimens.TABLE, chance))
+    valid_table = _encoded(specimens.TABLE)
+    table = (
+        spoilt_bytes(valid_table, chance) if chance.random() < 0.5 else _encoded(spoilt_text(specimens.TABLE, chance))
+    )
     files = specimens.scenario_files(specimens.SCENARIOS["recorded"])
     return {**files, "d.csv": table}, [BUILD, "s.yaml"]
 
@@ -101,12 +103,12 @@ def _log(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[str
     names = [name for name in material if not name.startswith("store/")]
     name = chance.choice(names)
     if name.startswith("bag/"):
-        bag = {one: data for one, data in material.items() if one.startswith("bag/")}
+        bag = {file_name: data for file_name, data in material.items() if file_name.startswith("bag/")}
         return {**bag, name: spoilt_bytes(material[name], chance), "bag": None}, ["logs", "bag"]
     suffix = Path(name).suffix if chance.random() < 0.95 else chance.choice((".mcap", ".ulg", ".bin", ".db3", ".csv"))
-    given = f"log{suffix}"
+    log_name = f"log{suffix}"
     out = ["--out", chance.choice(("x.csv", "x.mcap"))] if chance.random() < 0.2 else []
-    return {given: spoilt_bytes(material[name], chance)}, ["logs", given, *out]
+    return {log_name: spoilt_bytes(material[name], chance)}, ["logs", log_name, *out]
 
 
 def _result(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[str, bytes | None], list[str]]:
@@ -154,12 +156,13 @@ def _store(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[s
         f"out/{name.removeprefix('store/')}": data for name, data in material.items() if name.startswith("store/")
     }
     for _ in range(chance.choice((1, 1, 2, 5))):
-        name, how = chance.choice(sorted(store)), chance.random()
-        if how < 0.5:
+        name = chance.choice(sorted(store))
+        draw = chance.random()
+        if draw < 0.5:
             store[name] = spoilt_bytes(store[name] or b"", chance)
-        elif how < 0.75 and len(store) > 1:
+        elif draw < 0.75 and len(store) > 1:
             del store[name]
-        elif how < 0.9:
+        elif draw < 0.9:
             store[chance.choice(sorted(store))] = store[name]
         else:
             store[name + chance.choice((".partial", ".x", "2"))] = chance.randbytes(40)

@@ -56,16 +56,17 @@ class Judged(NamedTuple):
 
     def events(self) -> list[tuple[str, str]]:
         """Never-events of the run, and what happened in each."""
-        counts, found = self.counts, []
+        counts = self.counts
+        events = []
         if counts.undefined_inputs > 0:
-            found.append(("N1", f"an input that is not finite at {int(counts.undefined_inputs)} steps"))
+            events.append(("N1", f"an input that is not finite at {int(counts.undefined_inputs)} steps"))
         if counts.exceeded_limits > 0:
-            found.append(("N1", f"an input beyond its limits at {int(counts.exceeded_limits)} steps"))
+            events.append(("N1", f"an input beyond its limits at {int(counts.exceeded_limits)} steps"))
         if self.status is Status.OK and not (self.finite and counts.undefined_outputs == 0):
-            found.append(("N4", "a run that is completed has states that are not finite"))
+            events.append(("N4", "a run that is completed has states that are not finite"))
         if int(counts.steps) != self.steps:
-            found.append(("N4", f"{int(counts.steps)} of {self.steps} steps were counted"))
-        return found
+            events.append(("N4", f"{int(counts.steps)} of {self.steps} steps were counted"))
+        return events
 
     def rms(self) -> np.ndarray:
         """Tracking error of each window and axis, rms; NaN for a window without samples. Shape (windows, n)."""
@@ -101,9 +102,9 @@ def judge(
     judged: dict[int, Judged] = {}
     at_once = min(_AT_ONCE, math.ceil(len(runs) / workers)) if runs else 1
     for batch in run_many(runs, workers=workers, at_once=at_once, watch=watch):
-        for place, outcome in batch.each():
-            judged[place] = _judged(outcome, runs[place].plan.steps, batch.backend)
-    return [judged[place] for place in range(len(runs))]
+        for index, outcome in batch.each():
+            judged[index] = _judged(outcome, runs[index].plan.steps, batch.backend)
+    return [judged[index] for index in range(len(runs))]
 
 
 @in_its_precision
@@ -117,14 +118,16 @@ def watched(built: Built, windows: int) -> PreparedRun:
 
 
 def _judged(outcome: Outcome, steps: int, backend: str) -> Judged:
-    one: Any = outcome._replace(time=(), signals=())
-    leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(one)]
+    result: Any = outcome._replace(time=(), signals=())
+    leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(result)]
     digest = hashlib.sha256(b"".join(leaf.tobytes() for leaf in leaves)).hexdigest()[:16]
-    final = [np.asarray(leaf) for leaf in jax.tree.leaves(one.final)]
+    final = [np.asarray(leaf) for leaf in jax.tree.leaves(result.final)]
     finite = all(bool(np.isfinite(leaf).all()) for leaf in final if np.issubdtype(leaf.dtype, np.inexact))
-    status = Status(int(one.status))
-    supervised = state_in(one.final[1])
+    status = Status(int(result.status))
+    supervised = state_in(result.final[1])
     state = "" if supervised is None else state_of(int(supervised.state)).name
     changes = () if supervised is None else tuple(transitions(supervised.log))
     alarms = 0 if supervised is None else max(0, int(supervised.log.number) - _BEGINNING)
-    return Judged(status, state, changes, alarms, float(one.ended), one.accumulated[0], finite, steps, digest, backend)
+    return Judged(
+        status, state, changes, alarms, float(result.ended), result.accumulated[0], finite, steps, digest, backend
+    )

@@ -39,8 +39,8 @@ def _keep_what_is_compiled() -> None:
             if error.name != package:
                 raise
             continue
-        made = getattr(module, name)
-        setattr(module, name, _once(f"{module_name}.{name}", made))
+        function = getattr(module, name)
+        setattr(module, name, _once(f"{module_name}.{name}", function))
     _kept.setdefault("", None)
 
 

@@ -70,27 +70,29 @@ def kill_campaigns(
         until: time of `time.monotonic` after which no further campaign begins.
         watch: called with the number of kills.
     """
-    began, chance = time.monotonic(), random.Random(f"kills/{seed}")
+    began = time.monotonic()
+    chance = random.Random(f"kills/{seed}")
     path = folder / "c.yaml"
     data = load(specimens.CAMPAIGN, "", "")[0] | {"trials": trials, "chunk": 5}
     path.write_text(dump(data), encoding="utf-8")
-    whole = _start(path, folder / "whole")
-    if whole.wait() not in (0, 1):
-        says = f"an undisturbed campaign ended with exit code {whole.returncode}"
-        return Kills(0, 1, 2 * trials, 0, 0, 0, [Failure("N2", f"kills/{seed}/0", says)], time.monotonic() - began)
+    undisturbed = _start(path, folder / "whole")
+    if undisturbed.wait() not in (0, 1):
+        message = f"an undisturbed campaign ended with exit code {undisturbed.returncode}"
+        return Kills(0, 1, 2 * trials, 0, 0, 0, [Failure("N2", f"kills/{seed}/0", message)], time.monotonic() - began)
     expected = _contents(folder / "whole")
     sabotage = _Sabotage(chance, path)
     failures: list[Failure] = []
     campaigns = 0
     while sabotage.kills < kills and time.monotonic() < until:
         campaigns += 1
-        identity, out = f"kills/{seed}/{campaigns}", folder / "killed"
-        for event, says in sabotage.one_campaign(out, kills, watch):
-            failures.append(Failure(event, identity, says))
-        found = _contents(out)
-        if found != expected:
-            other = sorted(name for name in {*found, *expected} if found.get(name) != expected.get(name))
-            failures.append(Failure("N5", identity, f"{len(other)} files differ, such as {other[0]}"))
+        identity = f"kills/{seed}/{campaigns}"
+        out = folder / "killed"
+        for event, message in sabotage.one_campaign(out, kills, watch):
+            failures.append(Failure(event, identity, message))
+        contents = _contents(out)
+        if contents != expected:
+            differing = sorted(name for name in {*contents, *expected} if contents.get(name) != expected.get(name))
+            failures.append(Failure("N5", identity, f"{len(differing)} files differ, such as {differing[0]}"))
         shutil.rmtree(out)
     counted = (sabotage.damaged, sabotage.disk_full, sabotage.second)
     return Kills(sabotage.kills, campaigns, 2 * trials, *counted, failures, time.monotonic() - began)
@@ -105,38 +107,39 @@ class _Sabotage:
 
     def one_campaign(self, out: Path, most: int, watch: Callable[[int], None]) -> list[tuple[str, str]]:
         """One campaign from its beginning to its end; never-events."""
-        found: list[tuple[str, str]] = []
+        events: list[tuple[str, str]] = []
         while True:
             full = self._chance.random() < _DISK_FULL
             process = _start(self._path, out, self._chance.choice((400, 1500, 4000)) if full else 0)
             if self.kills >= most:
-                return found + self._finish(process, out)
-            ended = self._kill(process, out)
-            if ended is None:  # it had finished, or its files could not grow
+                return events + self._finish(process, out)
+            code_after_signal = self._kill(process, out)
+            if code_after_signal is None:  # it had finished, or its files could not grow
                 code = process.returncode
                 if full and code == 4:
                     self.disk_full += 1
                 elif code in (0, 1):
-                    return found
+                    return events
                 else:
-                    return [*found, ("N2", f"a resumed campaign ended with exit code {code}")]
+                    return [*events, ("N2", f"a resumed campaign ended with exit code {code}")]
             else:
                 self.kills += 1
                 watch(self.kills)
-                if ended not in (-int(signal.SIGKILL), *_ANSWERS.values(), 4):
-                    found.append(("N2", f"a process that got a signal ended with exit code {ended}"))
+                if code_after_signal not in (-int(signal.SIGKILL), *_ANSWERS.values(), 4):
+                    events.append(("N2", f"a process that got a signal ended with exit code {code_after_signal}"))
             if (out / STORE).exists() and self._chance.random() < _DAMAGED:
                 self._damage(out / STORE)
 
     def _kill(self, process: subprocess.Popen, out: Path) -> int | None:
         """End a process some time after its store grew; how it ended, None where it ended by itself."""
-        before, began = _size(out), time.monotonic()
+        before = _size(out)
+        began = time.monotonic()
         while _size(out) == before and process.poll() is None and time.monotonic() - began < _LATEST:
             time.sleep(0.01)
         if self._chance.random() < _SECOND and process.poll() is None:
             self.second += 1
-            other = _start(self._path, out)
-            other.wait()
+            second = _start(self._path, out)
+            second.wait()
         time.sleep(self._chance.uniform(0.0, 0.4))
         if process.poll() is not None:
             return None
@@ -160,11 +163,12 @@ class _Sabotage:
             return
         self.damaged += 1
         chunk = self._chance.choice(chunks)
-        data, how = bytearray(chunk.read_bytes()), self._chance.random()
-        if how < 0.4 and data:
+        data = bytearray(chunk.read_bytes())
+        draw = self._chance.random()
+        if draw < 0.4 and data:
             data[self._chance.randrange(len(data))] ^= 1 << self._chance.randrange(8)
             chunk.write_bytes(bytes(data))
-        elif how < 0.8:
+        elif draw < 0.8:
             chunk.write_bytes(bytes(data[: self._chance.randrange(len(data) + 1)]))
         else:
             chunk.with_name(f"{chunk.name}.0123.partial").write_bytes(bytes(data[: len(data) // 2]))

@@ -75,21 +75,25 @@ def attack_links(
         until: time of `time.monotonic` after which no further run begins.
         watch: called with the number of runs that are done, by link, and the never-events of the last ones.
     """
-    began, left_out = time.monotonic(), {}
+    began = time.monotonic()
+    left_out = {}
     runs: dict[str, list[LinkRun]] = {}
     pipes: dict[Any, str] = {}
-    processes, context = [], multiprocessing.get_context("spawn")
+    processes = []
+    context = multiprocessing.get_context("spawn")
     for link in links:
-        if missing := [one for one in _PACKAGES.get(link, ()) if importlib.util.find_spec(one) is None]:
+        if missing := [package for package in _PACKAGES.get(link, ()) if importlib.util.find_spec(package) is None]:
             left_out[link] = f"{missing[0]} is not installed"
             continue
-        pipe, other = context.Pipe()
-        own = folder / link
-        own.mkdir()
+        pipe, sender = context.Pipe()
+        folder_of_link = folder / link
+        folder_of_link.mkdir()
         limit = until - time.monotonic()
-        processes.append(context.Process(target=_attack_link, args=(run, link, number, seed, str(own), limit, other)))
+        processes.append(
+            context.Process(target=_attack_link, args=(run, link, number, seed, str(folder_of_link), limit, sender))
+        )
         processes[-1].start()
-        other.close()
+        sender.close()
         pipes[pipe], runs[link] = link, []
     try:
         while pipes:
@@ -97,24 +101,26 @@ def attack_links(
             if not ready:
                 left_out |= dict.fromkeys(pipes.values(), f"no run within {_LATEST:g} s")
                 break
-            found: list[Failure] = []
+            failures_of_last_runs: list[Failure] = []
             for pipe in ready:
                 try:
                     runs[pipes[pipe]].append(pipe.recv())
-                    found += runs[pipes[pipe]][-1].failures
+                    failures_of_last_runs += runs[pipes[pipe]][-1].failures
                 except EOFError:
                     del pipes[pipe]
-            watch({link: len(each) for link, each in runs.items()}, found)
+            watch({link: len(runs_of_link) for link, runs_of_link in runs.items()}, failures_of_last_runs)
     finally:
         for process in processes:
             process.terminate() if pipes else process.join()
-    every = [one for each in runs.values() for one in each]
-    failures = [failure for one in every for failure in one.failures]
-    for link, each in runs.items():
-        if len(each) < number and time.monotonic() < until:
-            failures.append(Failure("N3", f"links/{link}/{seed}/{len(each)}", "the process that attacks it ended"))
-    rows = [_row(link, each) for link, each in runs.items() if each]
-    return LinksSoakResult(len(every), left_out, rows, _worst(every), failures, time.monotonic() - began)
+    all_runs = [link_run for runs_of_link in runs.values() for link_run in runs_of_link]
+    failures = [failure for link_run in all_runs for failure in link_run.failures]
+    for link, runs_of_link in runs.items():
+        if len(runs_of_link) < number and time.monotonic() < until:
+            failures.append(
+                Failure("N3", f"links/{link}/{seed}/{len(runs_of_link)}", "the process that attacks it ended")
+            )
+    rows = [_row(link, runs_of_link) for link, runs_of_link in runs.items() if runs_of_link]
+    return LinksSoakResult(len(all_runs), left_out, rows, _worst(all_runs), failures, time.monotonic() - began)
 
 
 def replay(run: Run, identity: str, folder: Path) -> LinkRun:
@@ -157,42 +163,45 @@ def _runner(link: str, command: CommandProcess, folder: Path, seed: int) -> Runn
     scenario.write_text(SCENARIO, encoding="utf-8")
     if link == "ardupilot":
         return ArdupilotRunner(command, scenario).run
-    vehicle, log = DrivenVehicle(scenario), None
+    vehicle = DrivenVehicle(scenario)
+    log = None
     if link == "run":
-        peer, log = UdpPeer(str(folder / "out")), folder / "out" / "run.mcap"
+        peer = UdpPeer(str(folder / "out"))
+        log = folder / "out" / "run.mcap"
     elif link == "ros2":
         domain = random.Random(f"{seed}/{os.getpid()}").choice(_DOMAINS)
-        peer, log = Ros2Peer(domain, str(folder / "bag")), folder / "bag"
+        peer = Ros2Peer(domain, str(folder / "bag"))
+        log = folder / "bag"
     else:
         peer = MavlinkPeer(vehicle.vehicle, _OUTPUTS[link])
     return LinkRunner(command, peer, vehicle, scenario, log, stops_itself=link == "ros2").run
 
 
 def _row(link: str, runs: Sequence[LinkRun]) -> dict[str, Any]:
-    undisturbed = [one for one in runs if not one.plan.events and one.plan.disk is None]
+    undisturbed = [run for run in runs if not run.plan.events and run.plan.disk is None]
     largest = lambda values: float(np.max(list(values), initial=0.0))
     return {
         "link": link,
         "runs": len(runs),
-        "failed": sum(bool(one.failures) for one in runs),
-        "undisturbed_volt_seconds": largest(one.volt_seconds for one in undisturbed),
-        "worst_volt_seconds": largest(one.volt_seconds for one in runs),
-        "full_after_one": largest(one.longest_full for one in runs if one.plan.is_single),
-        "full": largest(one.longest_full for one in runs),
-        "furthest": largest(one.furthest for one in runs),
-        "neutral_after": largest(one.neutral_after for one in runs),
+        "failed": sum(bool(run.failures) for run in runs),
+        "undisturbed_volt_seconds": largest(run.volt_seconds for run in undisturbed),
+        "worst_volt_seconds": largest(run.volt_seconds for run in runs),
+        "full_after_one": largest(run.longest_full for run in runs if run.plan.is_single),
+        "full": largest(run.longest_full for run in runs),
+        "furthest": largest(run.furthest for run in runs),
+        "neutral_after": largest(run.neutral_after for run in runs),
     }
 
 
 def _worst(runs: Sequence[LinkRun], number: int = 10) -> list[dict[str, Any]]:
     """The runs with the most volt-seconds."""
-    chosen = sorted(runs, key=lambda one: -one.volt_seconds)[:number]
+    worst_runs = sorted(runs, key=lambda run: -run.volt_seconds)[:number]
     return [
         {
-            "identity": one.plan.identity,
-            "volt_seconds": one.volt_seconds,
-            "full": one.longest_full,
-            "plan": str(one.plan),
+            "identity": run.plan.identity,
+            "volt_seconds": run.volt_seconds,
+            "full": run.longest_full,
+            "plan": str(run.plan),
         }
-        for one in chosen
+        for run in worst_runs
     ]

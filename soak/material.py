@@ -20,26 +20,28 @@ def material(run: Run) -> dict[str, bytes]:
     Args:
         run: `undertow` with arguments, in this process.
     """
-    found = {"log.bin": _ardupilot(), "log.ulg": _px4()}
+    files = {"log.bin": _ardupilot(), "log.ulg": _px4()}
     before = Path.cwd()
     with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
         folder = Path(name)
         os.chdir(folder)
         try:
-            done = simulate_scenario(load(specimens.SCENARIOS["axis"], "", "")[0])
-            done.save("run.nc")
+            result = simulate_scenario(load(specimens.SCENARIOS["axis"], "", "")[0])
+            result.save("run.nc")
             for log in ("run.mcap", "run.csv"):
-                done.log().save(Path(log))
-            found |= {one: (folder / one).read_bytes() for one in ("run.nc", "run.mcap", "run.csv")}
+                result.log().save(Path(log))
+            files |= {file_name: (folder / file_name).read_bytes() for file_name in ("run.nc", "run.mcap", "run.csv")}
             Path("c.yaml").write_text(specimens.CAMPAIGN, encoding="utf-8")
             if code := run(["campaign", "c.yaml", "--out", "out", "--workers", "1"]):
                 raise RuntimeError(f"the campaign that stores are made of ended with exit code {code}")
-            found |= {f"store/{one}": data for one, data in _files(folder / "out") if one.startswith(STORE)}
+            files |= {
+                f"store/{file_name}": data for file_name, data in _files(folder / "out") if file_name.startswith(STORE)
+            }
             if _bag(folder / "bag"):
-                found |= {f"bag/{one}": data for one, data in _files(folder / "bag")}
+                files |= {f"bag/{file_name}": data for file_name, data in _files(folder / "bag")}
         finally:
             os.chdir(before)
-    return found
+    return files
 
 
 def _files(folder: Path) -> Iterator[tuple[str, bytes]]:
@@ -93,6 +95,6 @@ def _bag(folder: Path) -> bool:
     with Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection("/thrusters", kind, typestore=store)
         for i in range(20):
-            made = store.types[kind](layout, np.arange(6.0) + i)
-            writer.write(connection, 100_000_000 * i, store.serialize_cdr(made, kind))
+            message = store.types[kind](layout, np.arange(6.0) + i)
+            writer.write(connection, 100_000_000 * i, store.serialize_cdr(message, kind))
     return True

@@ -128,25 +128,25 @@ def change(data: Any, chance: random.Random) -> None:
     node = data
     for key in above:
         node = node[key]
-    how = chance.random()
-    if how < 0.5:
+    draw = chance.random()
+    if draw < 0.5:
         node[last] = _value(chance, node[last])
-    elif how < 0.6:
+    elif draw < 0.6:
         del node[last]
     elif isinstance(node, list):
-        node.insert(last, copy.deepcopy(node[last]) if how < 0.8 else _value(chance, None))
-    elif how < 0.72:
+        node.insert(last, copy.deepcopy(node[last]) if draw < 0.8 else _value(chance, None))
+    elif draw < 0.72:
         node[_misspelt(str(last), chance)] = node.pop(last)
-    elif how < 0.78:
+    elif draw < 0.78:
         node[chance.choice(_KEYS)] = node.pop(last)
-    elif how < 0.88:
+    elif draw < 0.88:
         node[chance.choice(_KEYS)] = _value(chance, None)
     else:  # the value of another place
-        *others, key = chance.choice(places)
-        other = data
-        for step in others:
-            other = other[step]
-        node[last] = copy.deepcopy(other[key]) if key in other or isinstance(other, list) else None
+        *path, key = chance.choice(places)
+        source = data
+        for step in path:
+            source = source[step]
+        node[last] = copy.deepcopy(source[key]) if key in source or isinstance(source, list) else None
 
 
 def _places(node: Any, path: Path_ = ()) -> Iterator[Path_]:
@@ -157,8 +157,9 @@ def _places(node: Any, path: Path_ = ()) -> Iterator[Path_]:
 
 
 def _misspelt(word: str, chance: random.Random) -> str:
-    at = chance.randrange(len(word) + 1)
-    left, right = word[:at], word[at:]
+    position = chance.randrange(len(word) + 1)
+    left = word[:position]
+    right = word[position:]
     swapped = left[:-1] + right[:1] + left[-1:] + right[1:]
     return chance.choice(
         (left + right[1:], left + "e" + right, swapped, word.upper(), word + " ", word.replace("_", ""))
@@ -166,22 +167,22 @@ def _misspelt(word: str, chance: random.Random) -> str:
 
 
 def _value(chance: random.Random, before: Any) -> Any:
-    how = chance.random()
-    if how < 0.3:
+    draw = chance.random()
+    if draw < 0.3:
         return chance.choice(_NUMBERS)
-    if how < 0.42:
+    if draw < 0.42:
         return chance.choice(_ODD)
-    if how < 0.5:
+    if draw < 0.5:
         return chance.choice(_UNITS)
-    if how < 0.62:
+    if draw < 0.62:
         return chance.choice(_WORDS)
-    if how < 0.75 and isinstance(before, int | float):
+    if draw < 0.75 and isinstance(before, int | float):
         return before * chance.choice((-1, 1e-6, 1e6, 1e30, 2, 0.5))
-    if how < 0.85:
+    if draw < 0.85:
         return [chance.choice(_NUMBERS)] * chance.choice((0, 1, 2, 3, 6, 7, 40))
-    if how < 0.9:
+    if draw < 0.9:
         return [[chance.choice((*_NUMBERS, *_ODD))] * chance.choice((1, 3, 7))] * chance.choice((1, 2, 6))
-    if how < 0.95:
+    if draw < 0.95:
         return {chance.choice(_KEYS): chance.choice((*_NUMBERS, *_ODD, *_WORDS))}
     nested = chance.choice(_NUMBERS)
     for _ in range(chance.choice((1, 3, 30))):
@@ -192,32 +193,32 @@ def _value(chance: random.Random, before: Any) -> Any:
 def spoilt_text(text: str, chance: random.Random) -> str:
     """Text with a slip of the keyboard or of an editor: of a few characters, of a line, of all."""
     lines = text.splitlines(keepends=True)
-    at, line = chance.randrange(len(text) + 1), chance.randrange(len(lines))
-    how = chance.random()
-    if how < 0.3:
-        return text[:at] + chance.choice(_JUNK) + text[at:]
-    if how < 0.4:
-        return text[:at] + text[at + chance.choice((1, 1, 2, 5, 40)) :]
-    if how < 0.48:
-        return text[:at]
-    if how < 0.56:
+    position, line = chance.randrange(len(text) + 1), chance.randrange(len(lines))
+    draw = chance.random()
+    if draw < 0.3:
+        return text[:position] + chance.choice(_JUNK) + text[position:]
+    if draw < 0.4:
+        return text[:position] + text[position + chance.choice((1, 1, 2, 5, 40)) :]
+    if draw < 0.48:
+        return text[:position]
+    if draw < 0.56:
         lines.insert(chance.randrange(len(lines) + 1), lines[line])
-    elif how < 0.62:
+    elif draw < 0.62:
         del lines[line]
-    elif how < 0.72:
+    elif draw < 0.72:
         lines[line] = chance.choice((" ", "    ", "\t")) + lines[line]
-    elif how < 0.78:
+    elif draw < 0.78:
         lines[line] = lines[line].lstrip()
-    elif how < 0.84:
-        return text[:at] + chance.choice((*map(str, _NUMBERS), *_UNITS, *_WORDS)) + text[at:]
-    elif how < 0.88:
+    elif draw < 0.84:
+        return text[:position] + chance.choice((*map(str, _NUMBERS), *_UNITS, *_WORDS)) + text[position:]
+    elif draw < 0.88:
         return chance.choice(_BOMBS) if chance.random() < 0.5 else text + chance.choice(_BOMBS)
-    elif how < 0.92:
+    elif draw < 0.92:
         return "\ufeff" + text if chance.random() < 0.5 else text.replace("\n", "\r\n")
-    elif how < 0.95:
+    elif draw < 0.95:
         return chance.choice(("", "\n", "~", "[]", "{}", "3", "a", "- a", "#", "---", "a: b: c", "null", "\0"))
     else:
-        return text[:at] + "".join(chance.choice(_JUNK) for _ in range(chance.choice((3, 30)))) + text[at:]
+        return text[:position] + "".join(chance.choice(_JUNK) for _ in range(chance.choice((3, 30)))) + text[position:]
     return "".join(lines)
 
 
@@ -225,22 +226,23 @@ def spoilt_bytes(data: bytes, chance: random.Random) -> bytes:
     """Bytes with what a disk, a cable or another program does to them."""
     if not data:
         return data
-    spoilt, how = bytearray(data), chance.random()
-    at = chance.randrange(len(data))
-    if how < 0.4:
+    spoilt = bytearray(data)
+    draw = chance.random()
+    position = chance.randrange(len(data))
+    if draw < 0.4:
         for _ in range(chance.choice((1, 1, 2, 8, 60))):
             spoilt[chance.randrange(len(spoilt))] ^= 1 << chance.randrange(8)
-    elif how < 0.6:
-        del spoilt[at:]
-    elif how < 0.7:
-        del spoilt[at : at + chance.choice((1, 4, 100, 4096))]
-    elif how < 0.8:
-        spoilt[at:at] = chance.randbytes(chance.choice((1, 4, 100)))
-    elif how < 0.9:
+    elif draw < 0.6:
+        del spoilt[position:]
+    elif draw < 0.7:
+        del spoilt[position : position + chance.choice((1, 4, 100, 4096))]
+    elif draw < 0.8:
+        spoilt[position:position] = chance.randbytes(chance.choice((1, 4, 100)))
+    elif draw < 0.9:
         long = chance.choice((1, 4, 8, 512))
-        spoilt[at : at + long] = chance.choice((bytes(long), b"\xff" * long, chance.randbytes(long)))
-    elif how < 0.95:
-        spoilt[at:at] = spoilt[at : at + 512]
+        spoilt[position : position + long] = chance.choice((bytes(long), b"\xff" * long, chance.randbytes(long)))
+    elif draw < 0.95:
+        spoilt[position:position] = spoilt[position : position + 512]
     else:
         return chance.choice(
             (b"", bytes(64), bytes(range(256)), b"\x89PNG\r\n\x1a\n" + bytes(40), b"PK\x03\x04", data * 2)
@@ -252,16 +254,19 @@ def spoilt_words(words: list[str], chance: random.Random) -> list[str]:
     """A command line with a word misspelt, removed, doubled, replaced or added."""
     spoilt = list(words)
     for _ in range(chance.choice((1, 1, 2))):
-        at, how = chance.randrange(len(spoilt) + 1), chance.random()
-        inside = min(at, len(spoilt) - 1)
-        if how < 0.3 and spoilt:
+        position = chance.randrange(len(spoilt) + 1)
+        draw = chance.random()
+        inside = min(position, len(spoilt) - 1)
+        if draw < 0.3 and spoilt:
             spoilt[inside] = _misspelt(spoilt[inside], chance)
-        elif how < 0.45 and spoilt:
+        elif draw < 0.45 and spoilt:
             del spoilt[inside]
-        elif how < 0.55 and spoilt:
-            spoilt.insert(at, spoilt[inside])
-        elif how < 0.8 and spoilt:
+        elif draw < 0.55 and spoilt:
+            spoilt.insert(position, spoilt[inside])
+        elif draw < 0.8 and spoilt:
             spoilt[inside] = str(chance.choice((*_NUMBERS, *_UNITS, *_WORDS)))
         else:
-            spoilt.insert(at, chance.choice(("--", "-", "--x", "-v", "--out=", "-o", *_WORDS, *map(str, _NUMBERS))))
+            spoilt.insert(
+                position, chance.choice(("--", "-", "--x", "-v", "--out=", "-o", *_WORDS, *map(str, _NUMBERS)))
+            )
     return [word.replace("\0", "") for word in spoilt]  # no command line can hold one

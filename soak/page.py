@@ -13,14 +13,14 @@ def soak_page(summary: Mapping[str, Any]) -> str:
     failed = len(summary["failures"])
     verdict = f"{failed or 'No'} never-event{'s' if failed > 1 else ''} occurred."
     facts = f"undertow {summary['version']}, Python {summary['python']}, {summary['machine']}, seed {summary['seed']}."
-    made = [_SECTIONS[part](found) for part, found in summary["parts"].items()]
+    sections = [_SECTIONS[part](results) for part, results in summary["parts"].items()]
     return document(
         summary["title"],
         tag("h1", summary["title"]),
         tag("p", f"{verdict} {facts} It took {_time(summary['seconds'])}.", class_="lead"),
         section("events", "Never-events", _events(summary)),
         *([section("failures", "Failures", *_failures(summary["failures"]))] if failed else []),
-        *made,
+        *sections,
     )
 
 
@@ -30,43 +30,44 @@ def _events(summary: Mapping[str, Any]) -> Html:
 
 
 def _failures(failures: Sequence[Mapping[str, Any]]) -> list[Html]:
-    rows = [(one["identity"], one["event"], one["says"]) for one in failures[:_SHOWN]]
+    rows = [(failure["identity"], failure["event"], failure["says"]) for failure in failures[:_SHOWN]]
     command = tag("code", "python -m soak --replay IDENTITY")
     hint = join("To repeat one alone, run ", command, ". Its files are in the folder failures/.")
     return [tag("p", hint), table(("identity", "event", "what happened"), rows, wide=True)]
 
 
-def _inputs(found: Mapping[str, Any]) -> Html:
+def _inputs(results: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['number']} hostile inputs were tried in {_time(found['seconds'])}. Each must be accepted, or refused "
-        "by one line that names the place, within 1 s of processor time and without files left behind. The slowest "
-        f"rejection took {found['slowest']:.2f} s. There were {found['messages']} different messages."
+        f"{results['number']} hostile inputs were tried in {_time(results['seconds'])}. Each must be accepted, or "
+        "refused by one line that names the place, within 1 s of processor time and without files left behind. The "
+        f"slowest rejection took {results['slowest']:.2f} s. There were {results['messages']} different messages."
     )
     endings = ("accepted", "refused", "failed")
-    rows = [(kind, *(str(counts.get(one, 0)) for one in endings)) for kind, counts in found["counts"].items()]
+    rows = [(kind, *(str(counts.get(ending, 0)) for ending in endings)) for kind, counts in results["counts"].items()]
     return section("inputs", "Hostile inputs", tag("p", words), table(("kind", *endings), rows, (1, 2, 3)))
 
 
-def _kills(found: Mapping[str, Any]) -> Html:
+def _kills(results: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['campaigns']} campaigns of {found['trials']} trials were ended {found['kills']} times by kill -9, "
-        f"Ctrl-C or SIGTERM at random moments and resumed, in {_time(found['seconds'])}. Their tables are compared "
-        "byte by byte with that of a campaign that was left alone."
+        f"{results['campaigns']} campaigns of {results['trials']} trials were ended {results['kills']} times by "
+        f"kill -9, Ctrl-C or SIGTERM at random moments and resumed, in {_time(results['seconds'])}. Their tables are "
+        "compared byte by byte with that of a campaign that was left alone."
     )
     also = (
-        f"files of the unfinished table that were cut off or changed before resuming: {found['damaged']}",
-        f"processes whose files could not grow, as on a full disk: {found['disk_full']}",
-        f"processes that were started while another one was writing: {found['second']}",
+        f"files of the unfinished table that were cut off or changed before resuming: {results['damaged']}",
+        f"processes whose files could not grow, as on a full disk: {results['disk_full']}",
+        f"processes that were started while another one was writing: {results['second']}",
     )
     return section("kills", "Kills", tag("p", words), bullets(also))
 
 
-def _hours(found: Mapping[str, Any]) -> Html:
-    before, after = found["memory"]
+def _hours(results: Mapping[str, Any]) -> Html:
+    before, after = results["memory"]
     words = (
-        f"{found['hours']:g} vehicle-hours in waves, current and noise were simulated in {_time(found['seconds'])}. At "
-        "every control step the input and the states were checked. The first and the last hour of each run are "
-        f"compared. The process had {before:.0f} MB before and at most {after:.0f} MB, compilers included."
+        f"{results['hours']:g} vehicle-hours in waves, current and noise were simulated in "
+        f"{_time(results['seconds'])}. At every control step the input and the states were checked. The first and the "
+        f"last hour of each run are compared. The process had {before:.0f} MB before and at most {after:.0f} MB, "
+        "compilers included."
     )
     head = (
         "loop",
@@ -82,64 +83,73 @@ def _hours(found: Mapping[str, Any]) -> Html:
     )
     rows = [
         (
-            one["loop"],
-            str(one["runs"]),
-            f"{one['hours']:g}",
-            str(one["completed"]),
-            str(one["alarms"]),
-            f"{one['first_rms']:.4g}",
-            f"{one['last_rms']:.4g}",
-            f"{100 * one['largest_change']:.2g}",
-            f"{one['first_weights']:.3g}",
-            f"{one['last_weights']:.3g}",
+            row["loop"],
+            str(row["runs"]),
+            f"{row['hours']:g}",
+            str(row["completed"]),
+            str(row["alarms"]),
+            f"{row['first_rms']:.4g}",
+            f"{row['last_rms']:.4g}",
+            f"{100 * row['largest_change']:.2g}",
+            f"{row['first_weights']:.3g}",
+            f"{row['last_weights']:.3g}",
         )
-        for one in found["rows"]
+        for row in results["rows"]
     ]
     return section("hours", "Simulated hours", tag("p", words), table(head, rows, range(1, len(head)), wide=True))
 
 
-def _faults(found: Mapping[str, Any]) -> Html:
+def _faults(results: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['number']} runs with random faults were simulated under supervision in {_time(found['seconds'])}; "
-        f"{found['repeated']} of them were built and run once more in other company, and must have the same bytes."
+        f"{results['number']} runs with random faults were simulated under supervision in {_time(results['seconds'])}; "
+        f"{results['repeated']} of them were built and run once more in other company, and must have the same bytes."
     )
-    states = table(("state at the end", "runs"), [(word, str(count)) for word, count in found["states"].items()], (1,))
-    ended = table(("how runs ended", "runs"), [(word, str(count)) for word, count in found["endings"].items()], (1,))
-    modes = sorted(found["modes"].items(), key=lambda one: (-one[1], one[0]))
+    states = table(
+        ("state at the end", "runs"), [(word, str(count)) for word, count in results["states"].items()], (1,)
+    )
+    ended = table(("how runs ended", "runs"), [(word, str(count)) for word, count in results["endings"].items()], (1,))
+    modes = sorted(results["modes"].items(), key=lambda item: (-item[1], item[0]))
     kinds = table(("target and mode", "faults"), [(mode, str(count)) for mode, count in modes], (1,))
     return section("faults", "Faults", tag("p", words), ended, states, kinds)
 
 
-def _controls(found: Mapping[str, Any]) -> Html:
+def _controls(results: Mapping[str, Any]) -> Html:
     words = (
         "The law of the paper without protection must fail in these ways, and succeed without what causes each "
         "failure. A soak in which they do not fail would not notice failures."
     )
     rows = [
-        (one["identity"], "fails" if one["fails"] else "DOES NOT FAIL", one["says"], one["found"], one["beside"])
-        for one in found["rows"]
+        (
+            control["identity"],
+            "fails" if control["fails"] else "DOES NOT FAIL",
+            control["says"],
+            control["found"],
+            control["beside"],
+        )
+        for control in results["rows"]
     ]
     head = ("control", "verdict", "why", "with the cause", "without it")
     return section("controls", "Negative controls", tag("p", words), table(head, rows, wide=True))
 
 
-def _links(found: Mapping[str, Any]) -> Html:
+def _links(results: Mapping[str, Any]) -> Html:
     words = (
-        f"{found['number']} runs of link commands were attacked in {_time(found['seconds'])}: signals, standstills, "
-        "full disks, wrong, old, repeated, reordered and damaged messages, and messages of others. Each must end with "
-        "the vehicle stopped in the stated time, and no single message or signal may give full thrust for 0.5 s."
+        f"{results['number']} runs of link commands were attacked in {_time(results['seconds'])}: signals, "
+        "standstills, full disks, wrong, old, repeated, reordered and damaged messages, and messages of others. Each "
+        "must end with the vehicle stopped in the stated time, and no single message or signal may give full thrust "
+        "for 0.5 s."
     )
     head = ("link", "runs", "with a never-event", "V s undisturbed", "V s worst")
     head += ("full thrust after one message, s", "longest full thrust, s", "furthest, m", "until neutral, s")
     keys = ("undisturbed_volt_seconds", "worst_volt_seconds", "full_after_one", "full", "furthest", "neutral_after")
     rows = [
-        (one["link"], str(one["runs"]), str(one["failed"]), *(f"{one[key]:.4g}" for key in keys))
-        for one in found["rows"]
+        (row["link"], str(row["runs"]), str(row["failed"]), *(f"{row[key]:.4g}" for key in keys))
+        for row in results["rows"]
     ]
     worst = [
-        (one["identity"], f"{one['volt_seconds']:.4g}", f"{one['full']:.2f}", one["plan"]) for one in found["worst"]
+        (row["identity"], f"{row['volt_seconds']:.4g}", f"{row['full']:.2f}", row["plan"]) for row in results["worst"]
     ]
-    left_out = [f"{link} was left out: {why}." for link, why in found["left_out"].items()]
+    left_out = [f"{link} was left out: {why}." for link, why in results["left_out"].items()]
     return section(
         "links",
         "Links",

@@ -111,21 +111,21 @@ def law(model, frequency=1.0):
 
 def plug_in(chance: random.Random) -> str:
     """A Python file that is wrong."""
-    how = chance.random()
-    if how < 0.2:
+    draw = chance.random()
+    if draw < 0.2:
         return spoilt_text(PLUG_IN, chance)
-    if how < 0.4:
+    if draw < 0.4:
         return chance.choice((PLUG_IN + "\n" + chance.choice(_AT_IMPORT), chance.choice(_AT_IMPORT) + PLUG_IN))
-    if how < 0.6:
+    if draw < 0.6:
         return PLUG_IN.replace("return pid(model, frequency=frequency)", chance.choice(_BODIES))
-    if how < 0.65:
+    if draw < 0.65:
         return PLUG_IN.replace(
             "(model, frequency=1.0)", chance.choice(("()", "(x)", "(*a, **b)", "(model, /)", "(a, b)"))
         )
-    zero, kept = "return jnp.zeros(1)", "return z"
+    zero, unchanged = "return jnp.zeros(1)", "return z"
     init = chance.choice((zero, zero, "return None", "return {'a': 3}", "raise ValueError('no')", "return jnp.nan"))
     advance = chance.choice(
-        (kept, kept, "return None", "return jnp.zeros(9)", "return (z, z)", "return z / 0", "return 'a'")
+        (unchanged, unchanged, "return None", "return jnp.zeros(9)", "return (z, z)", "return z / 0", "return 'a'")
     )
     signals = chance.choice(("{}", "{}", "{}", "None", "3", "{'x': 3}", "{'position': None}"))
     return _OWN.format(init=init, signals=signals, command=chance.choice(_COMMANDS), advance=advance)

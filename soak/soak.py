@@ -82,22 +82,22 @@ def soak(
         run_link: as `run`, for the commands of links; it may keep what it compiles from call to call. None for `run`.
     """
     began = time.monotonic()
-    said = watch or (lambda part, words: None)
-    found: dict[str, Any] = {}
+    report = watch or (lambda part, words: None)
+    results: dict[str, Any] = {}
     failures: list[Failure] = []
     attacks: list[tuple[Failure, Attack]] = []
     with tempfile.TemporaryDirectory(prefix="undertow-soak-", ignore_cleanup_errors=True) as name:
         for number, part in enumerate(parts):
-            left = began + 60.0 * minutes - time.monotonic()
-            until = time.monotonic() + left / (len(parts) - number)
+            seconds_left = began + 60.0 * minutes - time.monotonic()
+            until = time.monotonic() + seconds_left / (len(parts) - number)
             folder = Path(name) / part
             folder.mkdir()
             caller = run_link if part == "links" and run_link is not None else run
-            described, own, hostile = _PARTS[part](caller, amounts, seed, folder, until, said)
-            found[part] = described
-            failures += own
-            attacks += hostile
-    counted = Counter(one.event for one in failures)
+            result, part_failures, part_attacks = _PARTS[part](caller, amounts, seed, folder, until, report)
+            results[part] = result
+            failures += part_failures
+            attacks += part_attacks
+    counted = Counter(failure.event for failure in failures)
     summary = {
         "title": "Soak of undertow",
         "version": importlib.metadata.version("undertow"),
@@ -107,8 +107,8 @@ def soak(
         "seconds": round(time.monotonic() - began, 1),
         "events": {event: counted.get(event, 0) for event in EVENTS},
         "meanings": EVENTS,
-        "parts": found,
-        "failures": [one._asdict() for one in failures],
+        "parts": results,
+        "failures": [failure._asdict() for failure in failures],
     }
     return Soaked(summary, attacks)
 
@@ -123,18 +123,20 @@ def replayed(run: Run, identity: str, run_link: Run | None = None) -> tuple[Fail
     Raises:
         BadInput: no such identity, or one of a kill, whose moment cannot be repeated.
     """
-    part, *rest = identity.split("/")
+    part, *fields = identity.split("/")
     try:
         if part == "inputs":
-            return _replayed_input(run, *rest)
+            return _replayed_input(run, *fields)
         if part in ("hours", "faults"):
-            one = hours_soak.replay(identity) if part == "hours" else faults_soak.replay(identity)[1]
-            found = [Failure(event, identity, says) for event, says in one.events()]
-            return (found[0] if found else None), f"{one.status.word} at {one.ended:g} s, digest {one.digest}"
+            judged_run = hours_soak.replay(identity) if part == "hours" else faults_soak.replay(identity)[1]
+            failures = [Failure(event, identity, message) for event, message in judged_run.events()]
+            words = f"{judged_run.status.word} at {judged_run.ended:g} s, digest {judged_run.digest}"
+            return (failures[0] if failures else None), words
         if part == "links":
             return _replayed_link(run_link or run, identity)
         if part == "controls":
-            row = controls.judged_control({one.identity: one for one in controls.CONTROLS}[rest[0]])
+            controls_by_identity = {control.identity: control for control in controls.CONTROLS}
+            row = controls.judged_control(controls_by_identity[fields[0]])
             return None, f"{row['found']}; beside it: {row['beside']}"
     except (KeyError, ValueError, IndexError, TypeError):
         pass
@@ -143,18 +145,21 @@ def replayed(run: Run, identity: str, run_link: Run | None = None) -> tuple[Fail
 
 
 def _replayed_input(run: Run, kind: str, seed: str, number: str) -> tuple[Failure | None, str]:
-    given = attack(kind, int(seed), int(number), valid_files(run))
+    hostile_input = attack(kind, int(seed), int(number), valid_files(run))
     with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
-        done = try_in_process(run, given, Path(name))
-    failure = judged(given.identity, given.arguments, given.files, done)
-    return failure, f"undertow {' '.join(given.arguments)}: exit code {done.code}. {done.err.strip()}"
+        result = try_in_process(run, hostile_input, Path(name))
+    failure = judged(hostile_input.identity, hostile_input.arguments, hostile_input.files, result)
+    return failure, f"undertow {' '.join(hostile_input.arguments)}: exit code {result.code}. {result.err.strip()}"
 
 
 def _replayed_link(run: Run, identity: str) -> tuple[Failure | None, str]:
     with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
-        one = links_soak.replay(run, identity, Path(name))
-    words = f"{one.plan}: exit code {one.code}, {one.volt_seconds:.0f} V s, full thrust for {one.longest_full:.2f} s"
-    return (one.failures[0] if one.failures else None), words
+        link_run = links_soak.replay(run, identity, Path(name))
+    words = (
+        f"{link_run.plan}: exit code {link_run.code}, {link_run.volt_seconds:.0f} V s, "
+        f"full thrust for {link_run.longest_full:.2f} s"
+    )
+    return (link_run.failures[0] if link_run.failures else None), words
 
 
 def valid_files(run: Run) -> dict[str, bytes]:
@@ -170,8 +175,8 @@ def identities(path: Path) -> list[str]:
         BadInput: it cannot be read, or is another file.
     """
     try:
-        read = json.loads(path.read_text(encoding="utf-8"))
-        return [str(one["identity"]) for one in read["failures"]]
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return [str(failure["identity"]) for failure in data["failures"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise BadInput("--replay", "be a file soak.json or the identity of a failure", str(path)) from None
 
@@ -191,50 +196,50 @@ def check_parts(parts: Sequence[str]) -> list[str]:
 Described = tuple[dict[str, Any], list[Failure], list[tuple[Failure, Attack]]]
 
 
-def _inputs(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
-    said("inputs", "preparing valid files")
-    shown = _seldom(lambda done, failed: said("inputs", f"{done} of {amounts.inputs}, {failed} failed"))
-    tried = try_inputs(run, amounts.inputs, seed, valid_files(run), folder, until=until, watch=shown)
-    described = tried._asdict() | {"number": tried.number, "asked": amounts.inputs, "kinds": list(KINDS)}
-    del described["failures"]
-    return described, [failure for failure, _ in tried.failures], tried.failures
+def _inputs(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
+    report("inputs", "preparing valid files")
+    watch = _seldom(lambda done, failed: report("inputs", f"{done} of {amounts.inputs}, {failed} failed"))
+    tried = try_inputs(run, amounts.inputs, seed, valid_files(run), folder, until=until, watch=watch)
+    result = tried._asdict() | {"number": tried.number, "asked": amounts.inputs, "kinds": list(KINDS)}
+    del result["failures"]
+    return result, [failure for failure, _ in tried.failures], tried.failures
 
 
-def _kills(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
-    shown = lambda done: said("kills", f"{done} of {amounts.kills}")
-    found = kills.kill_campaigns(amounts.kills, seed, folder, until=until, watch=shown)
-    return _plain(found._asdict()) | {"asked": amounts.kills}, found.failures, []
+def _kills(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
+    watch = lambda done: report("kills", f"{done} of {amounts.kills}")
+    result = kills.kill_campaigns(amounts.kills, seed, folder, until=until, watch=watch)
+    return _plain(result._asdict()) | {"asked": amounts.kills}, result.failures, []
 
 
-def _hours(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
-    shown = lambda done: said("hours", f"{done:g} of {amounts.hours:g}")
-    found = hours_soak.simulate_hours(amounts.hours, seed, until, shown)
-    return _plain(found._asdict()) | {"asked": amounts.hours}, found.failures, []
+def _hours(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
+    watch = lambda done: report("hours", f"{done:g} of {amounts.hours:g}")
+    result = hours_soak.simulate_hours(amounts.hours, seed, until, watch)
+    return _plain(result._asdict()) | {"asked": amounts.hours}, result.failures, []
 
 
-def _faults(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
-    shown = _seldom(lambda done, failed: said("faults", f"{done} of {amounts.faults}, {failed} failed"))
-    found = faults_soak.run_faulted(amounts.faults, seed, until, shown)
-    return _plain(found._asdict()) | {"asked": amounts.faults}, found.failures, []
+def _faults(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
+    watch = _seldom(lambda done, failed: report("faults", f"{done} of {amounts.faults}, {failed} failed"))
+    result = faults_soak.run_faulted(amounts.faults, seed, until, watch)
+    return _plain(result._asdict()) | {"asked": amounts.faults}, result.failures, []
 
 
-def _controls(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
-    shown = lambda done: said("controls", f"{done} done")
-    found = controls.run_controls(amounts.short_controls, until, shown)
-    return _plain(found._asdict()), found.failures, []
+def _controls(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
+    watch = lambda done: report("controls", f"{done} done")
+    result = controls.run_controls(amounts.short_controls, until, watch)
+    return _plain(result._asdict()), result.failures, []
 
 
-def _links(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, said: Watch) -> Described:
+def _links(run: Run, amounts: Amounts, seed: int, folder: Path, until: float, report: Watch) -> Described:
     words = lambda done: ", ".join(f"{link} {count}" for link, count in done.items())
-    shown = _seldom(lambda done, asked: said("links", f"{words(done)} of {asked}"))
+    report_counts = _seldom(lambda done, total: report("links", f"{words(done)} of {total}"))
 
     def watch(done: Mapping[str, int], failures: Sequence[Failure]) -> None:
-        shown(done, amounts.links)
-        for one in failures:
-            said("links", f"{one.event} {one.identity}: {one.says}")
+        report_counts(done, amounts.links)
+        for failure in failures:
+            report("links", f"{failure.event} {failure.identity}: {failure.says}")
 
-    found = links_soak.attack_links(run, amounts.links, seed, folder, until=until, watch=watch)
-    return _plain(found._asdict()) | {"asked": amounts.links}, found.failures, []
+    result = links_soak.attack_links(run, amounts.links, seed, folder, until=until, watch=watch)
+    return _plain(result._asdict()) | {"asked": amounts.links}, result.failures, []
 
 
 _PARTS: Mapping[str, Callable[..., Described]] = {
@@ -247,8 +252,8 @@ _PARTS: Mapping[str, Callable[..., Described]] = {
 }
 
 
-def _plain(described: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in described.items() if key != "failures"}
+def _plain(results: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in results.items() if key != "failures"}
 
 
 def _seldom(watch: Callable[[Any, int], None]) -> Callable[[Any, int], None]:

@@ -29,15 +29,15 @@ class _Overdue(BaseException):
     """An input takes too long. No Exception, so that nothing that is tried can answer it."""
 
 
-def try_in_process(run: Run, given: Attack, folder: Path) -> Done:
+def try_in_process(run: Run, hostile_input: Attack, folder: Path) -> Done:
     """What an input does in this process.
 
     Args:
         run: `undertow` with arguments, in this process.
-        given: the input.
+        hostile_input: the input.
         folder: empty, and empty again afterwards.
     """
-    _write(given.files, folder)
+    _write(hostile_input.files, folder)
     before = _state(folder)
     out, err = _stream("strict"), _stream("backslashreplace")
     began = time.process_time(), time.monotonic()
@@ -47,7 +47,7 @@ def try_in_process(run: Run, given: Attack, folder: Path) -> Done:
         signal.setitimer(signal.ITIMER_PROF, _LIMIT)
         with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             try:
-                code = run(given.arguments)
+                code = run(hostile_input.arguments)
             finally:
                 signal.setitimer(signal.ITIMER_PROF, 0.0)
     except _Overdue:
@@ -57,9 +57,9 @@ def try_in_process(run: Run, given: Attack, folder: Path) -> Done:
         code = -2
     seconds = time.process_time() - began[0], time.monotonic() - began[1]
     after = _state(folder)
-    left = [name for name, data in after.items() if before.get(name) != data]
+    files_left = [name for name, data in after.items() if before.get(name) != data]
     _empty(folder)
-    return Done(code, _text(out), _text(err), seconds, left)
+    return Done(code, _text(out), _text(err), seconds, files_left)
 
 
 def work(run: Run, seed: int, material: Mapping[str, bytes], folder: str, pipe: Connection) -> None:
@@ -70,21 +70,22 @@ def work(run: Run, seed: int, material: Mapping[str, bytes], folder: str, pipe: 
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    here = Path(folder)
-    here.mkdir(parents=True, exist_ok=True)
+    working_folder = Path(folder)
+    working_folder.mkdir(parents=True, exist_ok=True)
     for words in LINES:
-        try_in_process(run, Attack("", {**scenario_files(SCENARIOS["axis"]), "folder": None}, words), here)
+        try_in_process(run, Attack("", {**scenario_files(SCENARIOS["axis"]), "folder": None}, words), working_folder)
     for kind in KINDS:  # what is imported and compiled once in a process is not what an input takes
-        try_in_process(run, attack(kind, -1, 0, material), here)
+        try_in_process(run, attack(kind, -1, 0, material), working_folder)
     for text in SCENARIOS.values():
-        try_in_process(run, Attack("", scenario_files(text), (BUILD, "s.yaml")), here)
+        try_in_process(run, Attack("", scenario_files(text), (BUILD, "s.yaml")), working_folder)
     with contextlib.suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the process that asks has ended
-        while (asked := pipe.recv()) is not None:
-            given = attack(asked[0], seed, asked[1], material)
-            done = try_in_process(run, given, here)
-            if done.code in REFUSED and done.seconds[0] > _ONCE:  # an import or a collection of garbage, or slow again?
-                done = try_in_process(run, given, here)
-            pipe.send((given, done))
+        while (task := pipe.recv()) is not None:
+            hostile_input = attack(task[0], seed, task[1], material)
+            outcome = try_in_process(run, hostile_input, working_folder)
+            # An import or a collection of garbage may have made it slow: once more.
+            if outcome.code in REFUSED and outcome.seconds[0] > _ONCE:
+                outcome = try_in_process(run, hostile_input, working_folder)
+            pipe.send((hostile_input, outcome))
 
 
 def _write(files: Mapping[str, bytes | None], folder: Path) -> None:
@@ -99,11 +100,11 @@ def _write(files: Mapping[str, bytes | None], folder: Path) -> None:
 
 def _state(folder: Path) -> dict[str, bytes | None]:
     """Bytes of every file, None for a folder; without what Python keeps of modules."""
-    found: dict[str, bytes | None] = {}
+    contents: dict[str, bytes | None] = {}
     for path in sorted(folder.rglob("*")):
         if "__pycache__" not in path.parts:
-            found[path.relative_to(folder).as_posix()] = path.read_bytes() if path.is_file() else None
-    return found
+            contents[path.relative_to(folder).as_posix()] = path.read_bytes() if path.is_file() else None
+    return contents
 
 
 def _empty(folder: Path) -> None:

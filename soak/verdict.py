@@ -74,8 +74,10 @@ def judged(identity: str, arguments: Sequence[str], files: Mapping[str, bytes | 
         files: that it was given.
         done: what it did.
     """
-    found = _event(arguments, files, done)
-    return found and Failure(found[0], identity, found[1], list(arguments), list(files))
+    event_and_message = _event(arguments, files, done)
+    return event_and_message and Failure(
+        event_and_message[0], identity, event_and_message[1], list(arguments), list(files)
+    )
 
 
 def _event(arguments: Sequence[str], files: Mapping[str, bytes | None], done: Done) -> tuple[str, str] | None:

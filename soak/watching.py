@@ -43,8 +43,10 @@ class Watch(AbstractAccumulator):
     windows: int = eqx.field(static=True)
 
     def init(self, signals: Signals) -> Counts:
-        zero, each = jnp.zeros(()), jnp.zeros(self.windows)
-        return Counts(zero, zero, zero, zero, each, jnp.zeros((self.windows, *signals["error"].shape)), each)
+        zero, zero_per_window = jnp.zeros(()), jnp.zeros(self.windows)
+        return Counts(
+            zero, zero, zero, zero, zero_per_window, jnp.zeros((self.windows, *signals["error"].shape)), zero_per_window
+        )
 
     def update(self, state: Counts, t: Float[Array, ""], signals: Signals) -> Counts:
         acting = signals.get("acting_input", signals["input"])
@@ -53,14 +55,14 @@ class Watch(AbstractAccumulator):
         outputs = jnp.isfinite(signals["position"]).all() & jnp.isfinite(signals["velocity"]).all()
         finite = jnp.isfinite(acting).all() & jnp.isfinite(signals["commanded_input"]).all()
         now = jnp.minimum(jnp.floor(t / self.length + 1e-9), self.windows - 1.0)
-        here = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
+        in_window = jnp.where(jnp.arange(self.windows, dtype=t.dtype) == now, 1.0, 0.0)
         largest = jnp.abs(signals["weights_peak"]).max() if "weights_peak" in signals else jnp.zeros(())
         return Counts(
             state.steps + 1.0,
             state.undefined_inputs + jnp.where(finite, 0.0, 1.0),
             state.exceeded_limits + jnp.where(finite & ~within.all(), 1.0, 0.0),
             state.undefined_outputs + jnp.where(outputs, 0.0, 1.0),
-            state.samples + here,
-            state.squares + here[:, None] * signals["error"][None, :] ** 2,
-            jnp.maximum(state.weights, here * largest),
+            state.samples + in_window,
+            state.squares + in_window[:, None] * signals["error"][None, :] ** 2,
+            jnp.maximum(state.weights, in_window * largest),
         )

@@ -40,16 +40,18 @@ class ArdupilotRunner:
 
     def run(self, plan: Plan) -> LinkRun:
         """What happens by a plan."""
-        self._chance, self._plan = random.Random(plan.seed), plan
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+        self._chance = random.Random(plan.seed)
+        self._plan = plan
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle_socket:
             port = free_port()
-            self._address, self._socket = ("127.0.0.1", port), own
+            self._address = ("127.0.0.1", port)
+            self._socket = vehicle_socket
             self._command.begin(["ardupilot", str(self._scenario), "--port", str(port)], plan.disk)
             failures = self._talk() if self._begins() else [("N3", "the physics did not begin")]
             ended_at = time.monotonic()
             failures += self._end()
-        found = [Failure(event, plan.identity, f"{says} ({plan})") for event, says in failures]
-        return LinkRun(plan, 0.0, 0.0, 0.0, max(0.0, self._ended_at - ended_at), self._code, found)
+        never_events = [Failure(event, plan.identity, f"{message} ({plan})") for event, message in failures]
+        return LinkRun(plan, 0.0, 0.0, 0.0, max(0.0, self._ended_at - ended_at), self._code, never_events)
 
     def _begins(self) -> bool:
         until = time.monotonic() + _BEGINS
@@ -60,25 +62,29 @@ class ArdupilotRunner:
 
     def _talk(self) -> list[tuple[str, str]]:
         """Frames until the end of the plan; never-events."""
-        found: list[tuple[str, str]] = []
-        sent, before = [self._packet(0)], 0.0
+        failures: list[tuple[str, str]] = []
+        sent = [self._packet(0)]
+        before = 0.0
         for step in range(1, self._plan.last):
-            begun, packet = time.monotonic(), self._packet(step)
+            frame_start = time.monotonic()
+            packet = self._packet(step)
             now = [event for event in self._plan.events if event.covers(step)]
             for kind in sorted({_OLD if event.kind in _OLD_KINDS else event.kind for event in now}):
                 self._disturb(kind, any(event.first == step for event in now), packet, sent)
             answer = self._patiently(packet, before)
             if answer is None:
-                return found if self._command.code() is not None else [*found, ("N3", f"no answer to frame {step}")]
+                return (
+                    failures if self._command.code() is not None else [*failures, ("N3", f"no answer to frame {step}")]
+                )
             numbers = np.hstack([np.ravel(value) for value in _numbers(answer)])
             if not np.isfinite(numbers).all():
-                found.append(("N1", f"an answer with numbers that are not finite at frame {step}"))
+                failures.append(("N1", f"an answer with numbers that are not finite at frame {step}"))
             if answer["timestamp"] < before:
-                found.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
+                failures.append(("N8", f"the time went from {before:g} to {answer['timestamp']:g} s at frame {step}"))
             before = answer["timestamp"]
             sent.append(packet)
-            time.sleep(max(0.0, begun + PERIOD - time.monotonic()))
-        return found
+            time.sleep(max(0.0, frame_start + PERIOD - time.monotonic()))
+        return failures
 
     def _disturb(self, kind: str, first: bool, packet: bytes, sent: list[bytes]) -> None:
         """What comes beside the packet of a frame."""
@@ -94,8 +100,8 @@ class ArdupilotRunner:
         elif kind == _OLD:  # one at a time: two old ones in a row are a restart, as the protocol has no session
             send(self._chance.choice(sent))
         elif kind == "another sender":
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-                other.sendto(self._packet(self._chance.randrange(1, 2**31)), self._address)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign_socket:
+                foreign_socket.sendto(self._packet(self._chance.randrange(1, 2**31)), self._address)
         elif kind == "silence" and first:
             time.sleep(1.0)
 
@@ -138,7 +144,8 @@ class ArdupilotRunner:
         if ending in ("stop", "silence"):
             time.sleep(STATED[ending])
             self._command.send(signal.SIGKILL if ending == "stop" else signal.SIGTERM)
-        self._code, self._ended_at = self._command.wait(), time.monotonic()
+        self._code = self._command.wait()
+        self._ended_at = time.monotonic()
         printed = self._command.printed()
         if self._code is None:
             self._command.kill()

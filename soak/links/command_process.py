@@ -27,17 +27,20 @@ class CommandProcess:
     """
 
     def __init__(self, run: Run, folder: Path):
-        self._run, self._printed = run, folder / "printed.txt"
+        self._run = run
+        self._printed = folder / "printed.txt"
         self._process: Any = None
 
     def begin(self, arguments: Sequence[str], disk: int | None = None) -> None:
         """Call `undertow`; no file may become larger than `disk` bytes, None for any size."""
         if self._process is None or not self._process.is_alive():
             context = multiprocessing.get_context("spawn")
-            self._pipe, other = context.Pipe()
-            self._process = context.Process(target=_serve, args=(self._run, other, str(self._printed)), daemon=False)
+            self._pipe, child_pipe = context.Pipe()
+            self._process = context.Process(
+                target=_serve, args=(self._run, child_pipe, str(self._printed)), daemon=False
+            )
             self._process.start()
-            other.close()
+            child_pipe.close()
         self._printed.write_bytes(b"")
         self._pipe.send((list(arguments), disk))
         self._code: int | None = None
@@ -102,8 +105,8 @@ def _serve(run: Run, pipe: Connection, printed: str) -> None:
     # As in a terminal: a stress test may run under `nohup`, or in the background of a script.
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    while (asked := _patiently(pipe.recv)) is not None:
-        arguments, disk = asked
+    while (request := _patiently(pipe.recv)) is not None:
+        arguments, disk = request
         most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
         resource.setrlimit(resource.RLIMIT_FSIZE, (most if disk is None else disk, most))
         code = run(arguments)

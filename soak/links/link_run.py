@@ -75,23 +75,27 @@ class LinkRunner:
 
     def run(self, plan: Plan) -> LinkRun:
         """What happens by a plan."""
-        self._plan, self._chance = plan, random.Random(plan.seed)
+        self._plan = plan
+        self._chance = random.Random(plan.seed)
         self._vehicle.restart()
-        self._volts, self._commands, self._thrusts = np.zeros(self._vehicle.vehicle.thrusters), 0, 0
+        self._volts = np.zeros(self._vehicle.vehicle.thrusters)
+        self._commands = 0
+        self._thrusts = 0
         self._commanded_at = self._thrust_at = time.monotonic()
         self._sent: deque[Any] = deque(maxlen=100)
         self._held_back: list[Any] = []
-        self._step, self._began = 0, time.monotonic()
+        self._step = 0
+        self._began = time.monotonic()
         self._due = self._moved_at = self._began
         if self._log is not None:
             shutil.rmtree(self._log if self._log.suffix == "" else self._log.parent, ignore_errors=True)
         self._peer.begin(self._chance)
         self._command.begin(self._arguments, plan.disk)
         if not self._control_begins():
-            says = f"control did not begin: exit code {self._command.code()}. {_last(self._command.printed())}"
+            message = f"control did not begin: exit code {self._command.code()}. {_last(self._command.printed())}"
             self._code = self._command.code()
             self._command.kill()
-            return self._result(0.0, [("N3", says)])
+            return self._result(0.0, [("N3", message)])
         while self._step < plan.last:
             for event in plan.events:
                 if event.kind == "stall" and event.first == self._step:
@@ -113,7 +117,8 @@ class LinkRunner:
             self._receive()
             self._step += 1
             if self._thrusts:
-                self._step, self._moved_at = 0, time.monotonic()
+                self._step = 0
+                self._moved_at = time.monotonic()
                 return True
         return False
 
@@ -128,7 +133,8 @@ class LinkRunner:
         self._due = max(self._due + PERIOD, time.monotonic())
         self._receive()
         silent = time.monotonic() - self._commanded_at > MAX_AGE
-        before, self._moved_at = self._moved_at, time.monotonic()
+        before = self._moved_at
+        self._moved_at = time.monotonic()
         volts = 0.0 * self._volts if self._stops_itself and silent else self._volts
         self._vehicle.hold(volts, min(self._moved_at - before, _LONGEST))
         self._step += 1
@@ -139,7 +145,8 @@ class LinkRunner:
             volts, count = self._peer.take(left)
             self._commands += count
             if volts is not None:
-                self._volts, self._commanded_at = volts, time.monotonic()
+                self._volts = volts
+                self._commanded_at = time.monotonic()
                 if volts.any():
                     self._thrusts += 1
                     self._thrust_at = self._commanded_at
@@ -154,7 +161,8 @@ class LinkRunner:
         for event in now:
             items = self._attacked(event, items, measured)
         if not any(event.kind in ("reordered", "late") for event in now) and self._held_back:
-            items, self._held_back = self._held_back + items, []
+            items = self._held_back + items
+            self._held_back = []
         for item in items:
             self._peer.send(item)
             self._sent.append(item)
@@ -170,9 +178,10 @@ class LinkRunner:
             self._held_back += items
             if len(self._held_back) < 4:
                 return []
-            found, self._held_back = self._held_back, []
-            self._chance.shuffle(found)
-            return found
+            released = self._held_back
+            self._held_back = []
+            self._chance.shuffle(released)
+            return released
         if event.kind == "replayed":
             return items + self._chance.choices(list(self._sent), k=3)
         if event.kind == "old only":
@@ -187,7 +196,8 @@ class LinkRunner:
 
     def _end(self) -> float:
         """End the command as the plan says, and watch; when that was."""
-        ending, numbers = self._plan.ending, signals_of(self._plan.ending)
+        ending = self._plan.ending
+        numbers = signals_of(self._plan.ending)
         ended_at = time.monotonic()
         for number in numbers:
             self._command.send(number)
@@ -205,24 +215,25 @@ class LinkRunner:
         return ended_at
 
     def _events(self, ended_at: float) -> list[tuple[str, str]]:
-        plan, found = self._plan, []
+        plan = self._plan
+        events = []
         after = self._thrust_at - ended_at
         stated = STATED.get(plan.ending, 1.0)
         stopped = not self._volts.any() or (self._stops_itself and time.monotonic() - self._commanded_at > MAX_AGE)
         if not stopped:
-            found.append(("N8", f"the last command is not neutral, {after:.2f} s after the end"))
+            events.append(("N8", f"the last command is not neutral, {after:.2f} s after the end"))
         elif after > stated:
-            found.append(("N8", f"the last command that is not neutral came {after:.2f} s after the end"))
+            events.append(("N8", f"the last command that is not neutral came {after:.2f} s after the end"))
         if plan.is_single and self._vehicle.longest_full > _TRANSIENT + 1e-9:
-            found.append(("N8", f"full thrust for {self._vehicle.longest_full:.2f} s"))
+            events.append(("N8", f"full thrust for {self._vehicle.longest_full:.2f} s"))
         if self._vehicle.failed:
-            found.append(("N1", "the vehicle's state is not finite"))
+            events.append(("N1", "the vehicle's state is not finite"))
         printed = self._command.printed()
         if self._code is None:
-            found.append(("N3", "the command did not end within ten seconds"))
+            events.append(("N3", "the command did not end within ten seconds"))
         elif self._code not in self._codes() or "Traceback" in printed:
-            found.append(("N2", f"exit code {self._code}: {_last(printed)}"))
-        return found + self._of_log()
+            events.append(("N2", f"exit code {self._code}: {_last(printed)}"))
+        return events + self._of_log()
 
     def _codes(self) -> tuple[int, ...]:
         """Exit codes that are right: a loop that stood still or got nothing may have ended by itself before."""
@@ -246,10 +257,10 @@ class LinkRunner:
         return []
 
     def _result(self, after: float, events: list[tuple[str, str]]) -> LinkRun:
-        of = self._vehicle
-        failures = [Failure(event, self._plan.identity, f"{says} ({self._plan})") for event, says in events]
-        seen = of.volt_seconds, of.longest_full, of.furthest
-        return LinkRun(self._plan, *seen, max(0.0, after), self._code, failures)
+        vehicle = self._vehicle
+        failures = [Failure(event, self._plan.identity, f"{message} ({self._plan})") for event, message in events]
+        measures = vehicle.volt_seconds, vehicle.longest_full, vehicle.furthest
+        return LinkRun(self._plan, *measures, max(0.0, after), self._code, failures)
 
 
 def _rows(path: Path) -> int:

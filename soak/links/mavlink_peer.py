@@ -38,10 +38,11 @@ class MavlinkPeer(AbstractPeer):
         self._channels = channels_of_vehicle(np.asarray(plant.thruster_matrix))
         self._dead_band = float((plant.power.esc or esc()).dead_band)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._foreign_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
     def begin(self, chance: random.Random) -> None:
-        self._chance, self._alive_at = chance, -np.inf
+        self._chance = chance
+        self._alive_at = -np.inf
         self._wire = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._camera = mavlink.MAVLink(None, srcSystem=1, srcComponent=_CAMERA)
         self._pulses = np.full(16, _NEUTRAL)
@@ -54,12 +55,12 @@ class MavlinkPeer(AbstractPeer):
             pass
 
     def items(self, measured: Measured, time: float) -> list[Any]:
-        found = [self._odometry(measured, time).pack(self._wire)]
+        messages = [self._odometry(measured, time).pack(self._wire)]
         if time - self._alive_at >= 1.0 or time < self._alive_at:
             self._alive_at = time
             armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-            found.insert(0, mavlink.MAVLink_heartbeat_message(12, 3, armed, 0, 4, 3).pack(self._wire))
-        return found
+            messages.insert(0, mavlink.MAVLink_heartbeat_message(12, 3, armed, 0, 4, 3).pack(self._wire))
+        return messages
 
     def send(self, item: bytes) -> None:
         self._transmit(self._socket, item)
@@ -76,7 +77,7 @@ class MavlinkPeer(AbstractPeer):
     def from_another(self, measured: Measured, time: float) -> None:
         away = measured._replace(position=measured.position + 50.0)
         self._transmit(self._socket, self._odometry(away, time).pack(self._camera))
-        self._transmit(self._other, self._odometry(away, time).pack(self._wire))
+        self._transmit(self._foreign_socket, self._odometry(away, time).pack(self._wire))
 
     def take(self, longest: float) -> tuple[np.ndarray | None, int]:
         count = 0
@@ -92,14 +93,14 @@ class MavlinkPeer(AbstractPeer):
 
     def close(self) -> None:
         self._socket.close()
-        self._other.close()
+        self._foreign_socket.close()
 
     def _note(self, message: Any) -> bool:
         """Take the pulses of a command; whether it was one."""
         kind = message.get_type()
         if kind == "RC_CHANNELS_OVERRIDE":
-            given = np.array([getattr(message, f"chan{n}_raw") for n in range(1, 17)], dtype=float)
-            self._pulses = np.where(given == 65535, self._pulses, given)
+            channels = np.array([getattr(message, f"chan{n}_raw") for n in range(1, 17)], dtype=float)
+            self._pulses = np.where(channels == 65535, self._pulses, channels)
             return True
         if kind == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_DO_SET_SERVO:
             self._pulses[int(message.param1) - 1] = message.param2
@@ -113,12 +114,12 @@ class MavlinkPeer(AbstractPeer):
     def _odometry(self, measured: Measured, time: float, frame: int = mavlink.MAV_FRAME_LOCAL_NED) -> Any:
         with warnings.catch_warnings(), np.errstate(over="ignore"):
             warnings.simplefilter("ignore")
-            numbers: Any = [np.float32(one).tolist() for one in measured]
+            numbers: Any = [np.float32(vector).tolist() for vector in measured]
         position, attitude, velocity = numbers
         frames = frame, mavlink.MAV_FRAME_BODY_FRD
         stamp = self._origin + round(1e6 * time)
-        made: Any = mavlink.MAVLink_odometry_message
-        return made(stamp, *frames, *position, attitude, *velocity, _UNKNOWN, _UNKNOWN, 0, 3, 0)
+        make_message: Any = mavlink.MAVLink_odometry_message
+        return make_message(stamp, *frames, *position, attitude, *velocity, _UNKNOWN, _UNKNOWN, 0, 3, 0)
 
     def _transmit(self, by: socket.socket, data: bytes) -> None:
         try:

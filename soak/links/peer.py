@@ -67,7 +67,7 @@ def measured_of(motion: MeasuredMotion) -> Measured:
 def altered(measured: Measured, what: str) -> Measured:
     """A measurement with one of `plan.WILD`."""
     name, size = what.split()[:2]
-    position, attitude, velocity = (np.array(one) for one in measured)
+    position, attitude, velocity = (np.array(vector) for vector in measured)
     if name == "position":
         position = position + np.array([float(size), 0.0, 0.0])
     elif name == "velocity":
@@ -86,7 +86,7 @@ def altered(measured: Measured, what: str) -> Measured:
 
 def damaged(data: bytes, chance: random.Random) -> list[bytes]:
     """Bytes that are no datagram, one with bits that are turned, and one that is cut off."""
-    turned = bytearray(data)
+    flipped = bytearray(data)
     for _ in range(chance.randint(1, 4)):
-        turned[chance.randrange(len(turned))] ^= 1 << chance.randrange(8)
-    return [chance.randbytes(chance.randint(0, 1400)), bytes(turned), data[: chance.randrange(len(data))]]
+        flipped[chance.randrange(len(flipped))] ^= 1 << chance.randrange(8)
+    return [chance.randbytes(chance.randint(0, 1400)), bytes(flipped), data[: chance.randrange(len(data))]]

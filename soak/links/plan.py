@@ -125,8 +125,8 @@ def free_port() -> int:
     """A UDP port that nobody uses, and that the system gives nobody: below those that it hands out."""
     while True:
         port = random.SystemRandom().randrange(10_000, 30_000)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one, contextlib.suppress(OSError):
-            one.bind(("127.0.0.1", port))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
             return port
 
 

@@ -24,10 +24,20 @@ class UdpPeer(AbstractPeer):
     def __init__(self, out: str):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
-        self._other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._foreign_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._received = DatagramFilter(COMMAND, _THRUSTERS)
-        place = f"127.0.0.1:{self._socket.getsockname()[1]}"
-        self.arguments = ["run", "SCENARIO", "--link", f"udp:{place}", "--patience", "60", "--out", out, "--overwrite"]
+        address = f"127.0.0.1:{self._socket.getsockname()[1]}"
+        self.arguments = [
+            "run",
+            "SCENARIO",
+            "--link",
+            f"udp:{address}",
+            "--patience",
+            "60",
+            "--out",
+            out,
+            "--overwrite",
+        ]
 
     def begin(self, chance: random.Random) -> None:
         self._chance, self._address = chance, None
@@ -51,13 +61,13 @@ class UdpPeer(AbstractPeer):
         session, sequence = self._chance.getrandbits(32), self._chance.getrandbits(32)
         restarted = Datagram(MEASUREMENT, False, session, 1, 0, 0, _numbers(measured)).packed(_THRUSTERS)
         newest = self._received.newest
-        own = 0 if newest is None else newest.session
-        turned = Datagram(COMMAND, False, own, sequence, 0, 0, np.zeros(_THRUSTERS)).packed(_THRUSTERS)
-        return [restarted, turned, restarted[:4] + b"\x02" + restarted[5:]]
+        current_session = 0 if newest is None else newest.session
+        reflected = Datagram(COMMAND, False, current_session, sequence, 0, 0, np.zeros(_THRUSTERS)).packed(_THRUSTERS)
+        return [restarted, reflected, restarted[:4] + b"\x02" + restarted[5:]]
 
     def from_another(self, measured: Measured, time: float) -> None:
-        other = Sender(MEASUREMENT, _THRUSTERS, self._chance.getrandbits(32))
-        self._transmit(self._other, other.pack(_numbers(measured), round(1e9 * time), 0))
+        foreign_sender = Sender(MEASUREMENT, _THRUSTERS, self._chance.getrandbits(32))
+        self._transmit(self._foreign_socket, foreign_sender.pack(_numbers(measured), round(1e9 * time), 0))
 
     def take(self, longest: float) -> tuple[np.ndarray | None, int]:
         newest, count = None, 0
@@ -71,7 +81,7 @@ class UdpPeer(AbstractPeer):
 
     def close(self) -> None:
         self._socket.close()
-        self._other.close()
+        self._foreign_socket.close()
 
     def _receive(self, longest: float) -> bytes | None:
         self._socket.settimeout(longest)

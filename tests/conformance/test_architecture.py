@@ -20,7 +20,7 @@ MOST_DUPLICATES = 12
 SMALLEST_DUPLICATE = 3  # statements
 
 # Where a module of ours is imported when it is used: the faces of packages, and the table of commands.
-LAZY = ("__init__.py", "undertow/cli/commands/command.py")
+LAZY = ("__init__.py", "undertow/cli/options/command.py")
 
 
 @functools.cache

@@ -3,8 +3,8 @@
 import numpy as np
 import typer
 
-from undertow.cli.commands.deploy import ArdupilotCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, complain
+from undertow.cli.options.ardupilot import ArdupilotCommand
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks

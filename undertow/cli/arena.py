@@ -9,9 +9,9 @@ import typer
 from rich.console import Console
 
 from undertow.cli import results_folder
-from undertow.cli.commands.understand import ArenaCommand
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.options.arena import ArenaCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import new_lines, stage

@@ -6,9 +6,9 @@ from typing import Any
 import typer
 from rich.table import Table
 
-from undertow.cli.commands.inspection import BenchCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
+from undertow.cli.options.bench import BenchCommand
 from undertow.cli.stages import shares
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.studies.speed.measure import measure

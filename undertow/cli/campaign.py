@@ -6,8 +6,8 @@ from rich.console import Console
 from rich.table import Table
 
 from undertow.analysis.metrics import for_people
-from undertow.cli.commands.understand import CampaignCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
+from undertow.cli.options.campaign import CampaignCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage

@@ -6,8 +6,8 @@ from typing import Any
 
 from rich.text import Text
 
-from undertow.cli.commands.inspection import CheckCommand
 from undertow.cli.exit_codes import BAD_INPUT, DONE
+from undertow.cli.options.check import CheckCommand
 from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
 from undertow.scenario.checks import check as checks

@@ -9,9 +9,9 @@ import typer
 from rich.console import Console
 
 from undertow.cli import results_folder
-from undertow.cli.commands.understand import CompareCommand
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.interruptible import interruptible
+from undertow.cli.options.compare import CompareCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import new_lines, stage

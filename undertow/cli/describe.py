@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from undertow.analysis.metrics import MEANINGS, PER_AXIS
-from undertow.cli.commands.inspection import DescribeCommand, ListCommand
+from undertow.cli.options.describe import DescribeCommand, ListCommand
 from undertow.cli.tables import titled, wide_console
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean

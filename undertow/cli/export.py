@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from undertow.cli.commands.deploy import ExportCommand
 from undertow.cli.exit_codes import DONE
+from undertow.cli.options.export import ExportCommand
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks

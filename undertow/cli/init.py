@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from undertow.cli.commands.start import InitCommand
+from undertow.cli.options.init import InitCommand
 from undertow.core import catalogue
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean

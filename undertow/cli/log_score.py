@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from undertow.cli.commands.inspection import LogsCommand
 from undertow.cli.exit_codes import DONE
 from undertow.cli.interruptible import interruptible
 from undertow.cli.logs import check_words
+from undertow.cli.options.logs import LogsCommand
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import stage
 from undertow.cli.tables import numbers, titled, wide_console

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from undertow.cli.commands.inspection import LogsCommand
 from undertow.cli.exit_codes import DONE
+from undertow.cli.options.logs import LogsCommand
 from undertow.cli.tables import numbers, titled, wide_console
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput

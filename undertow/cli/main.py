@@ -12,9 +12,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from undertow.cli.commands import GROUPS
 from undertow.cli.exit_codes import run_guarded
 from undertow.cli.interruptible import remember_interrupts
+from undertow.cli.options import GROUPS
 from undertow.core.process_setup import prepare
 
 

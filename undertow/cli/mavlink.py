@@ -1,7 +1,7 @@
 """`undertow mavlink`: the controller of a scenario as a MAVLink companion."""
 
-from undertow.cli.commands.deploy import MavlinkCommand
 from undertow.cli.exit_codes import report
+from undertow.cli.options.mavlink import MavlinkCommand
 from undertow.cli.paced_loop import run_until_signal
 from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console

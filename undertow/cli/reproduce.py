@@ -2,8 +2,8 @@
 
 import json
 
-from undertow.cli.commands.paper import ReproduceCommand
 from undertow.cli.interruptible import interruptible
+from undertow.cli.options.reproduce import ReproduceCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares

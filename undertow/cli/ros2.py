@@ -5,9 +5,9 @@ import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from undertow.cli.commands.deploy import Ros2Command
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain, report
 from undertow.cli.interruptible import interruptible
+from undertow.cli.options.ros2 import Ros2Command
 from undertow.cli.paced_loop import run_until_signal
 from undertow.core import checks
 from undertow.core.errors import BadInput

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import typer
 
-from undertow.cli.commands.deploy import RunCommand
 from undertow.cli.exit_codes import DONE, FILES_FAILED, RUN_FAILED, complain
 from undertow.cli.interruptible import EndingSignal, interruptible
+from undertow.cli.options.run import RunCommand
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
 from undertow.cli.step_logs import logging_to

@@ -3,7 +3,7 @@
 import importlib.metadata
 import platform
 
-from undertow.cli.commands.inspection import VersionCommand
+from undertow.cli.options.version import VersionCommand
 
 _PACKAGES = ("undertow", "jax", "jaxlib", "equinox", "diffrax", "numpy", "xarray")
 

@@ -58,8 +58,8 @@ def _kind(name: str, form: str, columns: list[str]) -> _Kind | None:
     good = len(form) == len(columns) == len(set(columns)) and all(columns) and set(form) <= set(_TYPES)
     if not good or not form or not name.isascii() or not name.isprintable():
         return None
-    fields = np.dtype([(column, _TYPES[one][0]) for column, one in zip(columns, form, strict=True)])
-    return _Kind(name, fields, tuple(_TYPES[one][1] for one in form), 3 + fields.itemsize)
+    fields = np.dtype([(column, _TYPES[type_letter][0]) for column, type_letter in zip(columns, form, strict=True)])
+    return _Kind(name, fields, tuple(_TYPES[type_letter][1] for type_letter in form), 3 + fields.itemsize)
 
 
 _OF_FMT = _kind("FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
@@ -90,13 +90,15 @@ def read_ardupilot(path: Path) -> Recording:
     data = path.read_bytes()
     if not data.startswith(_HEAD):
         raise BadInput("log", "be a .bin file of ArduPilot", f"{path.name}, which does not begin like one")
-    scan, tables, parameters = _scanned(data), {}, {}
+    scan = _scanned(data)
+    tables = {}
+    parameters = {}
     for kind, places in scan.places.items():
         if kind.fields.names is None or kind.fields.names[0] != "TimeUS":
             continue
         if not kind.divisors[0]:
             raise BadInput("log", "have numbers as TimeUS", f"{path.name}, whose messages {kind.name} have text there")
-        rows = np.frombuffer(b"".join(data[at + 3 : at + kind.size] for at in places), kind.fields)
+        rows = np.frombuffer(b"".join(data[offset + 3 : offset + kind.size] for offset in places), kind.fields)
         tables |= _tables(kind, rows, scan.numbered.get(kind.name, ""))
         if kind.name == "PARM":
             parameters |= _parameters(kind, rows)
@@ -118,45 +120,48 @@ def _parameters(kind: _Kind, rows: np.ndarray) -> dict[str, float]:
 
 def _scanned(data: bytes) -> _Scan:
     assert _OF_FMT is not None
-    kinds, places, numbered = {_FMT: _OF_FMT}, {}, dict(_NUMBERED)
-    at = lost = 0
-    while at < len(data):
-        kind = kinds.get(data[at + 2]) if data[at : at + 2] == _HEAD and at + 2 < len(data) else None
-        if kind is None or at + kind.size > len(data):
-            after = data.find(_HEAD, at + 1)
-            after = len(data) if after < 0 else after
-            lost += after - at
-            at = after
+    kinds = {_FMT: _OF_FMT}
+    places = {}
+    numbered = dict(_NUMBERED)
+    offset = lost = 0
+    while offset < len(data):
+        kind = kinds.get(data[offset + 2]) if data[offset : offset + 2] == _HEAD and offset + 2 < len(data) else None
+        if kind is None or offset + kind.size > len(data):
+            next_head = data.find(_HEAD, offset + 1)
+            next_head = len(data) if next_head < 0 else next_head
+            lost += next_head - offset
+            offset = next_head
             continue
         if kind.name == "FMT":
-            number, described = _described(data, at)
-            if described is not None:
-                kinds[number] = described
+            number, described_kind = _described(data, offset)
+            if described_kind is not None:
+                kinds[number] = described_kind
         elif kind.name == "FMTU":
-            _number(data, at, kind, kinds, numbered)
-        places.setdefault(kind, []).append(at)
-        at += kind.size
+            _number(data, offset, kind, kinds, numbered)
+        places.setdefault(kind, []).append(offset)
+        offset += kind.size
     return _Scan(places, numbered, lost)
 
 
-def _described(data: bytes, at: int) -> tuple[int, _Kind | None]:
+def _described(data: bytes, offset: int) -> tuple[int, _Kind | None]:
     """Type and kind that a message FMT describes; None where it is damaged."""
     assert _OF_FMT is not None
-    number, size, name, form, columns = np.frombuffer(data, _OF_FMT.fields, 1, at + 3)[0].item()
+    number, size, name, form, columns = np.frombuffer(data, _OF_FMT.fields, 1, offset + 3)[0].item()
     texts = [part.decode("latin-1") for part in (name, form, columns)]
     kind = _kind(texts[0], texts[1], texts[2].split(","))
     return number, kind if kind is not None and kind.size == size and number != _FMT else None
 
 
-def _number(data: bytes, at: int, kind: _Kind, kinds: dict[int, _Kind], numbered: dict[str, str]) -> None:
+def _number(data: bytes, offset: int, kind: _Kind, kinds: dict[int, _Kind], numbered: dict[str, str]) -> None:
     """Remember the column that a message FMTU says to number sensors or cores."""
-    fields = np.frombuffer(data, kind.fields, 1, at + 3)[0]
+    fields = np.frombuffer(data, kind.fields, 1, offset + 3)[0]
     if not {"FmtType", "UnitIds"} <= set(kind.fields.names or ()):
         return
-    about, units = kinds.get(int(fields["FmtType"])), bytes(fields["UnitIds"])
-    place = units.find(b"#")
-    if about is not None and about.fields.names and 0 <= place < len(about.fields.names):
-        numbered[about.name] = about.fields.names[place]
+    about = kinds.get(int(fields["FmtType"]))
+    units = bytes(fields["UnitIds"])
+    index = units.find(b"#")
+    if about is not None and about.fields.names and 0 <= index < len(about.fields.names):
+        numbered[about.name] = about.fields.names[index]
 
 
 def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, TopicMessages]:
@@ -167,9 +172,9 @@ def _tables(kind: _Kind, rows: np.ndarray, instance: str) -> dict[str, TopicMess
     time = rows["TimeUS"] * 1e-6
     if instance not in fields:
         return {kind.name: TopicMessages(time, fields, kind.name)}
-    found = {}
+    tables = {}
     for number in np.unique(fields[instance]):
-        own = fields[instance] == number
-        part = {name: values[own] for name, values in fields.items()}
-        found[f"{kind.name}[{number:g}]"] = TopicMessages(time[own], part, kind.name)
-    return found
+        of_instance = fields[instance] == number
+        part = {name: values[of_instance] for name, values in fields.items()}
+        tables[f"{kind.name}[{number:g}]"] = TopicMessages(time[of_instance], part, kind.name)
+    return tables

@@ -48,7 +48,8 @@ class BackgroundWriter:
     """
 
     def __init__(self, start: Callable[[], Recorder], capacity: int = CAPACITY):
-        self._start, self._entries = start, queue.Queue[Any](capacity)
+        self._start = start
+        self._entries = queue.Queue[Any](capacity)
         self.dropped, self.failure = 0, ""
         self._refused: list[BaseException] = []
         self._started = threading.Event()
@@ -88,8 +89,8 @@ class BackgroundWriter:
 
     def missing(self, what: str) -> list[str]:
         """What the recording lacks, as sentences; `what` names the entries, as in `steps`."""
-        found = [f"{self.failure}; later {what} are not recorded"] if self.failure else []
-        return found + [f"{self.dropped} {what} are missing: the disk was too slow"] * (self.dropped > 0)
+        sentences = [f"{self.failure}; later {what} are not recorded"] if self.failure else []
+        return sentences + [f"{self.dropped} {what} are missing: the disk was too slow"] * (self.dropped > 0)
 
     def _run(self) -> None:
         try:

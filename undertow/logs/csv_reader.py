@@ -40,18 +40,21 @@ def read_csv(path: Path) -> Log | Recording:
 
 
 def _our_log(path: Path, header: list[str], numbers: np.ndarray, empty: np.ndarray, notes: tuple[str, ...]) -> Log:
-    times, several = numbers[:, 0], {}
+    times = numbers[:, 0]
+    columns_by_signal = {}
     for i, name in enumerate(header[1:], start=1):
-        found = _OURS.fullmatch(name)
-        assert found is not None, "`read_csv` has looked"
-        several.setdefault((found["signal"], found["unit"]), []).append((found["column"] or "", i))
+        match = _OURS.fullmatch(name)
+        assert match is not None, "`read_csv` has looked"
+        columns_by_signal.setdefault((match["signal"], match["unit"]), []).append((match["column"] or "", i))
     signals = {}
-    for (name, unit), columns in several.items():
-        titles, places = (tuple(part) for part in zip(*columns, strict=True))
-        kept = ~empty[:, list(places)].all(axis=1)
-        values = numbers[np.ix_(kept, places)]
-        alone = titles == ("",)
-        signals[name] = Series(times[kept], values[:, 0] if alone else values, () if alone else titles, unit)
+    for (name, unit), columns in columns_by_signal.items():
+        titles, indices = (tuple(part) for part in zip(*columns, strict=True))
+        has_values = ~empty[:, list(indices)].all(axis=1)
+        values = numbers[np.ix_(has_values, indices)]
+        is_scalar = titles == ("",)
+        signals[name] = Series(
+            times[has_values], values[:, 0] if is_scalar else values, () if is_scalar else titles, unit
+        )
     return Log(signals, path.name, "CSV", notes)
 
 
@@ -61,7 +64,8 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str]
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadInput("log", "be a CSV text file", f"{path.name}: {error.reason} at byte {error.start}") from None
-    lines, notes = text.splitlines(), ()
+    lines = text.splitlines()
+    notes = ()
     if text.startswith(TIME) and "\r\n" in text and not text.endswith(("\r", "\n")):
         lines, notes = lines[:-1], (f"the file ends early, within line {len(lines)}, which is left out",)
     try:
@@ -74,9 +78,11 @@ def _read(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, dict[str, str]
     if len(numbered) < 2:
         raise BadInput("log", "have a header and at least one row", f"{path.name} with {len(numbered)} rows")
     header = numbered[0][1]
-    again, times = Counter(header).most_common(1)[0]
+    repeated_name, times = Counter(header).most_common(1)[0]
     if times > 1:
-        raise BadInput("log", "have columns of different names", f"{path.name}, where `{again}` occurs {times} times")
+        raise BadInput(
+            "log", "have columns of different names", f"{path.name}, where `{repeated_name}` occurs {times} times"
+        )
     texts: dict[str, str] = {}
     numbers = np.array([_numbers(path.name, line, row, header, texts) for line, row in numbered[1:]])
     return header, numbers, np.array([[not cell for cell in row] for _, row in numbered[1:]]), texts, notes

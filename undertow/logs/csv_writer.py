@@ -25,7 +25,8 @@ def write_csv(log: LogSignals, path: Path) -> None:
         OSError: the file cannot be written.
     """
     times = np.unique(np.concatenate([series.time for series in log.signals.values()] or [np.zeros(0)]))
-    header, columns = [TIME], [[repr(time) for time in times.tolist()]]
+    header = [TIME]
+    columns = [[repr(time) for time in times.tolist()]]
     for name, series in log.signals.items():
         rows = np.searchsorted(times, series.time)
         for column, values in zip(series.column_names(), series.flat().T, strict=True):

@@ -132,10 +132,12 @@ def usual_mapping(recording: Recording) -> tuple[LogMapping, tuple[str, ...]]:
     mapping = DEFAULTS.get(recording.format, LogMapping({}))
     if recording.format not in ("ArduPilot", "MAVLink"):
         return mapping, ()
-    signals, notes = dict(mapping.signals), []
+    signals = dict(mapping.signals)
+    notes = []
     if recording.format == "ArduPilot":
         entries, note = _depth(recording)
-        signals["depth"], notes = entries + signals["depth"], [note] if note else []
+        signals["depth"] = entries + signals["depth"]
+        notes = [note] if note else []
     entries, note = _pulses(recording)
     signals["pulses"] = entries + signals["pulses"]
     return mapping._replace(signals=signals), tuple(notes + [note] if note else notes)
@@ -149,8 +151,8 @@ def _depth(recording: Recording) -> tuple[tuple[SignalMapping, ...], str]:
         return (SignalMapping(("Alt",), primary or present[0], frame=_ENU),), ""
     if (height is not None and "BAlt" in height[1].fields) or len(present) < 2:
         return (), ""
-    others = f"{present[0]} is read as depth, the first of {', '.join(present)}"
-    return (), f"{others}: no parameter BARO_PRIMARY of the file says which of them is in the water"
+    guess = f"{present[0]} is read as depth, the first of {', '.join(present)}"
+    return (), f"{guess}: no parameter BARO_PRIMARY of the file says which of them is in the water"
 
 
 def _pulses(recording: Recording) -> tuple[tuple[SignalMapping, ...], str]:
@@ -159,6 +161,10 @@ def _pulses(recording: Recording) -> tuple[tuple[SignalMapping, ...], str]:
     channels = [channel for channel in motor_channels(recording.parameters).values() if channel in columns]
     if not channels:
         return (), ""
-    others = [column for channel, column in columns.items() if channel not in channels]
-    note = f"{topic} {', '.join(others)} are no pulses of motors (SERVOn_FUNCTION) and are left out" if others else ""
+    other_columns = [column for channel, column in columns.items() if channel not in channels]
+    note = (
+        f"{topic} {', '.join(other_columns)} are no pulses of motors (SERVOn_FUNCTION) and are left out"
+        if other_columns
+        else ""
+    )
     return (SignalMapping(tuple(columns[channel] for channel in channels), topic),), note

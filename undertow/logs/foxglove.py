@@ -104,16 +104,16 @@ def transforms(time: np.ndarray, motions: Mapping[str, np.ndarray]) -> Iterator[
     """
     parts = []
     for outputs in motions.values():
-        good = np.atleast_1d(np.isfinite(outputs).all(axis=1))
-        turned = quaternions(outputs[:, 3:])[:, [1, 2, 3, 0]].tolist()
-        parts.append(zip(good, outputs[:, :3].tolist(), turned, strict=True))
+        is_finite = np.atleast_1d(np.isfinite(outputs).all(axis=1))
+        attitudes = quaternions(outputs[:, 3:])[:, [1, 2, 3, 0]].tolist()
+        parts.append(zip(is_finite, outputs[:, :3].tolist(), attitudes, strict=True))
     for when, *frames in zip(time.tolist(), *parts, strict=True):
         stamp = divmod(nanoseconds(when), 10**9)
-        found = [_TRANSFORM % (*stamp, WORLD, NED, 0, 0, 0, *_NED_IN_WORLD)]
-        for name, (good, place, turn) in zip(motions, frames, strict=True):
-            if good:
-                found.append(_TRANSFORM % (*stamp, NED, name, *place, *turn))
-        yield when, f'{{"transforms": [{", ".join(found)}]}}'.encode()
+        messages = [_TRANSFORM % (*stamp, WORLD, NED, 0, 0, 0, *_NED_IN_WORLD)]
+        for name, (is_finite, position, quaternion) in zip(motions, frames, strict=True):
+            if is_finite:
+                messages.append(_TRANSFORM % (*stamp, NED, name, *position, *quaternion))
+        yield when, f'{{"transforms": [{", ".join(messages)}]}}'.encode()
 
 
 def scene(time: float, path: np.ndarray, size: Any = None) -> bytes:
@@ -144,13 +144,13 @@ def scene(time: float, path: np.ndarray, size: Any = None) -> bytes:
 
 def _entity(time: float, frame: str, name: str, **shapes: Any) -> dict[str, Any]:
     kinds = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
-    place = {"timestamp": _stamp(time), "frame_id": frame, "id": name, "lifetime": {"sec": 0, "nsec": 0}}
-    return place | {"frame_locked": True, "metadata": []} | {kind: [] for kind in kinds} | shapes
+    header = {"timestamp": _stamp(time), "frame_id": frame, "id": name, "lifetime": {"sec": 0, "nsec": 0}}
+    return header | {"frame_locked": True, "metadata": []} | {kind: [] for kind in kinds} | shapes
 
 
 def _stamp(time: float) -> dict[str, int]:
-    seconds, rest = divmod(nanoseconds(time), 10**9)
-    return {"sec": seconds, "nsec": rest}
+    seconds, remainder = divmod(nanoseconds(time), 10**9)
+    return {"sec": seconds, "nsec": remainder}
 
 
 def _pose() -> dict[str, Any]:

@@ -20,8 +20,8 @@ _COLOURS = ("#0072b2", "#e07b00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#
 
 def layout() -> str:
     """The layout as JSON, which Foxglove imports: Layouts, Import from file."""
-    panels: dict[str, Any] = {"3D!view": _view()} | {name: _plot(*given) for name, given in _PLOTS.items()}
-    found = {
+    panels: dict[str, Any] = {"3D!view": _view()} | {name: _plot(*settings) for name, settings in _PLOTS.items()}
+    contents = {
         "configById": panels,
         "globalVariables": {},
         "userNodes": {},
@@ -34,7 +34,7 @@ def layout() -> str:
             50,
         ),
     }  # fmt: skip
-    return json.dumps(found, indent=1) + "\n"
+    return json.dumps(contents, indent=1) + "\n"
 
 
 def _split(direction: str, first: Any, second: Any, share: int) -> dict[str, Any]:

@@ -70,8 +70,10 @@ def quaternions(angles: ArrayLike) -> np.ndarray:
     """Unit quaternions (w, x, y, z), body to world, of roll, pitch, yaw (rad) along the last axis."""
     halves = np.moveaxis(np.asarray(angles, dtype=float), -1, 0) / 2
     (sr, sp, sy), (cr, cp, cy) = np.sin(halves), np.cos(halves)
-    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
-    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    w = cr * cp * cy + sr * sp * sy
+    x = sr * cp * cy - cr * sp * sy
+    y = cr * sp * cy + sr * cp * sy
+    z = cr * cp * sy - sr * sp * cy
     return np.stack([w, x, y, z], axis=-1)
 
 

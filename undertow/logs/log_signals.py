@@ -101,7 +101,8 @@ class LogSignals:
     def sampling(self, name: str) -> SamplingStatistics:
         """How a signal was sampled."""
         series = self[name]
-        time, steps = series.time, np.diff(series.time)
+        time = series.time
+        steps = np.diff(series.time)
         median = float(np.median(steps)) if steps.size else np.nan
         gaps = steps[steps > _GAP * median]
         numbers = np.asarray(series.values, dtype=float)
@@ -117,14 +118,16 @@ class LogSignals:
 
     def duration(self) -> float:
         """Time from the first sample of any signal to the last, s."""
-        ends = [time for one in self.signals.values() if len(one.time) for time in (one.time[0], one.time[-1])]
+        ends = [
+            time for series in self.signals.values() if len(series.time) for time in (series.time[0], series.time[-1])
+        ]
         return float(max(ends) - min(ends)) if ends else 0.0
 
     def __repr__(self) -> str:
         lines = [f"Log of {self.source} ({self.format}), {self.duration():g} s"]
         for name, series in self.signals.items():
-            how = self.sampling(name)
-            lines.append(f"  {name:<20}{how.samples:>8} samples {how.rate:>8.4g} Hz  {series.unit}")
+            sampling = self.sampling(name)
+            lines.append(f"  {name:<20}{sampling.samples:>8} samples {sampling.rate:>8.4g} Hz  {series.unit}")
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
@@ -145,8 +148,8 @@ def _how_to_add(log: LogSignals, name: str) -> str:
     """How a log comes to have a signal: by a mapping, unless undertow wrote it, or the name means nothing."""
     if name not in SIGNALS or log.format == "undertow":
         return nearest(name, log.signals)
-    known = SIGNALS[name]
-    return mapping_hint(log, name, ", ".join(known.columns) or name, f"unit: {known.unit}")
+    signal = SIGNALS[name]
+    return mapping_hint(log, name, ", ".join(signal.columns) or name, f"unit: {signal.unit}")
 
 
 def mapping_hint(log: LogSignals, name: str, columns: str, how: str, topic: str = "TOPIC") -> str:
@@ -166,8 +169,8 @@ def check_times(name: str, time: np.ndarray, source: str) -> None:
     if not np.isfinite(time).all():
         row = int(np.argmin(np.isfinite(time)))
         raise BadInput("log", "have finite times", f"{source}, {name}, sample {row + 1}: {time[row]:g}")
-    late = np.diff(time) <= 0
-    if late.any():
-        row = int(np.argmax(late)) + 1
+    not_increasing = np.diff(time) <= 0
+    if not_increasing.any():
+        row = int(np.argmax(not_increasing)) + 1
         got = f"{source}, {name}, sample {row + 1}: {time[row]:.9g} s after {time[row - 1]:.9g} s"
         raise BadInput("log", "have increasing times", got)

@@ -19,17 +19,18 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
     Raises:
         BadInput: a topic or a column is missing, a time does not increase, or a frame is not the one named.
     """
-    notes, signals = list(recording.notes), {}
+    notes = list(recording.notes)
+    signals = {}
     for name, entries in mapping.signals.items():
         with within("signals"), within(name):
             entries = tuple(_with_motors(entry, recording) for entry in entries)
-            entry = next((one for one in entries if _has(recording, one)), entries[-1])
+            entry = next((candidate for candidate in entries if _has(recording, candidate)), entries[-1])
             topic, table = recording.table(entry.topic)
-        used, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
+        cleaned_table, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
         if repeated:
             notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
         with within("signals"), within(name):
-            ours, series = _series(name, entry, topic, used, recording)
+            ours, series = _series(name, entry, topic, cleaned_table, recording)
             signals[ours] = series
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
 
@@ -43,9 +44,11 @@ def _with_motors(entry: SignalMapping, recording: Recording) -> SignalMapping:
     if not entry.motors:
         return entry
     numbers = range(1, len(FRAMES[entry.motors]) + 1)
-    turned = tuple(motor_direction(recording.parameters, number) for number in numbers)
+    directions = tuple(motor_direction(recording.parameters, number) for number in numbers)
     if entry.columns:
-        return entry._replace(signs=tuple(sign * other for sign, other in zip(entry.signs, turned, strict=True)))
+        return entry._replace(
+            signs=tuple(sign * direction for sign, direction in zip(entry.signs, directions, strict=True))
+        )
     topic, columns = pulse_columns(recording)
     channels = motor_channels(recording.parameters) or {number: number for number in numbers}  # as ArduSub has it
     names = [columns.get(channels.get(number, 0), "") for number in numbers]
@@ -54,28 +57,28 @@ def _with_motors(entry: SignalMapping, recording: Recording) -> SignalMapping:
         got = f"{entry.motors}, and {recording.source} has no pulses of motor {lacking}"
         hint = f"Give the columns of the motors 1 to {len(numbers)} as well: `columns: [C1..C{len(numbers)}]`"
         raise BadInput("frame", "be that of the vehicle that wrote the log", got, hint=hint)
-    return entry._replace(columns=tuple(names), signs=turned, topic=entry.topic or topic)
+    return entry._replace(columns=tuple(names), signs=directions, topic=entry.topic or topic)
 
 
 def suited(recording: Recording, mapping: LogMapping) -> tuple[LogMapping, tuple[str, ...]]:
     """The mapping without what a file does not have, and a sentence for each topic that has another frame."""
-    kept, notes = {}, []
+    signals, notes = {}, []
     for name, entries in mapping.signals.items():
-        fitting = []
+        suitable = []
         for entry in entries:
-            other = _other_frame(recording, entry) if _has(recording, entry) else ""
-            if other:
-                notes.append(f"{entry.topic} is not read as {name}: {other}")
+            mismatch = _other_frame(recording, entry) if _has(recording, entry) else ""
+            if mismatch:
+                notes.append(f"{entry.topic} is not read as {name}: {mismatch}")
             elif _has(recording, entry):
-                fitting.append(entry)
-        if fitting:
-            kept[name] = tuple(fitting)
-    return mapping._replace(signals=kept), tuple(notes)
+                suitable.append(entry)
+        if suitable:
+            signals[name] = tuple(suitable)
+    return mapping._replace(signals=signals), tuple(notes)
 
 
 def _has(recording: Recording, entry: SignalMapping) -> bool:
-    found = recording.find(entry.topic) if entry.topic else None
-    return found is not None and all(column in found[1].fields for column in entry.columns)
+    topic_and_table = recording.find(entry.topic) if entry.topic else None
+    return topic_and_table is not None and all(column in topic_and_table[1].fields for column in entry.columns)
 
 
 def _other_frame(recording: Recording, entry: SignalMapping) -> str:
@@ -108,52 +111,57 @@ def _series(
     name: str, entry: SignalMapping, topic: str, table: TopicMessages, recording: Recording
 ) -> tuple[str, Series]:
     """A signal in our unit and frame, and its name: quaternions become an attitude."""
-    known, source = SIGNALS[name], recording.source
+    signal = SIGNALS[name]
+    source = recording.source
     columns = [np.asarray(_column(table, column, source), dtype=float) for column in entry.columns]
-    values = factor_of(name, entry) * _signed(np.stack(columns, axis=1), entry, known)
-    unit, ours, titles = known.unit, name, known.columns
-    if known.columns == ("thruster",):
+    values = factor_of(name, entry) * _signed(np.stack(columns, axis=1), entry, signal)
+    unit = signal.unit
+    ours = name
+    titles = signal.columns
+    if signal.columns == ("thruster",):
         titles = motor_columns(entry.motors) if entry.motors else thruster_columns(len(columns))
         unit = "N" if entry.unit == "N" else unit
         if name in INPUTS and entry.supply is not None:
             values = volts(values, entry, entry.supply)
-    elif known.kind == "quaternion":
-        ours, unit, titles = "attitude", "rad", SIGNALS["attitude"].columns
+    elif signal.kind == "quaternion":
+        ours = "attitude"
+        unit = "rad"
+        titles = SIGNALS["attitude"].columns
         values = frames.attitudes_of_quaternions(values, *entry.frame)
     else:
-        values = _in_our_frame(values, known, entry.frame)
-    shown = f"{topic} " if topic else ""
-    used = entry.unit or known.unit
-    signed = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
-    named = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signed)
-    origin = f"{shown}{named} ({used}{_frame_note(known, entry.frame)})"
+        values = _in_our_frame(values, signal, entry.frame)
+    topic_prefix = f"{topic} " if topic else ""
+    file_unit = entry.unit or signal.unit
+    signs_and_columns = zip(entry.signs or [1] * len(entry.columns), entry.columns, strict=True)
+    signed_names = ", ".join(f"-{column}" if sign < 0 else column for sign, column in signs_and_columns)
+    origin = f"{topic_prefix}{signed_names} ({file_unit}{_frame_note(signal, entry.frame)})"
     return ours, Series(table.time, values[:, 0] if not titles else values, titles, unit, SIGNALS[ours].meaning, origin)
 
 
-def _signed(values: np.ndarray, entry: SignalMapping, known: KnownSignal) -> np.ndarray:
+def _signed(values: np.ndarray, entry: SignalMapping, signal: KnownSignal) -> np.ndarray:
     """Values, with the negative of those columns whose sign is -1. The negative of a pulse is as far from neutral."""
     if not entry.signs:
         return values
-    pulses = entry.unit == "us" or (known.unit == "us" and not entry.unit)
+    pulses = entry.unit == "us" or (signal.unit == "us" and not entry.unit)
     middle = entry.esc["neutral"] if pulses else 0.0
     sent = values != 0.0 if pulses else True  # 0 us is no pulse
     return np.where(sent, middle + np.array(entry.signs) * (values - middle), 0.0)
 
 
-def _in_our_frame(values: np.ndarray, known: KnownSignal, frame: tuple[str, str]) -> np.ndarray:
+def _in_our_frame(values: np.ndarray, signal: KnownSignal, frame: tuple[str, str]) -> np.ndarray:
     world, body = frame
-    if known.kind == "world":
+    if signal.kind == "world":
         return frames.world_vectors(values, world)
-    if known.kind == "body":
+    if signal.kind == "body":
         return frames.body_vectors(values, body)
-    if known.kind == "attitude":
+    if signal.kind == "attitude":
         return frames.attitudes(values, world, body)
-    return -values if known.kind == "down" and world == "ENU" else values
+    return -values if signal.kind == "down" and world == "ENU" else values
 
 
-def _frame_note(known: KnownSignal, frame: tuple[str, str]) -> str:
-    shown = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
-    note = shown.get(known.kind, f"{frame[1]} in {frame[0]}")
+def _frame_note(signal: KnownSignal, frame: tuple[str, str]) -> str:
+    notes_by_kind = {"world": frame[0], "body": frame[1], "down": "up" if frame[0] == "ENU" else "down", "": ""}
+    note = notes_by_kind.get(signal.kind, f"{frame[1]} in {frame[0]}")
     return f", {note}" if note else ""
 
 

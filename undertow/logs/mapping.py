@@ -83,23 +83,23 @@ def mapping_of(data: Any) -> LogMapping:
     with within("signals"):
         if not isinstance(data["signals"], Mapping) or not data["signals"]:
             raise BadInput("", "be a mapping of signals", data["signals"])
-        for name, described in data["signals"].items():
+        for name, settings in data["signals"].items():
             if name not in SIGNALS:
                 raise BadInput(str(name), "be a known signal", "unknown", hint=did_you_mean(str(name), SIGNALS))
             with within(str(name)):
-                signals[name] = (_entry(name, described, frame),)
+                signals[name] = (_entry(name, settings, frame),)
         if {"attitude", "quaternion"} <= set(signals):
             raise BadInput("quaternion", "be left out where `attitude` is given", "given too")
     return LogMapping(signals, _time(data.get("time", "")))
 
 
-def _keys(data: Any, name: str, known: Iterable[str], needed: str) -> None:
+def _keys(data: Any, name: str, allowed: Iterable[str], needed: str) -> None:
     """Check that data is a mapping of known keys that has a needed one."""
     if not isinstance(data, Mapping):
         raise BadInput(name or "mapping", "be a mapping", data)
     for key in data:
-        if key not in known:
-            raise BadInput(str(key), "be a key here", "unknown", hint=known_key(str(key), known))
+        if key not in allowed:
+            raise BadInput(str(key), "be a key here", "unknown", hint=known_key(str(key), allowed))
     if needed not in data:
         raise BadInput(needed, "be given")
 
@@ -111,35 +111,35 @@ def _word(data: Mapping[str, Any], key: str, allowed: tuple[str, str]) -> str:
     return word
 
 
-def _time(given: Any) -> tuple[str, str]:
-    if isinstance(given, str):
-        return given, "s"
+def _time(settings: Any) -> tuple[str, str]:
+    if isinstance(settings, str):
+        return settings, "s"
     with within("time"):
-        _keys(given, "", ("column", "unit"), "column")
-        unit = str(given.get("unit", "s"))
+        _keys(settings, "", ("column", "unit"), "column")
+        unit = str(settings.get("unit", "s"))
         units.seconds(unit)
-        return str(given["column"]), unit
+        return str(settings["column"]), unit
 
 
-def _entry(name: str, given: Any, frame: tuple[str, str]) -> SignalMapping:
-    motors = isinstance(given, Mapping) and "frame" in given and name in INPUTS
+def _entry(name: str, settings: Any, frame: tuple[str, str]) -> SignalMapping:
+    motors = isinstance(settings, Mapping) and "frame" in settings and name in INPUTS
     known_keys = ("columns", *(["frame"] if name in INPUTS else []), "topic", "unit", "world", "body", "supply", *_ESC)
-    _keys(given, name, known_keys, "frame" if motors else "columns")
-    signed = _columns(given["columns"]) if not motors or "columns" in given else []
-    settings = {"world": frame[0], "body": frame[1]} | dict(given)
+    _keys(settings, name, known_keys, "frame" if motors else "columns")
+    signed_columns = _columns(settings["columns"]) if not motors or "columns" in settings else []
+    with_axes = {"world": frame[0], "body": frame[1]} | dict(settings)
     entry = SignalMapping(
-        columns=tuple(column for _, column in signed),
-        topic=str(given.get("topic", "")),
-        unit=str(given.get("unit", "")),
-        frame=(_word(settings, "world", WORLD), _word(settings, "body", BODY)),
-        supply=_number(given, "supply", None),
-        esc={key: _number(given, key, usual) for key, usual in _ESC.items()},
-        signs=tuple(sign for sign, _ in signed),
-        motors=_frame(given["frame"], signed) if motors else "",
+        columns=tuple(column for _, column in signed_columns),
+        topic=str(settings.get("topic", "")),
+        unit=str(settings.get("unit", "")),
+        frame=(_word(with_axes, "world", WORLD), _word(with_axes, "body", BODY)),
+        supply=_number(settings, "supply", None),
+        esc={key: _number(settings, key, usual) for key, usual in _ESC.items()},
+        signs=tuple(sign for sign, _ in signed_columns),
+        motors=_frame(settings["frame"], signed_columns) if motors else "",
     )
-    known = SIGNALS[name]
-    if known.columns != ("thruster",) and len(entry.columns) != max(1, len(known.columns)):
-        must = f"be {max(1, len(known.columns))}: {', '.join(known.columns) or name}"
+    signal = SIGNALS[name]
+    if signal.columns != ("thruster",) and len(entry.columns) != max(1, len(signal.columns)):
+        must = f"be {max(1, len(signal.columns))}: {', '.join(signal.columns) or name}"
         raise BadInput("columns", must, f"{len(entry.columns)}")
     factor_of(name, entry)
     return entry
@@ -155,8 +155,8 @@ def _frame(name: Any, columns: list[tuple[int, str]]) -> str:
     return name
 
 
-def _number(given: Mapping[str, Any], key: str, usual: Any) -> Any:
-    value = given.get(key, usual)
+def _number(settings: Mapping[str, Any], key: str, usual: Any) -> Any:
+    value = settings.get(key, usual)
     if value is usual:
         return value
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
@@ -165,17 +165,17 @@ def _number(given: Mapping[str, Any], key: str, usual: Any) -> Any:
     return float(value)
 
 
-def _columns(given: Any) -> list[tuple[int, str]]:
+def _columns(columns: Any) -> list[tuple[int, str]]:
     """Sign and name of each column: `-C1` is the negative of C1, and `C1..C8` stands for C1, C2, ..., C8."""
-    words = [given] if isinstance(given, str) else given
+    words = [columns] if isinstance(columns, str) else columns
     if not isinstance(words, list | tuple) or not words or not all(isinstance(word, str) for word in words):
         raise BadInput("columns", "be names of columns", words)
-    signed = []
+    signed_columns = []
     for word in words:
-        turned = word.startswith("-")
-        names = _spread(word[1:].replace("..-", "..") if turned else word)
-        signed += [(-1 if turned else 1, column) for column in names]
-    return signed
+        negative = word.startswith("-")
+        names = _spread(word[1:].replace("..-", "..") if negative else word)
+        signed_columns += [(-1 if negative else 1, column) for column in names]
+    return signed_columns
 
 
 def _spread(name: str) -> list[str]:
@@ -192,7 +192,7 @@ def _spread(name: str) -> list[str]:
 
 def factor_of(name: str, entry: SignalMapping) -> float:
     """Factor of the unit; that of pulses and duties, which become volts, is 1 or that of the duty."""
-    known = SIGNALS[name]
+    signal = SIGNALS[name]
     shares = name in INPUTS and entry.unit in SHARES
     if shares and entry.supply is None:
         raise BadInput("supply", "be given, V: the input is a share of it", f"{name} in {entry.unit}, without")
@@ -202,4 +202,4 @@ def factor_of(name: str, entry: SignalMapping) -> float:
         return SHARES[entry.unit]
     if name in INPUTS and entry.unit == "N":  # of thrusters that are commanded in newtons
         return 1.0
-    return units.factor(entry.unit or known.unit, known.unit, name, ("N", *SHARES) if name in INPUTS else ())
+    return units.factor(entry.unit or signal.unit, signal.unit, name, ("N", *SHARES) if name in INPUTS else ())

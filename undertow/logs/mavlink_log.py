@@ -63,8 +63,10 @@ def read_mavlink(path: Path, names: Collection[str] = ("",)) -> Recording:
     senders = [sender for sender, _ in scan.autopilots.most_common()]
     vehicle = senders[0] if senders else next(iter(scan.fields))[1]
     start = min(min(fields.stamps) for fields in scan.fields.values())
-    own = {name: fields.table(start) for (name, sender), fields in scan.fields.items() if sender == vehicle}
-    tables, restarts = on_vehicle_clock(own)
+    tables_of_vehicle = {
+        name: fields.table(start) for (name, sender), fields in scan.fields.items() if sender == vehicle
+    }
+    tables, restarts = on_vehicle_clock(tables_of_vehicle)
     for (name, sender), fields in scan.fields.items():
         if sender != vehicle:
             tables[f"{name}[{sender[0]}:{sender[1]}]"] = fields.table(start)
@@ -92,12 +94,13 @@ def _dialect() -> Any:
 
 def _scanned(data: bytes, names: Collection[str]) -> _Scan:
     dialect = _dialect()
-    decoder, types = dialect.MAVLink(None), dialect.mavlink_map
+    decoder = dialect.MAVLink(None)
+    types = dialect.mavlink_map
     scan = _Scan({}, {}, Counter(), 0, 0)
-    at = lost = damaged_times = 0
+    offset = lost = damaged_times = 0
     before = None
-    while at < len(data):
-        frame = _frame_at(data, at)
+    while offset < len(data):
+        frame = _frame_at(data, offset)
         size = 0 if frame is None else 8 + len(frame.data)
         name = types[frame.kind].msgname if frame is not None and frame.kind in types else ""
         message = None
@@ -107,15 +110,16 @@ def _scanned(data: bytes, names: Collection[str]) -> _Scan:
             except Exception:  # whatever bytes may cause
                 name = ""
         if frame is not None and message is not None:
-            time = _likely_time(before, frame.time, _frame_at(data, at + size))
+            time = _likely_time(before, frame.time, _frame_at(data, offset + size))
             damaged_times += time != frame.time
             before = time
             _add(scan, name, frame._replace(time=time), message)
-        elif not size or not _begins(data, at + size):
-            size, lost = 1, lost + 1
+        elif not size or not _begins(data, offset + size):
+            size = 1
+            lost += 1
         elif not name:  # damaged, or of another dialect
             lost += size
-        at += size
+        offset += size
     return scan._replace(lost=lost, times=damaged_times)
 
 
@@ -126,11 +130,11 @@ def _requested(name: str, frame: _Frame, names: Collection[str], scan: _Scan) ->
     return (name, frame.sender) not in scan.fields
 
 
-def _frame_at(data: bytes, at: int) -> _Frame | None:
+def _frame_at(data: bytes, offset: int) -> _Frame | None:
     """The frame whose time stands at a place; None where there is none that ends within the file."""
-    begin = at + 8
+    begin = offset + 8
     overhead = _FRAMES.get(data[begin]) if begin + 10 <= len(data) else None
-    time = int.from_bytes(data[at:begin], "big")
+    time = int.from_bytes(data[offset:begin], "big")
     if overhead is None or time >= _LATEST:
         return None
     newer = overhead == _FRAMES[0xFD]
@@ -150,9 +154,9 @@ def _likely_time(before: int | None, time: int, following: _Frame | None) -> int
     return before if abs(time - before) > _LEAP and abs(after - before) < _LEAP else time
 
 
-def _begins(data: bytes, at: int) -> bool:
+def _begins(data: bytes, offset: int) -> bool:
     """Whether a frame seems to begin at a place, or the file ends there."""
-    return at == len(data) or _frame_at(data, at) is not None
+    return offset == len(data) or _frame_at(data, offset) is not None
 
 
 def _add(scan: _Scan, name: str, frame: _Frame, message: Any) -> None:
@@ -171,4 +175,6 @@ def _numbers(message: Any) -> Iterator[tuple[str, float]]:
         if isinstance(value, int | float):
             yield name, float(value)
         elif isinstance(value, list | tuple):
-            yield from ((f"{name}[{i}]", float(one)) for i, one in enumerate(value) if isinstance(one, int | float))
+            yield from (
+                (f"{name}[{i}]", float(entry)) for i, entry in enumerate(value) if isinstance(entry, int | float)
+            )

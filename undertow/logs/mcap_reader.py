@@ -56,41 +56,42 @@ def read_mcap(path: Path) -> Log | Recording:
     Raises:
         BadInput: damaged, or without messages in JSON.
     """
-    found = _contents(path)
-    others = found.encodings - {"json"}
-    if not found.ours and not found.others:
+    contents = _contents(path)
+    others = contents.encodings - {"json"}
+    if not contents.ours and not contents.others:
         got = f"whose messages are {', '.join(sorted(others))}" if others else "which has none"
-        if found.notes:
-            got = f"{got} before it ends: {found.notes[-1]}"
+        if contents.notes:
+            got = f"{got} before it ends: {contents.notes[-1]}"
         raise BadInput("log", "have messages in JSON", f"{path.name}, {got}")
-    if found.ours:
-        return _our_log(path, found)
-    notes = [*found.notes, *(f"channels in {encoding} are left out" for encoding in sorted(others))]
-    notes += [f"{topic} is left out: {reason}" for topic, reason in found.left_out.items()]
-    tables = {topic: fields.table() for topic, fields in found.others.items()}
-    return Recording(tables, path.name, "MCAP", tuple(notes), left_out=found.left_out)
+    if contents.ours:
+        return _our_log(path, contents)
+    notes = [*contents.notes, *(f"channels in {encoding} are left out" for encoding in sorted(others))]
+    notes += [f"{topic} is left out: {reason}" for topic, reason in contents.left_out.items()]
+    tables = {topic: fields.table() for topic, fields in contents.others.items()}
+    return Recording(tables, path.name, "MCAP", tuple(notes), left_out=contents.left_out)
 
 
-def _our_log(path: Path, found: _Contents) -> Log:
-    facts, signals = dict(found.facts), {}
-    for topic, messages in found.ours.items():
+def _our_log(path: Path, contents: _Contents) -> Log:
+    facts = dict(contents.facts)
+    signals = {}
+    for topic, messages in contents.ours.items():
         try:
-            signals |= signals_of(found.schemas[topic][1], messages)
+            signals |= signals_of(contents.schemas[topic][1], messages)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(path, f"messages of {topic}: {error}") from None
-    kept = tuple(filter(None, facts.pop("notes", "").split("\n")))
+    notes = tuple(filter(None, facts.pop("notes", "").split("\n")))
     facts.pop("source", "")
-    return Log(signals, path.name, facts.pop("format", "undertow"), (*kept, *found.notes), facts)
+    return Log(signals, path.name, facts.pop("format", "undertow"), (*notes, *contents.notes), facts)
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, float]]:
     """Numbers within a message, by path: `pose.position.x`, `values[3]`."""
     if isinstance(value, dict):
-        for key, one in value.items():
-            yield from _leaves(one, f"{path}.{key}".lstrip("."))
+        for key, entry in value.items():
+            yield from _leaves(entry, f"{path}.{key}".lstrip("."))
     elif isinstance(value, list):
-        for i, one in enumerate(value):
-            yield from _leaves(one, f"{path}[{i}]")
+        for i, entry in enumerate(value):
+            yield from _leaves(entry, f"{path}[{i}]")
     elif isinstance(value, bool | int | float) or value is None:
         yield path, number(value)
 
@@ -155,28 +156,30 @@ def records(path: Path, notes: list[str]) -> Iterator[Any]:
     from mcap.stream_reader import StreamReader
 
     data = path.read_bytes()
-    size, stream = len(data), io.BytesIO(_without_zeros(path, data))
-    unpacked, most = 0, most_unpacked(size)
+    size = len(data)
+    stream = io.BytesIO(_without_zeros(path, data))
+    unpacked = 0
+    most = most_unpacked(size)
     end = stream.getbuffer().nbytes
     reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=_LARGEST)
     records = iter(reader.records)
-    place = 0  # of the record that is read next
+    offset = 0  # of the record that is read next
     while True:
         try:
             record = next(records, None)
             parts = _broken_up(record) if type(record).__name__ == "Chunk" else [record]
         except Exception as error:  # whatever bytes may cause
-            if place and stream.tell() >= end:
-                notes.append(f"the file ends early, within the record at byte {place} of {size}")
+            if offset and stream.tell() >= end:
+                notes.append(f"the file ends early, within the record at byte {offset} of {size}")
                 return
-            raise _damaged(path, f"at byte {place}: {str(error) or type(error).__name__}") from None
+            raise _damaged(path, f"at byte {offset}: {str(error) or type(error).__name__}") from None
         if record is None or type(record).__name__ == "DataEnd":
             return
         unpacked += getattr(record, "uncompressed_size", 0)
         if unpacked > most:
-            what = f"chunks of {unpacked} bytes in all, more than the {most} that are read of a file of this size"
-            raise _damaged(path, f"at byte {place}: {what}")
-        place = stream.tell()
+            reason = f"chunks of {unpacked} bytes in all, more than the {most} that are read of a file of this size"
+            raise _damaged(path, f"at byte {offset}: {reason}")
+        offset = stream.tell()
         yield from parts
 
 
@@ -186,21 +189,21 @@ def _without_zeros(path: Path, data: bytes) -> bytes:
     Raises:
         BadInput: zeros elsewhere, where a record should begin.
     """
-    at = _first_other(data, 8, range(1, 256))  # after the bytes that mark the format
-    if data[at:].strip(b"\0") and at < len(data):
-        raise _damaged(path, f"at byte {at}: a record of kind 0, which there is not")
-    return data[:at]
+    end = _first_other(data, 8, range(1, 256))  # after the bytes that mark the format
+    if data[end:].strip(b"\0") and end < len(data):
+        raise _damaged(path, f"at byte {end}: a record of kind 0, which there is not")
+    return data[:end]
 
 
-def _first_other(data: bytes, at: int, kinds: Collection[int]) -> int:
+def _first_other(data: bytes, offset: int, kinds: Collection[int]) -> int:
     """Place of the first record of another kind, from a place on; the length of the data without one."""
-    while at + _HEAD.size <= len(data):
-        kind, size = _HEAD.unpack_from(data, at)
+    while offset + _HEAD.size <= len(data):
+        kind, size = _HEAD.unpack_from(data, offset)
         if kind not in kinds:
-            return at
+            return offset
         if kind == _DATA_END:
             break
-        at += _HEAD.size + size
+        offset += _HEAD.size + size
     return len(data)
 
 
@@ -218,9 +221,9 @@ def _broken_up(chunk: Any) -> list[Any]:
     data = _unpacked(chunk.compression, chunk.data, size)
     if len(data) != size:
         raise ValueError(f"a chunk of {'more' if len(data) > size else 'fewer'} than the {size} bytes that it declares")
-    other = _first_other(data, 0, _IN_CHUNKS)
-    if other < len(data):
-        raise ValueError(f"a record of kind {data[other]} in a chunk, where there is none of it")
+    offset = _first_other(data, 0, _IN_CHUNKS)
+    if offset < len(data):
+        raise ValueError(f"a record of kind {data[offset]} in a chunk, where there is none of it")
     return breakup_chunk(dataclasses.replace(chunk, compression="", data=data), validate_crc=True)
 
 

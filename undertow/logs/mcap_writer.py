@@ -33,7 +33,9 @@ class _Writer:
     def __init__(self, stream: IO[bytes], chunk: int, facts: Mapping[str, str]):
         from mcap.writer import Writer
 
-        self._stream, self._writer, self._ids = stream, Writer(stream, chunk_size=chunk), {}
+        self._stream = stream
+        self._writer = Writer(stream, chunk_size=chunk)
+        self._ids = {}
         self._writer.start(profile="", library="undertow")
         self._writer.add_metadata(METADATA, {key: str(value) for key, value in facts.items()})
 
@@ -87,7 +89,7 @@ def write_mcap(log: LogSignals, path: Path, size: Any = None) -> None:
             channel = writer.channel(topic, form.schema_name, form.schema())
             streams.append(zip(itertools.repeat(channel), form.of_samples()))
         # In the order of time, so that a viewer need not read the whole file for one moment.
-        for channel, (time, message) in heapq.merge(*streams, *_view(writer, log, size), key=lambda one: one[1][0]):
+        for channel, (time, message) in heapq.merge(*streams, *_view(writer, log, size), key=lambda entry: entry[1][0]):
             writer.write(channel, time, message)
         writer.finish()
 
@@ -158,11 +160,14 @@ class LiveLog:
         self._stream = path.open("wb")
         self._writer = _Writer(self._stream, _LIVE_CHUNK, dict(facts) | {"format": "undertow", "source": path.name})
         self._topics = []
-        for topic, several in grouped(signals).items():
-            form = MessageForm(topic.strip("/"), several)
-            self._topics.append((self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(several)))
+        for topic, signals_of_topic in grouped(signals).items():
+            form = MessageForm(topic.strip("/"), signals_of_topic)
+            self._topics.append(
+                (self._writer.channel(topic, form.schema_name, form.schema()), form, tuple(signals_of_topic))
+            )
         self._tf = self._writer.foxglove_channel("/tf", "foxglove.FrameTransforms")
-        self._pose, self._begun = _pose_names(signals), False
+        self._pose = _pose_names(signals)
+        self._begun = False
 
     def write(self, entry: tuple[float, Mapping[str, Any]]) -> None:
         """Write one step: its time, s, and the values of all signals by name."""

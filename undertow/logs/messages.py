@@ -37,14 +37,14 @@ def group_of(name: str) -> str:
 
 def grouped(signals: Mapping[str, Series]) -> dict[str, dict[str, Series]]:
     """Signals by topic: those of a group that were sampled together, or each for itself where they were not."""
-    found: dict[str, dict[str, Series]] = {}
+    groups: dict[str, dict[str, Series]] = {}
     for name, series in signals.items():
         topic = f"/{group_of(name)}"
-        held = next(iter(found.get(topic, {}).values()), series)
-        if held.time.shape != series.time.shape or (held.time != series.time).any():
+        first = next(iter(groups.get(topic, {}).values()), series)
+        if first.time.shape != series.time.shape or (first.time != series.time).any():
             topic = f"{topic}/{name}"
-        found.setdefault(topic, {})[name] = series
-    return found
+        groups.setdefault(topic, {})[name] = series
+    return groups
 
 
 class MessageForm:
@@ -56,19 +56,20 @@ class MessageForm:
     """
 
     def __init__(self, group: str, signals: Mapping[str, Series]):
-        self.schema_name, self._signals = _OUR_SCHEMA + group, dict(signals)
-        parts = ", ".join(f"{_key(name)}: {_template(one)}" for name, one in signals.items())
+        self.schema_name = _OUR_SCHEMA + group
+        self._signals = dict(signals)
+        parts = ", ".join(f"{_key(name)}: {_template(series)}" for name, series in signals.items())
         self._template = '{"time": %r, ' + parts + "}"
 
     def schema(self) -> str:
         """JSON schema of the messages; `unit`, `description` and `origin` are ours."""
         properties: dict[str, Any] = {"time": {"type": "number", "unit": "s", "description": "time"}}
-        for name, one in self._signals.items():
-            meant = {"unit": one.unit, "description": one.meaning, "origin": one.origin}
-            inner = _number_schema(one.values.dtype, one.values.shape[2:])
-            if one.values.ndim > 1:
-                inner = {"type": "object", "properties": dict.fromkeys(_columns(one), inner)}
-            properties[name] = inner | {key: text for key, text in meant.items() if text}
+        for name, series in self._signals.items():
+            annotations = {"unit": series.unit, "description": series.meaning, "origin": series.origin}
+            inner = _number_schema(series.values.dtype, series.values.shape[2:])
+            if series.values.ndim > 1:
+                inner = {"type": "object", "properties": dict.fromkeys(_columns(series), inner)}
+            properties[name] = inner | {key: text for key, text in annotations.items() if text}
         return json.dumps({"title": self.schema_name, "type": "object", "properties": properties})
 
     def of_sample(self, time: float, values: list[Any]) -> bytes:
@@ -79,19 +80,19 @@ class MessageForm:
     def of_samples(self) -> Iterator[tuple[float, bytes]]:
         """Time and message of each sample of the signals."""
         first = next(iter(self._signals.values()))
-        matrix = np.concatenate([one.flat().astype(float) for one in self._signals.values()], axis=1)
+        matrix = np.concatenate([series.flat().astype(float) for series in self._signals.values()], axis=1)
         finite = np.atleast_1d(np.isfinite(matrix).all(axis=1))
-        for good, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
-            yield time, (self._template % (time, *row) if good else self._with_words(time, row)).encode()
+        for is_finite, time, row in zip(finite, first.time.tolist(), matrix.tolist(), strict=True):
+            yield time, (self._template % (time, *row) if is_finite else self._with_words(time, row)).encode()
 
     def _with_words(self, time: float, values: list[float]) -> str:
         """The message of a sample that has numbers that are not finite."""
         words = {np.inf: '"Infinity"', -np.inf: '"-Infinity"'}
-        marked = self._template.replace("%d", "%r")  # integers are always finite, but share the row
-        shown = [
+        template = self._template.replace("%d", "%r")  # integers are always finite, but share the row
+        printed = [
             _Word("null") if value != value else _Word(words[value]) if value in words else value for value in values
         ]
-        return marked % (time, *shown)
+        return template % (time, *printed)
 
 
 class _Word:
@@ -146,24 +147,29 @@ def signals_of(schema: Mapping[str, Any], messages: list[Mapping[str, Any]]) -> 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: the messages have another form.
     """
-    time, found = np.array([number(one["time"]) for one in messages]), {}
-    for name, described in schema["properties"].items():
+    time = np.array([number(message["time"]) for message in messages])
+    signals = {}
+    for name, signal_schema in schema["properties"].items():
         if name == "time":
             continue
-        columns = tuple(described.get("properties", ()))
-        rows = [[one[name][column] for column in columns] if columns else one[name] for one in messages]
-        values = _array(rows, _type(described))
-        texts = (described.get("unit", "1"), described.get("description", ""), described.get("origin", ""))
-        found[name] = Series(time, values, columns, *map(str, texts))
-    return found
+        columns = tuple(signal_schema.get("properties", ()))
+        rows = [[message[name][column] for column in columns] if columns else message[name] for message in messages]
+        values = _array(rows, _type(signal_schema))
+        texts = (signal_schema.get("unit", "1"), signal_schema.get("description", ""), signal_schema.get("origin", ""))
+        signals[name] = Series(time, values, columns, *map(str, texts))
+    return signals
 
 
-def _type(described: Mapping[str, Any]) -> type:
+def _type(number_schema: Mapping[str, Any]) -> type:
     """Type of the numbers that a schema describes, within its objects and arrays."""
-    while described.get("type") in ("object", "array"):
-        inner = described.get("properties", {}).values() if described["type"] == "object" else [described["items"]]
-        described = next(iter(inner), {})
-    return int if described.get("type") == "integer" else float
+    while number_schema.get("type") in ("object", "array"):
+        inner = (
+            number_schema.get("properties", {}).values()
+            if number_schema["type"] == "object"
+            else [number_schema["items"]]
+        )
+        number_schema = next(iter(inner), {})
+    return int if number_schema.get("type") == "integer" else float
 
 
 def _array(rows: list[Any], kind: type) -> np.ndarray:
@@ -175,7 +181,7 @@ def _array(rows: list[Any], kind: type) -> np.ndarray:
 
 
 def _numbers(value: Any) -> Any:
-    return [_numbers(one) for one in value] if isinstance(value, list) else number(value)
+    return [_numbers(entry) for entry in value] if isinstance(value, list) else number(value)
 
 
 def number(value: Any) -> float:

@@ -41,15 +41,15 @@ def inputs_of(log: LogSignals, names: tuple[str, ...] = _INPUTS, thruster_matrix
     Raises:
         BadInput: it has none of them, or not enough samples; or the motors are not the thrusters of the vehicle.
     """
-    found = next((log[name] for name in names if name in log), None)
-    if found is None:
+    inputs = next((log[name] for name in names if name in log), None)
+    if inputs is None:
         raise missing(log, *names, hint=_input_hint(log))
-    good = np.isfinite(found.values).all(axis=1)
-    if good.sum() < 2:
-        raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(good.sum())}")
-    found = found._replace(time=found.time[good], values=found.values[good])
-    frame = frame_of_columns(found.columns)
-    return found if not frame else _of_thrusters(found, frame, thruster_matrix)
+    is_finite = np.isfinite(inputs.values).all(axis=1)
+    if is_finite.sum() < 2:
+        raise BadInput("log", "have two or more samples of the input", f"{log.source} with {int(is_finite.sum())}")
+    inputs = inputs._replace(time=inputs.time[is_finite], values=inputs.values[is_finite])
+    frame = frame_of_columns(inputs.columns)
+    return inputs if not frame else _of_thrusters(inputs, frame, thruster_matrix)
 
 
 def _of_thrusters(inputs: Series, frame: str, thruster_matrix: ArrayLike | None) -> Series:
@@ -69,8 +69,8 @@ def _input_hint(log: LogSignals) -> str:
         return f"{example}, with the frame of the vehicle (FRAME_CONFIG); `supply` is in V"
     usual = DEFAULTS[log.format].signals.get(commands) if log.format in DEFAULTS else None
     columns, topic = (usual[0].columns, usual[0].topic) if usual else (("pwm1", "pwm2"), "TOPIC")
-    how = f"unit: {_COMMANDS[commands]}, supply: 16"
-    example = mapping_hint(log, "input", f"{columns[0]}, {columns[1]}, ...", how, topic)
+    unit_and_supply = f"unit: {_COMMANDS[commands]}, supply: 16"
+    example = mapping_hint(log, "input", f"{columns[0]}, {columns[1]}, ...", unit_and_supply, topic)
     return f"{example}, one column per thruster; `supply` is in V"
 
 
@@ -83,25 +83,26 @@ def motion_of(log: LogSignals) -> LoggedMotion:
         BadInput: position, attitude or a velocity is missing, or they do not overlap.
     """
     position = log["measured_position" if "position" not in log and "measured_position" in log else "position"]
-    whole = position.values.shape[1:] == (6,)
-    attitude = position._replace(values=position.values[:, 3:]) if whole else log["attitude"]
+    is_pose = position.values.shape[1:] == (6,)
+    attitude = position._replace(values=position.values[:, 3:]) if is_pose else log["attitude"]
     turning = attitude._replace(values=without_jumps(attitude.values))
     velocity, rates = _velocities(log)
-    used = [position, turning, velocity, rates]
-    start, end = (pick(one.time[place] for one in used if len(one.time)) for pick, place in ((max, 0), (min, -1)))
-    kept = (position.time >= start) & (position.time <= end) & np.isfinite(position.values).all(axis=1)
-    time = position.time[kept]
+    signals = [position, turning, velocity, rates]
+    start = max(series.time[0] for series in signals if len(series.time))
+    end = min(series.time[-1] for series in signals if len(series.time))
+    in_common = (position.time >= start) & (position.time <= end) & np.isfinite(position.values).all(axis=1)
+    time = position.time[in_common]
     if len(time) < 2:
         raise BadInput("log", "have position, attitude and velocities of the same times", log.source)
     angles = at_times(time, turning)
-    place = position.values[kept, :3]
+    north_east_down = position.values[in_common, :3]
     linear = at_times(time, velocity)
     if velocity.columns[:3] == ("north", "east", "down"):  # world axes
         linear = np.einsum("kij,ki->kj", frames.rotations(angles), linear[:, :3])
-    turned = at_times(time, rates)
+    angular = at_times(time, rates)
     if rates.values.shape[1] == 6:  # rates of the Euler angles
-        turned = frames.angular_velocity_of_rates(angles, turned[:, 3:])
-    return LoggedMotion(time, np.hstack([place, angles]), np.hstack([linear, turned]))
+        angular = frames.angular_velocity_of_rates(angles, angular[:, 3:])
+    return LoggedMotion(time, np.hstack([north_east_down, angles]), np.hstack([linear, angular]))
 
 
 def _velocities(log: LogSignals) -> tuple[Series, Series]:
@@ -115,16 +116,16 @@ def _velocities(log: LogSignals) -> tuple[Series, Series]:
 
 def without_jumps(angles: np.ndarray) -> np.ndarray:
     """Angles without jumps of a turn; rows that are not finite stay."""
-    found = angles.copy()
-    good = np.isfinite(angles).all(axis=1)
-    found[good] = np.unwrap(angles[good], axis=0)
-    return found
+    unwrapped = angles.copy()
+    is_finite = np.isfinite(angles).all(axis=1)
+    unwrapped[is_finite] = np.unwrap(angles[is_finite], axis=0)
+    return unwrapped
 
 
 def at_times(time: np.ndarray, series: Series) -> np.ndarray:
     """Values at other times, linear between samples that are finite; the samples themselves at their times."""
-    good = np.isfinite(series.values).all(axis=1)
-    known, values = series.time[good], series.values[good]
-    if not len(known):
+    is_finite = np.isfinite(series.values).all(axis=1)
+    sample_times, values = series.time[is_finite], series.values[is_finite]
+    if not len(sample_times):
         return np.full((len(time), series.values.shape[1]), np.nan)
-    return np.stack([np.interp(time, known, column) for column in values.T], axis=1)
+    return np.stack([np.interp(time, sample_times, column) for column in values.T], axis=1)

@@ -45,21 +45,21 @@ def read_px4(path: Path) -> Recording:
     stream = _Stream(path.read_bytes())
     try:
         with quiet(notes):
-            found = _parsed(stream)
+            log = _parsed(stream)
         tables = {}
-        for data in found.data_list:
+        for data in log.data_list:
             topic = data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
             tables[topic] = _table(data)
     except Exception as error:  # whatever bytes may cause
-        place = 0 if stream.closed else stream.tell()
-        got = f"{path.name}, near byte {place}: {str(error) or type(error).__name__}"
+        offset = 0 if stream.closed else stream.tell()
+        got = f"{path.name}, near byte {offset}: {str(error) or type(error).__name__}"
         raise BadInput("log", "be an undamaged .ulg file of PX4", got) from None
     if not tables:
         raise BadInput("log", "have topics", f"{path.name}, which has none")
-    if found.file_corruption:
+    if log.file_corruption:
         notes.append("parts of the file are damaged or missing, and left out")
-    if found.dropouts:
-        notes.append(f"{len(found.dropouts)} dropouts while it was recorded")
+    if log.dropouts:
+        notes.append(f"{len(log.dropouts)} dropouts while it was recorded")
     return Recording(tables, path.name, "PX4", tuple(notes))
 
 
@@ -91,7 +91,7 @@ def _fields(name: str, formats: Any, sizes: dict[str, int]) -> int:
     if name not in formats:
         return 1
     if name not in sizes:
-        sizes[name] = sum(max(1, several) * _fields(kind, formats, sizes) for kind, several, _ in formats[name].fields)
+        sizes[name] = sum(max(1, count) * _fields(kind, formats, sizes) for kind, count, _ in formats[name].fields)
     return sizes[name]
 
 

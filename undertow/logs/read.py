@@ -39,66 +39,68 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
     if not path.exists():
         raise BadInput("log", "be an existing file", str(path))
     with _readable(path):
-        found = _reader(path, _names(mapping))(path)
-    if isinstance(found, Log):
+        recording = _reader(path, _names(mapping))(path)
+    if isinstance(recording, Log):
         if mapping is not None:
-            got = f"given for {found.source}, which holds them by name"
+            got = f"given for {recording.source}, which holds them by name"
             raise BadInput("mapping", "be left out for a log whose signals are known", got)
-        return found
-    return _mapped(found, mapping, location)
+        return recording
+    return _mapped(recording, mapping, location)
 
 
 def _names(mapping: LogMapping | None) -> set[str]:
     """Topics and types that are looked for in a bag or a telemetry log; "" where the only topic is meant."""
-    given = () if mapping is None else mapping.signals.values()
+    entries_of_mapping = () if mapping is None else mapping.signals.values()
     usual = (ROS2.signals.values(), MAVLINK.signals.values())
-    return {entry.topic for entries in (*given, *usual[0], *usual[1]) for entry in entries if not entry.motors}
+    return {
+        entry.topic for entries in (*entries_of_mapping, *usual[0], *usual[1]) for entry in entries if not entry.motors
+    }
 
 
-def _mapped(found: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
-    usual, guesses = usual_mapping(found)
-    usual, frames = suited(found, usual)
-    found = found._replace(notes=(*found.notes, *guesses, *frames))
+def _mapped(recording: Recording, mapping: LogMapping | None, location: Callable[[str], str]) -> Log:
+    usual, guesses = usual_mapping(recording)
+    usual, frames = suited(recording, usual)
+    recording = recording._replace(notes=(*recording.notes, *guesses, *frames))
     if mapping is None:
         if not usual.signals:
-            hint = f"Give a mapping. It has {_listed(found)}"
-            got = f"{found.source}, a {found.format} file whose columns may mean anything"
-            if found.format in DEFAULTS:
-                got = f"{found.source}, which has none of the messages that are known"
+            hint = f"Give a mapping. It has {_listed(recording)}"
+            got = f"{recording.source}, a {recording.format} file whose columns may mean anything"
+            if recording.format in DEFAULTS:
+                got = f"{recording.source}, which has none of the messages that are known"
             raise BadInput("mapping", "be given", got, hint=hint)
-        return log_of(found, usual)
-    given = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
+        return log_of(recording, usual)
+    signals = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
     with within("mapping", location):
-        _check_time(found, mapping)
-        return log_of(found, mapping._replace(signals=given | dict(mapping.signals)))
+        _check_time(recording, mapping)
+        return log_of(recording, mapping._replace(signals=signals | dict(mapping.signals)))
 
 
-def _check_time(found: Recording, mapping: LogMapping) -> None:
+def _check_time(recording: Recording, mapping: LogMapping) -> None:
     """Check that the mapping names the time of a table, and of nothing whose messages have times of their own."""
     column = mapping.time[0]
-    if found.format == "CSV" and not column:
+    if recording.format == "CSV" and not column:
         raise BadInput("time", "be given: the column of the time, and its unit", hint="`time: {column: t, unit: s}`")
-    if found.format != "CSV" and column:
-        raise BadInput("time", f"be left out: the messages of {found.source} have times", column)
+    if recording.format != "CSV" and column:
+        raise BadInput("time", f"be left out: the messages of {recording.source} have times", column)
 
 
 def _replaced(name: str, mapping: LogMapping) -> bool:
     """Whether a mapping gives a signal itself; attitude and quaternion are the same one."""
-    same = ("attitude", "quaternion")
-    return any(one in mapping.signals for one in (same if name in same else (name,)))
+    attitudes = ("attitude", "quaternion")
+    return any(signal in mapping.signals for signal in (attitudes if name in attitudes else (name,)))
 
 
-def _listed(found: Recording) -> str:
-    names = [f"{topic or 'columns'} ({_columns(table)})" for topic, table in found.tables.items()]
-    names += [f"{topic}, which is left out: {reason}" for topic, reason in found.left_out.items()]
+def _listed(recording: Recording) -> str:
+    names = [f"{topic or 'columns'} ({_columns(table)})" for topic, table in recording.tables.items()]
+    names += [f"{topic}, which is left out: {reason}" for topic, reason in recording.left_out.items()]
     return "; ".join(names[:_SHOWN_TOPICS]) + ("; ..." if len(names) > _SHOWN_TOPICS else "")
 
 
 def _columns(table: TopicMessages) -> str:
     """Names of the columns of a table, or of the first of them."""
     names = list(itertools.islice(table.fields, _SHOWN_COLUMNS))
-    more = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []
-    return ", ".join([*names, *more]) or "no numbers"
+    ellipsis = ["..."] if len(table.fields) > _SHOWN_COLUMNS else []
+    return ", ".join([*names, *ellipsis]) or "no numbers"
 
 
 def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Recording]:
@@ -110,12 +112,12 @@ def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Record
     suffix = path.suffix.lower()
     if suffix == ".mcap":
         return functools.partial(read_ros2_bag, names=names) if has_ros_messages(path) else read_mcap
-    known = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
-    known |= {".db3": functools.partial(read_ros2_bag, names=names)}
-    known |= {".tlog": functools.partial(read_mavlink, names=names)}
-    if suffix not in known:
-        raise BadInput("log", f"be one of .mcap, {', '.join(known)}, or the folder of a bag", path.name)
-    return known[suffix]
+    readers = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
+    readers |= {".db3": functools.partial(read_ros2_bag, names=names)}
+    readers |= {".tlog": functools.partial(read_mavlink, names=names)}
+    if suffix not in readers:
+        raise BadInput("log", f"be one of .mcap, {', '.join(readers)}, or the folder of a bag", path.name)
+    return readers[suffix]
 
 
 @contextlib.contextmanager

@@ -48,8 +48,8 @@ class Recording(NamedTuple):
         """The table of a topic, or the first whose messages are of a type; None without one."""
         if topic in self.tables:
             return topic, self.tables[topic]
-        same = [(name, table) for name, table in self.tables.items() if table.kind == topic]
-        return same[0] if same else None
+        of_this_type = [(name, table) for name, table in self.tables.items() if table.kind == topic]
+        return of_this_type[0] if of_this_type else None
 
     def table(self, topic: str) -> tuple[str, TopicMessages]:
         """As `find`; the only table where no topic is named.
@@ -59,12 +59,12 @@ class Recording(NamedTuple):
         """
         if not topic and len(self.tables) == 1:
             return next(iter(self.tables.items()))
-        found = self.find(topic)
-        if found is None and topic in self.left_out:
+        topic_and_table = self.find(topic)
+        if topic_and_table is None and topic in self.left_out:
             raise BadInput(
                 "topic", "name messages that can be read", f"{topic} of {self.source}: {self.left_out[topic]}"
             )
-        if found is None:
+        if topic_and_table is None:
             got = f"not in {self.source}"
             raise BadInput(
                 "topic",
@@ -72,7 +72,7 @@ class Recording(NamedTuple):
                 f"{topic or 'left out'}, {got}",
                 hint=did_you_mean(topic, self.tables) if self.tables else "",
             )
-        return found
+        return topic_and_table
 
 
 class _Rows(Mapping[str, np.ndarray]):
@@ -96,10 +96,10 @@ class _Rows(Mapping[str, np.ndarray]):
 
 def cleaned(table: TopicMessages) -> tuple[TopicMessages, int]:
     """The table without samples of the same time as the one before, and how many these were."""
-    again = np.concatenate([[False], np.diff(table.time) == 0])
-    if not again.any():
+    repeated = np.concatenate([[False], np.diff(table.time) == 0])
+    if not repeated.any():
         return table, 0
-    return rows_of(table, ~again), int(again.sum())
+    return rows_of(table, ~repeated), int(repeated.sum())
 
 
 def rows_of(table: TopicMessages, rows: np.ndarray) -> TopicMessages:

@@ -83,7 +83,8 @@ class _Topics:
     def __init__(self, names: Collection[str]):
         self.fields: dict[str, MessageFields] = {}
         self.place = "at its beginning"
-        self._names, self._decoder = names, Decoder()
+        self._names = names
+        self._decoder = Decoder()
         self._errors: dict[str, list[str]] = {}  # of each topic and type
 
     def requested(self, topic: str, kind: str) -> bool:
@@ -120,8 +121,8 @@ class _Topics:
     def start(self) -> int:
         """Time of the first message of the requested topics, or of any if none is, ns."""
         stamps = {topic: min(fields.stamps) for topic, fields in self.fields.items()}
-        used = [stamp for topic, stamp in stamps.items() if self.requested(topic, self.fields[topic].kind)]
-        return min(used or stamps.values())
+        requested_stamps = [stamp for topic, stamp in stamps.items() if self.requested(topic, self.fields[topic].kind)]
+        return min(requested_stamps or stamps.values())
 
 
 def _files(path: Path) -> Iterator[Path]:
@@ -169,14 +170,17 @@ def _of_sqlite(file: Path, topics: _Topics, notes: list[str]) -> Iterator[_Messa
     from rosbags.rosbag2 import Reader
 
     forms = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
-    with whole_files(file, notes) as (whole,), Reader(whole) as reader:
-        connections = [one for one in reader.connections if getattr(one.ext, "serialization_format", "") == "cdr"]
-        requested = [one for one in connections if topics.requested(one.topic, one.msgtype)]
-        for chosen in (requested, *([one] for one in connections if one not in requested)):
-            for connection, recorded, data in reader.messages(chosen) if chosen else ():
+    with whole_files(file, notes) as (whole_file,), Reader(whole_file) as reader:
+        connections = [
+            candidate for candidate in reader.connections if getattr(candidate.ext, "serialization_format", "") == "cdr"
+        ]
+        requested = [candidate for candidate in connections if topics.requested(candidate.topic, candidate.msgtype)]
+        alone = [[candidate] for candidate in connections if candidate not in requested]
+        for connections_to_read in (requested, *alone):
+            for connection, recorded, data in reader.messages(connections_to_read) if connections_to_read else ():
                 definition = Definition(forms.get(connection.msgdef.format, ""), connection.msgdef.data)
                 yield _Message(connection.topic, connection.msgtype, definition, recorded, unpacked(bytes(data)))
-                if chosen is not requested:
+                if connections_to_read is not requested:
                     break
 
 

@@ -46,8 +46,8 @@ def _columns(run: "xr.Dataset", name: str, variable: "xr.DataArray") -> tuple[st
         return ()
     dimension = variable.dims[1]
     if dimension == "axis":
-        own = run["axis"].attrs.get("controller_axes", "") if group_of(name) == "controller" else ""
-        return tuple(own.split(", ")) if own else tuple(map(str, run["axis"].values))
+        law_axes = run["axis"].attrs.get("controller_axes", "") if group_of(name) == "controller" else ""
+        return tuple(law_axes.split(", ")) if law_axes else tuple(map(str, run["axis"].values))
     if dimension == "actuator":
         return thruster_columns(variable.shape[1])
     return tuple(str(i + 1) for i in range(variable.shape[1]))

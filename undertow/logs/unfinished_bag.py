@@ -80,10 +80,10 @@ def _mended(path: Path, folder: Path) -> Path:
 
 def _end_of_records(data: bytes) -> int:
     """Where the last whole record of the data section of an MCAP file ends."""
-    at = len(_MAGIC)
-    while at + _HEAD.size <= len(data):
-        kind, size = _HEAD.unpack_from(data, at)
-        if not 0 < kind <= _LARGEST_KIND or kind == _DATA_END or at + _HEAD.size + size > len(data):
+    offset = len(_MAGIC)
+    while offset + _HEAD.size <= len(data):
+        kind, size = _HEAD.unpack_from(data, offset)
+        if not 0 < kind <= _LARGEST_KIND or kind == _DATA_END or offset + _HEAD.size + size > len(data):
             break
-        at += _HEAD.size + size
-    return at
+        offset += _HEAD.size + size
+    return offset

@@ -54,9 +54,9 @@ def factor(unit: str, ours: str, signal: str, others: Iterable[str] = ()) -> flo
     Raises:
         BadInput: the unit is unknown, or measures something else.
     """
-    fitting = [name for name, one in UNITS.items() if one.ours == ours]
-    if unit not in fitting:
-        raise BadInput("unit", f"be one of {', '.join((*fitting, *others))} for `{signal}`", unit)
+    unit_names = [name for name, known_unit in UNITS.items() if known_unit.ours == ours]
+    if unit not in unit_names:
+        raise BadInput("unit", f"be one of {', '.join((*unit_names, *others))} for `{signal}`", unit)
     return UNITS[unit].factor
 
 

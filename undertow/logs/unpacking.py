@@ -19,12 +19,13 @@ def unpacked(data: bytes) -> bytes:
         return data
     import zstandard
 
-    reader, whole = zstandard.ZstdDecompressor().stream_reader(data), bytearray()
+    reader = zstandard.ZstdDecompressor().stream_reader(data)
+    content = bytearray()
     while piece := reader.read(_PIECE):
-        whole += piece
-        if len(whole) > _LARGEST:
+        content += piece
+        if len(content) > _LARGEST:
             raise ValueError(f"a message of more than the {_LARGEST} bytes that are read")
-    return bytes(whole)
+    return bytes(content)
 
 
 def unpacked_file(file: Path, folder: Path) -> Path:
@@ -36,7 +37,8 @@ def unpacked_file(file: Path, folder: Path) -> Path:
     import zstandard
 
     most = most_unpacked(file.stat().st_size)
-    target, size = folder / file.stem, 0
+    target = folder / file.stem
+    size = 0
     with file.open("rb") as packed, target.open("wb") as stream:
         reader = zstandard.ZstdDecompressor().stream_reader(packed)
         while piece := reader.read(_PIECE):

@@ -51,7 +51,8 @@ def _timed(table: TopicMessages, clock: np.ndarray | None, begins: np.ndarray, z
 
 def _starts(received: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """Times of the ground station from which on the clock counts anew; the first is before all others."""
-    begins, highest = [-np.inf], -np.inf
+    begins = [-np.inf]
+    highest = -np.inf
     for time, reading in zip(received.tolist(), clock.tolist(), strict=True):
         if reading < highest - _RESTART:
             begins.append(time)

@@ -71,7 +71,8 @@ def predict(
         limited: whether the inputs are commands, which the vehicle limits, rather than what was applied.
         factors: on the input of each thruster, a row per variant.
     """
-    plant, loop = vehicle_of(built), built.scenario.loop
+    plant = vehicle_of(built)
+    loop = built.scenario.loop
     before = round(RUN_IN / loop.dt)
     times = starts[:, None] + loop.dt * np.arange(-before, steps)
     with on_processor():
@@ -133,9 +134,9 @@ def time_together(motion: LoggedMotion, inputs: Series) -> float:
 
 def held(inputs: Series, times: np.ndarray) -> np.ndarray:
     """Inputs at times: those of the last sample until then."""
-    early = _EARLY * np.median(np.diff(inputs.time))
-    places = np.searchsorted(inputs.time, times + early, side="right") - 1
-    return inputs.values[places.clip(0, len(inputs.time) - 1)]
+    tolerance = _EARLY * np.median(np.diff(inputs.time))
+    indices = np.searchsorted(inputs.time, times + tolerance, side="right") - 1
+    return inputs.values[indices.clip(0, len(inputs.time) - 1)]
 
 
 def logged(motion: LoggedMotion, times: np.ndarray) -> np.ndarray:
@@ -160,26 +161,27 @@ def _predicted(
 ):
     """Outputs and body velocity after every stride of each window, with each row of factors on the inputs."""
     before, stride, method, substeps = settings
-    plant, integrate = realization.loop.plant, METHODS[method]
+    plant = realization.loop.plant
+    integrate = METHODS[method]
 
-    def step(x: VehicleState, given: tuple[Any, Inputs]):
-        t, u = given
+    def step(x: VehicleState, time_and_input: tuple[Any, Inputs]):
+        t, u = time_and_input
         u = plant.admissible(x, u) if limited else u
         h = dt / substeps
         for i in range(substeps):
             x = integrate(lambda t, x: realization.motion(jnp.asarray(t), x, u), t + i * h, x, h)
         return x, None
 
-    def several(x: VehicleState, given: tuple[Any, Inputs]):
-        x, _ = jax.lax.scan(step, x, given)
-        y = plant.output(given[0][-1] + dt, x)
+    def stride_of_steps(x: VehicleState, times_and_inputs: tuple[Any, Inputs]):
+        x, _ = jax.lax.scan(step, x, times_and_inputs)
+        y = plant.output(times_and_inputs[0][-1] + dt, x)
         return x, jnp.concatenate([y.position, body_of(y).nu])
 
-    def window(given: _Windows, factor: Inputs):
-        inputs = factor[None] * given.inputs
-        ran_in, _ = jax.lax.scan(step, given.before, (given.time[:before], inputs[:before]))
-        start = given.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
-        after = given.time[before:].reshape(-1, stride), inputs[before:].reshape(-1, stride, inputs.shape[1])
-        return jax.lax.scan(several, start, after)[1]
+    def window(starts: _Windows, factor: Inputs):
+        inputs = factor[None] * starts.inputs
+        ran_in, _ = jax.lax.scan(step, starts.before, (starts.time[:before], inputs[:before]))
+        start = starts.start._replace(thrusters=ran_in.thrusters, power=ran_in.power)
+        after = starts.time[before:].reshape(-1, stride), inputs[before:].reshape(-1, stride, inputs.shape[1])
+        return jax.lax.scan(stride_of_steps, start, after)[1]
 
     return jax.vmap(jax.vmap(window, (0, None)), (None, 0))(windows, factors)

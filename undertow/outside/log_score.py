@@ -81,7 +81,8 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
         BadInput: the plant is no vehicle, the log is of another one or too short, horizons are too short, or the model
             diverges.
     """
-    plant, loop = vehicle_of(built), built.scenario.loop
+    plant = vehicle_of(built)
+    loop = built.scenario.loop
     checks.positive("horizons", horizons, "s")
     checks.positive("every", every, "s")
     motion = motion_of(log)
@@ -105,7 +106,8 @@ def score(built: Built, log: Log, horizons: Sequence[float] = HORIZONS, every: f
     limited = "input" not in log
     as_logged = np.ones((1, plant.inputs()))
     prediction = predict(built, motion, inputs, starts, steps, stride, limited, as_logged)
-    predicted, after = prediction.motion[0], prediction.after
+    predicted = prediction.motion[0]
+    after = prediction.after
     _check_finite(predicted, after, log)
     errors = np.asarray(predicted, dtype=float) - logged(motion, starts[:, None] + after)
     errors[..., 3:6] -= 2 * np.pi * np.round(errors[..., 3:6] / (2 * np.pi))
@@ -121,8 +123,8 @@ def _check_finite(predicted: np.ndarray, after: np.ndarray, log: Log) -> None:
     Raises:
         BadInput: it does not.
     """
-    good = (np.abs(predicted) < _ENDLESS).all(axis=(0, 2))  # false for NaN
-    if not good.all():
-        got = f"{log.source}, with which it diverges within {after[np.argmin(good)]:.4g} s of a start"
+    is_bounded = (np.abs(predicted) < _ENDLESS).all(axis=(0, 2))  # false for NaN
+    if not is_bounded.all():
+        got = f"{log.source}, with which it diverges within {after[np.argmin(is_bounded)]:.4g} s of a start"
         hint = "Check the units of the inputs, and their order: pulses that are declared as volts are 1500 V"
         raise BadInput("log", "have motions and inputs with which the model stays finite", got, hint=hint)

@@ -32,7 +32,8 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
         inputs: of the thrusters.
         limited: as in `predict`.
     """
-    dt, number = built.scenario.loop.dt, inputs.values.shape[1]
+    dt = built.scenario.loop.dt
+    number = inputs.values.shape[1]
     steps = max(1, round(_HORIZON / dt))
     starts = starts_of(motion, inputs, dt * steps, _HORIZON)
     if 6 * len(starts) < 4 * number:  # too few numbers to tell sets of thrusters apart
@@ -46,12 +47,14 @@ def warnings_of_signs(built: Built, motion: LoggedMotion, inputs: Series, limite
         return ((predicted - truth) @ root.T).reshape(len(rows), -1)
 
     alone = np.eye(number)
-    found = errors(np.vstack([np.ones(number), np.zeros(number), alone, -alone]))
-    if not np.isfinite(found).all():
+    residuals = errors(np.vstack([np.ones(number), np.zeros(number), alone, -alone]))
+    if not np.isfinite(residuals).all():
         return ()
-    mapped, without = (found[:2] ** 2).sum(axis=1)
-    as_mapped, turned = found[2:].reshape(2, number, -1) - found[1]
-    to_turn = _best_set(found[1] + as_mapped.sum(axis=0), turned - as_mapped)
+    mapped, without = (residuals[:2] ** 2).sum(axis=1)
+    # Effects of single thrusters, as mapped and turned. Over so short a time they nearly add up: the errors of all sets
+    # follow from them, and only the best ones are predicted again.
+    as_mapped, turned = residuals[2:].reshape(2, number, -1) - residuals[1]
+    to_turn = _best_set(residuals[1] + as_mapped.sum(axis=0), turned - as_mapped)
     if to_turn.any():
         signs = np.where(to_turn, -1.0, 1.0)
         rows = np.vstack([signs, -np.ones(number), signs * (1.0 - 2.0 * alone), np.broadcast_to(signs, alone.shape)])
@@ -81,8 +84,8 @@ def _best_set(error: np.ndarray, changes: np.ndarray) -> np.ndarray:
         sets = np.array(list(itertools.product((0.0, 1.0), repeat=number)))
     energy = error @ error + 2 * sets @ (changes @ error) + np.einsum("ki,ij,kj->k", sets, changes @ changes.T, sets)
     enough = energy.min() + _SPARE * (error @ error - energy.min())
-    fitting = np.flatnonzero(energy <= enough)
-    fewest = fitting[np.lexsort((energy[fitting], sets[fitting].sum(axis=1)))[0]]
+    good_sets = np.flatnonzero(energy <= enough)
+    fewest = good_sets[np.lexsort((energy[good_sets], sets[good_sets].sum(axis=1)))[0]]
     return sets[fewest] > 0
 
 

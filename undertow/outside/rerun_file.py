@@ -80,13 +80,13 @@ def _write_view(rerun: Any, recording: Any, log: Log, size: Any) -> None:
     pose = pose_of(log.signals)
     if pose is None or not len(pose[0]):
         return
-    good = np.isfinite(pose[1]).all(axis=1)
-    time, outputs = pose[0][good], pose[1][good]
+    is_finite = np.isfinite(pose[1]).all(axis=1)
+    time, outputs = pose[0][is_finite], pose[1][is_finite]
     # North, east, down: x forward, y to the right, z down.
     recording.log("world", rerun.ViewCoordinates.FRD, static=True)
     recording.log("world/path", rerun.LineStrips3D([outputs[:, :3]], colors=[_PATH]), static=True)
     box = rerun.Boxes3D(sizes=[list(size if size is not None else _SIZE)], colors=[_VEHICLE])
     recording.log("world/vehicle", box, static=True)
-    turned = np.roll(quaternions(outputs[:, 3:]), -1, axis=1)  # x, y, z, w
-    moved = rerun.Transform3D.columns(translation=outputs[:, :3], quaternion=turned)
-    rerun.send_columns("world/vehicle", [rerun.TimeColumn("time", duration=time)], moved, recording=recording)
+    attitudes = np.roll(quaternions(outputs[:, 3:]), -1, axis=1)  # x, y, z, w
+    transforms = rerun.Transform3D.columns(translation=outputs[:, :3], quaternion=attitudes)
+    rerun.send_columns("world/vehicle", [rerun.TimeColumn("time", duration=time)], transforms, recording=recording)

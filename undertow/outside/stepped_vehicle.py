@@ -74,8 +74,8 @@ class SteppedVehicle:
         with runtime.on_processor(), runtime.in_precision(self.vehicle.precision):
             zero, none = jnp.zeros(()), jnp.zeros(self.plant.inputs())
 
-            def look(of: Realization, _, given: tuple[Any, VehicleState, Inputs]):
-                return (), _state_of(of, *given)
+            def look(part: Realization, _, arguments: tuple[Any, VehicleState, Inputs]):
+                return (), _state_of(part, *arguments)
 
             realization, x = self.vehicle.realization, self.vehicle.state
             self._look = step_of(look, realization, (), (zero, x, none))
@@ -114,8 +114,8 @@ class SteppedVehicle:
     def state(self) -> VehicleOutputs:
         """Motion and electrical side now, with the last input still applied."""
         applied = self.vehicle.output.applied
-        still = np.zeros(self.plant.inputs())
-        put(self._look.inputs, (self.time, self.vehicle.state, still if applied is None else applied))
+        zero_input = np.zeros(self.plant.inputs())
+        put(self._look.inputs, (self.time, self.vehicle.state, zero_input if applied is None else applied))
         self._look()
         return jax.tree.map(np.array, self._look.outputs)
 
@@ -126,23 +126,24 @@ def _under_surface(loop: ClosedLoop, depth: float | None, otherwise: float | Non
     if depth is not None and stated and stated[0] != depth:
         hint = "Leave one of them out: the surface of waves is `depth` of the waves above the world's origin"
         raise BadInput("depth", f"be that of the scenario's disturbance, {stated[0]:g} m", f"{depth:g} m", hint=hint)
-    chosen = otherwise if depth is None else depth
-    if stated or chosen is None:
+    depth_of_surface = otherwise if depth is None else depth
+    if stated or depth_of_surface is None:
         return loop
-    return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(chosen)))
+    return dataclasses.replace(loop, disturbance=UnderSurface(loop.disturbance, surface(depth_of_surface)))
 
 
-def _state_of(of: Realization, t, x: VehicleState, u: Inputs) -> VehicleOutputs:
-    plant = of.loop.plant
+def _state_of(realization: Realization, t, x: VehicleState, u: Inputs) -> VehicleOutputs:
+    plant = realization.loop.plant
     assert isinstance(plant, HybridVehicle)
     pose = plant.pose(x)
-    acceleration = plant.acceleration(t, x, u, of.load(t, x))[:3]
+    acceleration = plant.acceleration(t, x, u, realization.load(t, x))[:3]
     force = matvec(pose.rotation.T, acceleration - as_array((0.0, 0.0, STANDARD_GRAVITY)))
-    report, battery = plant.thruster.report(x.thrusters), plant.power.battery
+    report = plant.thruster.report(x.thrusters)
+    battery = plant.power.battery
     electrical = ()
     if battery is not None:
-        taken = plant.thruster.electrical_power(x.thrusters, u).sum()
+        power = plant.thruster.electrical_power(x.thrusters, u).sum()
         charge = x.power.charge
-        electrical = jnp.stack([battery.bus_voltage(charge, taken), battery.current(charge, taken)])
+        electrical = jnp.stack([battery.bus_voltage(charge, power), battery.current(charge, power)])
     propellers = () if report is None else report.speed
     return VehicleOutputs(x.position, x.attitude, pose.velocity, x.nu, force, propellers, electrical)

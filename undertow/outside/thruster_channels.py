@@ -31,16 +31,16 @@ class Channels(NamedTuple):
         Raises:
             BadInput: there are fewer channels than the thrusters need.
         """
-        given = np.asarray(pwm, dtype=float)
-        if self.numbers.max() > len(given):
+        pulses = np.asarray(pwm, dtype=float)
+        if self.numbers.max() > len(pulses):
             hint = "With SERVO_32_ENABLE = 1 ArduPilot sends 32"
-            raise BadInput("channels", f"be of the {len(given)} that arrive", str(self.numbers.max()), hint=hint)
-        return neutral + self.signs * (given[self.numbers - 1] - neutral)
+            raise BadInput("channels", f"be of the {len(pulses)} that arrive", str(self.numbers.max()), hint=hint)
+        return neutral + self.signs * (pulses[self.numbers - 1] - neutral)
 
     def of_outputs(self, pulses: ArrayLike, neutral: float) -> dict[int, float]:
         """Pulse (or another signal about its neutral value) by number of the channel, from those of the thrusters."""
-        turned = neutral + self.signs * (np.asarray(pulses, dtype=float) - neutral)
-        return dict(zip(self.numbers.tolist(), turned.tolist(), strict=True))
+        channel_pulses = neutral + self.signs * (np.asarray(pulses, dtype=float) - neutral)
+        return dict(zip(self.numbers.tolist(), channel_pulses.tolist(), strict=True))
 
     def __str__(self) -> str:
         return ",".join(str(number) for number in (self.signs * self.numbers).tolist())
@@ -53,16 +53,16 @@ def channels_from_text(text: str, thrusters: int) -> Channels:
         BadInput: not one channel for each thruster, or a channel twice or out of range.
     """
     try:
-        signed = np.array([int(word) for word in text.split(",")])
+        signed_numbers = np.array([int(word) for word in text.split(",")])
     except ValueError:
         raise BadInput("channels", "be whole numbers with commas, such as 1,2,-3", repr(text)) from None
-    checks.length("channels", signed, thrusters, "one per thruster, negative where it turns the other way")
-    numbers = np.abs(signed)
+    checks.length("channels", signed_numbers, thrusters, "one per thruster, negative where it turns the other way")
+    numbers = np.abs(signed_numbers)
     if not ((numbers >= 1) & (numbers <= MOST_CHANNELS)).all():
         raise BadInput("channels", f"be from 1 to {MOST_CHANNELS}", text)
     if len(set(numbers.tolist())) < len(numbers):
         raise BadInput("channels", "be different", text)
-    return Channels(numbers, np.sign(signed))
+    return Channels(numbers, np.sign(signed_numbers))
 
 
 def channels_of_frame(frame: str, thruster_matrix: ArrayLike) -> Channels:
@@ -91,7 +91,7 @@ def channels_of_vehicle(thruster_matrix: ArrayLike, frame: str | None = None, ch
         if frame is not None:
             raise BadInput("frame", "be left out with `channels`", frame)
         return channels_from_text(channels, thrusters)
-    fitting = [name for name, motors in FRAMES.items() if len(motors) == thrusters]
-    if frame is None and not fitting:
+    frames = [name for name, motors in FRAMES.items() if len(motors) == thrusters]
+    if frame is None and not frames:
         raise BadInput("channels", f"be given for {thrusters} thrusters, which no known frame has", hint=_HINT)
-    return channels_of_frame(frame or fitting[0], thruster_matrix)
+    return channels_of_frame(frame or frames[0], thruster_matrix)

@@ -64,7 +64,7 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
         for name, vector in saved.vectors.items()
     }
     title = f"Arena, version {VERSION}"
-    trials = max(len(result.errors) for one in board.standings for result in one.score.cells.values())
+    trials = max(len(result.errors) for standing in board.standings for result in standing.score.cells.values())
     lead = (
         f"{len(board.standings)} laws, {len(board.tasks)} tasks, {len(board.vehicles)} vehicles, {len(board.cells)} "
         f"pairs of them, {trials} {'trial' if trials == 1 else 'trials'} of each with the same seeds for all laws."
@@ -93,8 +93,10 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
 
 
 def _ratios(ratios: TextTable) -> Html:
-    said = f"Error / that of preset `{BASELINE}`: the geometric mean over the vehicles; below 1 the law is better."
-    return section("ratios", f"Errors against {BASELINE}", _rows(ratios), tag("p", prose(said), class_="small"))
+    explanation = (
+        f"Error / that of preset `{BASELINE}`: the geometric mean over the vehicles; below 1 the law is better."
+    )
+    return section("ratios", f"Errors against {BASELINE}", _rows(ratios), tag("p", prose(explanation), class_="small"))
 
 
 def _robustness(pictures: dict[str, Html], margins: TextTable) -> Html:
@@ -116,10 +118,10 @@ def _rows(rows: TextTable, words: int = 1) -> Html:
 def _gains(board: Board) -> Html:
     """How the gains of each law came about."""
     items = []
-    for one in board.standings:
-        sentences = [f"{vehicle}: {sentence}" for vehicle, sentence in one.entry.gains.items()]
-        said = ". ".join(sentences) if sentences else "as the law has them by itself"
-        items.append(prose(f"{one.entry.name}: {said}."))
+    for standing in board.standings:
+        sentences = [f"{vehicle}: {sentence}" for vehicle, sentence in standing.entry.gains.items()]
+        description = ". ".join(sentences) if sentences else "as the law has them by itself"
+        items.append(prose(f"{standing.entry.name}: {description}."))
     return bullets(items)
 
 

@@ -43,7 +43,7 @@ _INTERVALS = (
 def write_campaign(
     title: str,
     results: Results,
-    found: Mapping[str, Any],
+    summary: Mapping[str, Any],
     folder: Path,
     pdf: str | None = None,
     replays: Sequence[ReplayData] = (),
@@ -55,19 +55,21 @@ def write_campaign(
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: _plots(results, found), folder / "figures", pdf)
+    saved = save_all(lambda: _plots(results, summary), folder / "figures", pdf)
     plotted = _figures(saved)
     page = document(
         title,
         tag("h1", prose(title)),
-        tag("p", f"{found['done']} of {found['trials']} trials", class_="lead"),
-        *([tag("p", prose(found["nominal_model"]))] if found["nominal_model"] else []),
+        tag("p", f"{summary['done']} of {summary['trials']} trials", class_="lead"),
+        *([tag("p", prose(summary["nominal_model"]))] if summary["nominal_model"] else []),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
-        section("status", "Status of the trials", *_endings(found)),
-        *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, found)),
-        section("metrics", "Distributions", plotted["distributions"], distributions(results, found)),
-        *_optional("sensitivity", "Sensitivity", *_chance(found), plotted["sensitivity"], *_choices(results, found)),
-        section("worst", "The worst trials", _how(found), worst(results, found)),
+        section("status", "Status of the trials", *_endings(summary)),
+        *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, summary)),
+        section("metrics", "Distributions", plotted["distributions"], distributions(results, summary)),
+        *_optional(
+            "sensitivity", "Sensitivity", *_chance(summary), plotted["sensitivity"], *_choices(results, summary)
+        ),
+        section("worst", "The worst trials", _how(summary), worst(results, summary)),
         *([replay_section(replays, _REPLAY)] if replays else []),
         section("configuration", "Configuration", *asked(results)),
         looks=replay_looks() if replays else "",
@@ -77,28 +79,28 @@ def write_campaign(
     return path, saved.failures
 
 
-def _endings(found: Mapping[str, Any]) -> list[Html]:
-    ended = endings(found)
-    if not found["invalid"]:
+def _endings(summary: Mapping[str, Any]) -> list[Html]:
+    ended = endings(summary)
+    if not summary["invalid"]:
         return [ended]
-    errors = [prose(f"{one['trials']} with this error: {one['why']}") for one in found["invalid"]]
+    errors = [prose(f"{error['trials']} with this error: {error['why']}") for error in summary["invalid"]]
     return [ended, tag("p", "The following trials are invalid and did not run:"), bullets(errors)]
 
 
-def _chance(found: Mapping[str, Any]) -> list[Html]:
+def _chance(summary: Mapping[str, Any]) -> list[Html]:
     """What unrelated inputs reach by chance, and how many inputs the figure leaves out."""
-    lasted = [one["status"].get("completed", 0) for one in found["combinations"]]
-    if not found["sensitivity"] or max(lasted, default=0) < 3:
+    completed = [combination["status"].get("completed", 0) for combination in summary["combinations"]]
+    if not summary["sensitivity"] or max(completed, default=0) < 3:
         return []
-    chance = join("With ", str(max(lasted)), " trials, 95 % of the correlations of unrelated quantities are within ")
-    size = join(Html("&plusmn;"), number(min(1.96 / math.sqrt(max(lasted) - 1), 1.0), 2), ".")
-    hidden = len(found["sensitivity"]) - len(shown_inputs(found["sensitivity"]))
-    more = f" {hidden} further inputs with smaller correlations are in summary.json." if hidden else ""
-    return [tag("p", join(chance, size, more))]
+    chance = join("With ", str(max(completed)), " trials, 95 % of the correlations of unrelated quantities are within ")
+    size = join(Html("&plusmn;"), number(min(1.96 / math.sqrt(max(completed) - 1), 1.0), 2), ".")
+    hidden = len(summary["sensitivity"]) - len(shown_inputs(summary["sensitivity"]))
+    omitted = f" {hidden} further inputs with smaller correlations are in summary.json." if hidden else ""
+    return [tag("p", join(chance, size, omitted))]
 
 
-def _choices(results: Results, found: Mapping[str, Any]) -> list[Html]:
-    tables = by_choice(results, found)
+def _choices(results: Results, summary: Mapping[str, Any]) -> list[Html]:
+    tables = by_choice(results, summary)
     sentence = "Median [5 %, 95 %] of the completed trials for each choice, over all combinations."
     return [tag("p", prose(sentence)), *tables] if tables else []
 
@@ -108,20 +110,23 @@ def _optional(identity: str, title: str, *content: Html) -> list[Html]:
     return [section(identity, title, *content)] if any(content[-1:]) else []
 
 
-def _how(found: Mapping[str, Any]) -> Html:
+def _how(summary: Mapping[str, Any]) -> Html:
     order = "Failed trials come first, the earliest at the top, then those with the largest tracking rms."
-    again = "To repeat one, run `undertow simulate worst/trial-NUMBER.yaml` in the folder of this page."
-    return tag("p", prose(f"{order} {again} {by_xla(found)}".rstrip()))
+    repeat_hint = "To repeat one, run `undertow simulate worst/trial-NUMBER.yaml` in the folder of this page."
+    return tag("p", prose(f"{order} {repeat_hint} {by_xla(summary)}".rstrip()))
 
 
-def _plots(results: Results, found: Mapping[str, Any]) -> Plots:
+def _plots(results: Results, summary: Mapping[str, Any]) -> Plots:
     """What makes each figure; nothing where there is nothing to sample."""
-    values, units = _values(results, found), {name: _people(results, name)[1] for name in results.metrics}
-    varied = sum(key in results.campaign.vary for key in found["sensitivity"])
-    ran = {named(one): one["trials"] - one["invalid"] for one in found["combinations"]}
+    values = _values(results, summary)
+    units = {name: _people(results, name)[1] for name in results.metrics}
+    varied = sum(key in results.campaign.vary for key in summary["sensitivity"])
+    ran = {
+        named(combination): combination["trials"] - combination["invalid"] for combination in summary["combinations"]
+    }
     figures = {
         "distributions": (lambda: distributions_figure(values, ran, units)) if values else None,
-        "sensitivity": (lambda: sensitivity_figure(found["sensitivity"], varied)) if found["sensitivity"] else None,
+        "sensitivity": (lambda: sensitivity_figure(summary["sensitivity"], varied)) if summary["sensitivity"] else None,
     }
     return {name: make for name, make in figures.items() if make is not None}
 
@@ -134,16 +139,16 @@ def _figures(saved: Saved) -> dict[str, Html]:
     }
 
 
-def _values(results: Results, found: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:
+def _values(results: Results, summary: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:
     """Finite values of each metric that is plotted, by combination; angles in degrees."""
     values: dict[str, dict[str, np.ndarray]] = {}
-    numbers = np.unique(results.combinations)
-    for combination, one in zip(numbers, found["combinations"], strict=True):
-        own = results.combinations == combination
-        for metric in (name for name in one["metrics"] if name in SHOWN):
-            whole = _people(results, metric)[0] * results.rows[metric].values[own]
-            if np.isfinite(whole).any():
-                values.setdefault(metric, {})[named(one)] = whole[np.isfinite(whole)]
+    indices = np.unique(results.combinations)
+    for index, combination in zip(indices, summary["combinations"], strict=True):
+        in_combination = results.combinations == index
+        for metric in (name for name in combination["metrics"] if name in SHOWN):
+            scaled = _people(results, metric)[0] * results.rows[metric].values[in_combination]
+            if np.isfinite(scaled).any():
+                values.setdefault(metric, {})[named(combination)] = scaled[np.isfinite(scaled)]
     return values
 
 
@@ -158,79 +163,94 @@ def named(combination: Mapping[str, Any]) -> str:
     return ", ".join(parts) or "all trials"
 
 
-def endings(found: Mapping[str, Any]) -> Html:
+def endings(summary: Mapping[str, Any]) -> Html:
     """Number of trials by status and number of successes, one column per combination."""
-    several = found["combinations"]
-    rows = [(word, *(str(one["status"].get(word, 0)) for one in several)) for word in found["status"]]
-    if any(one["success"]["within"] or one["success"]["not_within"] for one in several):
-        rows.append(("within the criterion of success", *(str(one["success"]["within"]) for one in several)))
-    head = ("trials", *map(named, several))
-    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 3)
+    combinations = summary["combinations"]
+    rows = [
+        (word, *(str(combination["status"].get(word, 0)) for combination in combinations)) for word in summary["status"]
+    ]
+    if any(combination["success"]["within"] or combination["success"]["not_within"] for combination in combinations):
+        rows.append(
+            (
+                "within the criterion of success",
+                *(str(combination["success"]["within"]) for combination in combinations),
+            )
+        )
+    head = ("trials", *map(named, combinations))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(combinations) > 3)
 
 
-def by_xla(found: Mapping[str, Any]) -> str:
+def by_xla(summary: Mapping[str, Any]) -> str:
     """A sentence about trials that used the XLA backend; empty where none did."""
-    if not found["by_xla"]:
+    if not summary["by_xla"]:
         return ""
     consequence = "which is slower, and a single run repeats such a trial only up to rounding"
     return (
-        f"{found['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
+        f"{summary['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
     )
 
 
-def requirements(results: Results, found: Mapping[str, Any]) -> Html:
+def requirements(results: Results, summary: Mapping[str, Any]) -> Html:
     """The requirements and their verdicts; empty where there are none."""
     rows = []
-    for one in found["combinations"]:
-        for required in one["requirements"]:
-            low, high = required["interval"]
-            share = f"{100 * required['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-            of = f" in {100 * required['share']:g} % of the trials"
-            if required["formula"] is None:
-                bound = quantity(required["below"], results.unit(required["metric"]))
-                words = join(_metric(required["metric"]), " < ", bound, of)
+    for combination in summary["combinations"]:
+        for requirement in combination["requirements"]:
+            low, high = requirement["interval"]
+            share = f"{100 * requirement['kept']:.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+            share_words = f" in {100 * requirement['share']:g} % of the trials"
+            if requirement["formula"] is None:
+                bound = quantity(requirement["below"], results.unit(requirement["metric"]))
+                description = join(_metric(requirement["metric"]), " < ", bound, share_words)
             else:
-                words = join(f"{required['metric']}: ", tag("code", prose(required["formula"])), of)
-            rows.append((words, named(one), chip(required["verdict"]), share))
+                description = join(
+                    f"{requirement['metric']}: ", tag("code", prose(requirement["formula"])), share_words
+                )
+            rows.append((description, named(combination), chip(requirement["verdict"]), share))
     head = ("requirement", "combination", "verdict", "share of the trials [95 % interval]")
     return table(head, rows) if rows else Html("")
 
 
-def distributions(results: Results, found: Mapping[str, Any]) -> Html:
+def distributions(results: Results, summary: Mapping[str, Any]) -> Html:
     """Quantiles of every metric, side by side for the combinations."""
-    several = found["combinations"]
-    names = dict.fromkeys(name for one in several for name in one["metrics"])
+    combinations = summary["combinations"]
+    names = dict.fromkeys(name for combination in combinations for name in combination["metrics"])
     rows = []
     for name in names:
-        cells = (_spread(results, name, one["metrics"].get(name)) for one in several)
+        cells = (_spread(results, name, combination["metrics"].get(name)) for combination in combinations)
         rows.append((_headed(results, name), *cells))
-    head = ("median [5 %, 95 %]", *map(named, several))
-    return table(head, rows, numeric=range(1, len(head)), wide=len(several) > 1)
+    head = ("median [5 %, 95 %]", *map(named, combinations))
+    return table(head, rows, numeric=range(1, len(head)), wide=len(combinations) > 1)
 
 
-def by_choice(results: Results, found: Mapping[str, Any]) -> list[Html]:
+def by_choice(results: Results, summary: Mapping[str, Any]) -> list[Html]:
     """For each choice, a table of the median and the 5 % to 95 % range."""
-    tables, shown = [], [*results.tracking, "input_rms"]
-    for key, entries in found["choices"].items():
+    tables = []
+    metrics = [*results.tracking, "input_rms"]
+    for key, entries in summary["choices"].items():
         rows = []
-        for word, one in entries.items():
-            cells = (_spread(results, name, one["metrics"].get(name)) for name in shown)
-            rows.append((word, str(one["trials"]), str(one["failed"]), *cells))
-        head = (prose(f"`{key}`"), "trials", "failed", *(_headed(results, name) for name in shown))
+        for word, statistics in entries.items():
+            cells = (_spread(results, name, statistics["metrics"].get(name)) for name in metrics)
+            rows.append((word, str(statistics["trials"]), str(statistics["failed"]), *cells))
+        head = (prose(f"`{key}`"), "trials", "failed", *(_headed(results, name) for name in metrics))
         tables.append(table(head, rows, numeric=range(1, len(head))))
     return tables
 
 
-def worst(results: Results, found: Mapping[str, Any]) -> Html:
+def worst(results: Results, summary: Mapping[str, Any]) -> Html:
     """The worst trials with their sampled values."""
     rows = []
-    for trial in found["worst"]:
-        row, swept = results.rows.sel(trial=trial), results.swept(trial)
-        sampled = [number(one, _DIGITS) if isinstance(one, float) else one for one in results.sampled(trial).values()]
-        lasted = int(row["status"]) == int(Status.OK)
-        how = ending({"status": ENDINGS[int(row["status"])], "diverged_at": None if lasted else float(row["ended"])})
-        errors = [_shown(results, name, float(row[name]) if lasted else None) for name in results.tracking]
-        rows.append((str(trial), how, *errors, *swept, *sampled))
+    for trial in summary["worst"]:
+        row = results.rows.sel(trial=trial)
+        swept = results.swept(trial)
+        sampled = [
+            number(value, _DIGITS) if isinstance(value, float) else value for value in results.sampled(trial).values()
+        ]
+        completed = int(row["status"]) == int(Status.OK)
+        ended = ending(
+            {"status": ENDINGS[int(row["status"])], "diverged_at": None if completed else float(row["ended"])}
+        )
+        errors = [_shown(results, name, float(row[name]) if completed else None) for name in results.tracking]
+        rows.append((str(trial), ended, *errors, *swept, *sampled))
     keys = [prose(f"`{key}`") for key in (*results.campaign.axes, *results.campaign.vary)]
     heads = [_headed(results, name) for name in results.tracking]
     return table(("trial", "ended", *heads, *keys), rows, numeric=range(2, 2 + len(heads)), wide=len(keys) > 1)
@@ -238,7 +258,8 @@ def worst(results: Results, found: Mapping[str, Any]) -> Html:
 
 def asked(results: Results) -> list[Html]:
     """The configuration: sampling, versions and the campaign file."""
-    campaign, attributes = results.campaign, results.rows.attrs
+    campaign = results.campaign
+    attributes = results.rows.attrs
     rows = [(prose(f"`{key}`"), prose(_words(spread))) for key, spread in campaign.vary.items()]
     rows += [(prose(f"`{key}`"), ", ".join(entries)) for key, entries in campaign.axes.items()]
     sampling = f"{campaign.trials} samples ({campaign.design}), seed {campaign.seed}"
@@ -295,7 +316,7 @@ def _shown(results: Results, name: str, value: float | None) -> Html:
 def _spread(results: Results, name: str, quantiles: Mapping[str, float] | None) -> Html:
     if quantiles is None:
         return number(None)
-    of = results.unit(name)
-    said = lambda value: infinite(of) if np.isinf(value) else number(for_people(value, of)[0])
-    low, middle, high = map(said, quantiles.values())
+    metric_unit = results.unit(name)
+    formatted = lambda value: infinite(metric_unit) if np.isinf(value) else number(for_people(value, metric_unit)[0])
+    low, middle, high = map(formatted, quantiles.values())
     return join(middle, " [", low, ", ", high, "]")

@@ -24,16 +24,16 @@ from undertow.studies.comparison.step_time import HOW_LONG, StepTime
 from undertow.studies.comparison.tables import NOTE, TextTable, medians, paired, titled, value_in
 
 _CAPTIONS = {
-    "differences": "Each point is one trial: the metric of a {one} less that of the first {one}, with the same sample "
-    "and seed. The diamond is the median, the bar its 95 % bootstrap interval. Left of zero the {one} has the smaller "
-    "value.",
-    "pareto": "Medians over the completed trials with their 95 % intervals. A {one} is on the front (bold, joined by a "
-    "line) if no other one is at least as good in both and better in one; the others are pale. A hollow point is a "
-    "{one} that did not complete every trial, and is not judged.",
+    "differences": "Each point is one trial: the metric of a {noun} less that of the first {noun}, with the same "
+    "sample and seed. The diamond is the median, the bar its 95 % bootstrap interval. Left of zero the {noun} has the "
+    "smaller value.",
+    "pareto": "Medians over the completed trials with their 95 % intervals. A {noun} is on the front (bold, joined by "
+    "a line) if no other one is at least as good in both and better in one; the others are pale. A hollow point is a "
+    "{noun} that did not complete every trial, and is not judged.",
     "histories": "Tracking error per axis: the root of its mean square over the axes, whose rms over the steady window "
     "is the metric of the table. Lines end where a run failed. The area holds 5 % to 95 % of the trials that were "
     "running at that time.",
-    "plan": "Positions north and east in the first trial, with the same seed for each {one}, on axes that fit the "
+    "plan": "Positions north and east in the first trial, with the same seed for each {noun}, on axes that fit the "
     "completed runs. A dot marks the end of the reference, a cross a failure.",
     "distributions": "Empirical cumulative distribution functions, with one step per trial. A curve that ends below 1 "
     "has failed trials.",
@@ -43,7 +43,7 @@ _REPLAY = "The first trial, as in the figures of time histories and paths, with 
 
 _FAIR = (
     "A comparison with a controller that was not tuned says little. The folder `scenarios` beside this page has the "
-    "scenario of each {one}: `undertow tune scenarios/NAME.yaml` tunes its gains, and `--controllers` takes the "
+    "scenario of each {noun}: `undertow tune scenarios/NAME.yaml` tunes its gains, and `--controllers` takes the "
     "`tuned.yaml` that this writes."
 )
 
@@ -73,31 +73,31 @@ def write_comparison(
     Raises:
         OSError: the folder cannot be written.
     """
-    found = comparison.findings
-    one = found.dimension if found.dimension in _COMPARED else "variant"
-    saved = save_all(lambda: comparison_plots(comparison.dataset, found), folder / "figures", pdf)
-    title = f"Comparison: {', '.join(found.names)}"
+    findings = comparison.findings
+    noun = findings.dimension if findings.dimension in _COMPARED else "variant"
+    saved = save_all(lambda: comparison_plots(comparison.dataset, findings), folder / "figures", pdf)
+    title = f"Comparison: {', '.join(findings.names)}"
     figures = [
         figure(vector.read_text(encoding="utf-8"), name, caption, prose(caption))
         for name, vector in saved.vectors.items()
-        for caption in [_CAPTIONS[name].format(one=one)]
+        for caption in [_CAPTIONS[name].format(noun=noun)]
     ]
-    if said := _alike(comparison.dataset, found):
-        figures.insert(0, tag("p", prose(said)))
+    if alike_sentence := _alike(comparison.dataset, findings):
+        figures.insert(0, tag("p", prose(alike_sentence)))
     page = document(
         title,
         tag("h1", prose(title)),
-        tag("p", prose(_lead(found, subject)), class_="lead"),
+        tag("p", prose(_lead(findings, subject)), class_="lead"),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
-        _rows(medians(found, times)),
+        _rows(medians(findings, times)),
         tag("p", prose(f"{NOTE}{f' {HOW_LONG}' if times else ''}"), class_="small"),
-        bullets([prose(sentence) for sentence in sentences(found)]),
-        *([_differing(found)] if found.differing else []),
-        *([replay_section(replays, _replayed(replays, found))] if replays else []),
-        section("tuning", "Tuning", *_how_tuned(one, found, budgets)),
+        bullets([prose(sentence) for sentence in sentences(findings)]),
+        *([_differing(findings)] if findings.differing else []),
+        *([replay_section(replays, _replayed(replays, findings))] if replays else []),
+        section("tuning", "Tuning", *_how_tuned(noun, findings, budgets)),
         section("figures", "Figures", *figures),
-        section("endings", "Status of the trials", _endings(found)),
-        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(found), words=2)),
+        section("endings", "Status of the trials", _endings(findings)),
+        section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(findings), words=2)),
         section("configuration", "Configuration", *asked(results)),
         looks=replay_looks() if replays else "",
     )
@@ -106,24 +106,31 @@ def write_comparison(
     return path, saved.failures
 
 
-def _lead(found: Findings, subject: str) -> str:
-    of = f"{subject}: " if subject and not found.differing else ""
-    if found.all_equal:
-        trials = "one trial" if found.trials == 1 else f"{found.trials} trials, which are all equal,"
-        return f"{of}{trials} for each, because nothing in the scenario is random."
-    return f"{of}{found.trials} trials for each, with the same samples and seeds."
+def _lead(findings: Findings, subject: str) -> str:
+    prefix = f"{subject}: " if subject and not findings.differing else ""
+    if findings.all_equal:
+        trials = "one trial" if findings.trials == 1 else f"{findings.trials} trials, which are all equal,"
+        return f"{prefix}{trials} for each, because nothing in the scenario is random."
+    return f"{prefix}{findings.trials} trials for each, with the same samples and seeds."
 
 
-def _alike(dataset: xr.Dataset, found: Findings) -> str:
+def _alike(dataset: xr.Dataset, findings: Findings) -> str:
     """A sentence on the metrics that no figure shows, because they have one value only; empty without any."""
-    same = alike(dataset, found)
-    each = ", ".join(f"{titled(found, metric)}: {value_in(one, found.units[metric])}" for metric, one in same.items())
-    return f"The same in all completed trials, and therefore not shown in figures: {each}." if same else ""
+    constant_metrics = alike(dataset, findings)
+    metrics_and_values = ", ".join(
+        f"{titled(findings, metric)}: {value_in(value, findings.units[metric])}"
+        for metric, value in constant_metrics.items()
+    )
+    return (
+        f"The same in all completed trials, and therefore not shown in figures: {metrics_and_values}."
+        if constant_metrics
+        else ""
+    )
 
 
-def _replayed(replays: Sequence[ReplayData], found: Findings) -> str:
-    shown = ", ".join(replay.label for replay in replays)
-    return _REPLAY if len(replays) == len(found.names) else f"{_REPLAY} Shown: {shown}."
+def _replayed(replays: Sequence[ReplayData], findings: Findings) -> str:
+    labels = ", ".join(replay.label for replay in replays)
+    return _REPLAY if len(replays) == len(findings.names) else f"{_REPLAY} Shown: {labels}."
 
 
 def _rows(rows: TextTable, words: int = 1) -> Html:
@@ -137,30 +144,31 @@ def _cell(content: str) -> Html:
     return prose(re.sub(r"\binf\b", "\u221e", content))
 
 
-def _differing(found: Findings) -> Html:
+def _differing(findings: Findings) -> Html:
     """What differs between scenarios."""
-    rows = [(prose(f"`{key}`"), *values) for key, values in found.differing.items()]
-    return section("scenarios", "What differs", table(("key", *found.names), rows, wide=len(found.names) > 2))
+    rows = [(prose(f"`{key}`"), *values) for key, values in findings.differing.items()]
+    return section("scenarios", "What differs", table(("key", *findings.names), rows, wide=len(findings.names) > 2))
 
 
-def _how_tuned(one: str, found: Findings, budgets: EqualBudgets | None) -> list[Html]:
+def _how_tuned(noun: str, findings: Findings, budgets: EqualBudgets | None) -> list[Html]:
     if budgets is None:
-        return [tag("p", prose(_FAIR.format(one=one))), _tuning(one, found.tuning)]
+        return [tag("p", prose(_FAIR.format(noun=noun))), _tuning(noun, findings.tuning)]
     rows = budget_rows(budgets)
     return [
         *(tag("p", prose(sentence)) for sentence in budget_sentences(budgets)),
         _rows(rows),
-        _tuning(one, found.tuning),
+        _tuning(noun, findings.tuning),
     ]
 
 
-def _tuning(one: str, tuning: Mapping[str, str]) -> Html:
-    return table((one, "gains"), [(name, prose(sentence)) for name, sentence in tuning.items()])
+def _tuning(noun: str, tuning: Mapping[str, str]) -> Html:
+    return table((noun, "gains"), [(name, prose(sentence)) for name, sentence in tuning.items()])
 
 
-def _endings(found: Findings) -> Html:
-    words = dict.fromkeys(word for each in found.endings.values() for word in each)
+def _endings(findings: Findings) -> Html:
+    words = dict.fromkeys(word for counts in findings.endings.values() for word in counts)
     rows = [
-        (word.replace("_", " "), *(str(found.endings[name].get(word, 0)) for name in found.names)) for word in words
+        (word.replace("_", " "), *(str(findings.endings[name].get(word, 0)) for name in findings.names))
+        for word in words
     ]
-    return table(("trials", *found.names), rows, numeric=range(1, 1 + len(found.names)))
+    return table(("trials", *findings.names), rows, numeric=range(1, 1 + len(findings.names)))

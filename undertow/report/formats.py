@@ -42,16 +42,16 @@ def plain(value: float, digits: int = _DIGITS) -> str:
     if value and not _SMALL <= abs(value) < _LARGE:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{_minus(mantissa)} \u00d7 10{str(int(exponent)).translate(_RAISED)}"
-    whole = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
-    return _minus(f"{value:.0f}" if whole else f"{value:#.{digits}g}".rstrip("."))
+    is_integer = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
+    return _minus(f"{value:.0f}" if is_integer else f"{value:#.{digits}g}".rstrip("."))
 
 
 def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
     """A number with its unit; angles in degrees."""
     if value is None:
         return number(None)
-    shown, name = for_people(value, of)
-    return join(number(shown, digits), Html("&nbsp;"), unit(name)) if name else number(shown, digits)
+    displayed, name = for_people(value, of)
+    return join(number(displayed, digits), Html("&nbsp;"), unit(name)) if name else number(displayed, digits)
 
 
 def percent(value: float | None) -> Html:
@@ -71,13 +71,13 @@ def prose(content: Any) -> Html:
 
 
 def _typeset(words: str) -> Html:
-    marked = _TINY.sub(lambda found: _scientific(len(found[1]), found[2]), with_symbols(words))
-    marked = _POWER.sub(lambda found: _with_power(found[1], f"{found[2]}{found[3]}".lstrip("+")), marked)
-    marked = re.sub(r"\^(-?\d)", lambda found: f"<sup>{_minus(found[1])}</sup>", marked)
-    marked = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", marked))
+    markup = _TINY.sub(lambda match: _scientific(len(match[1]), match[2]), with_symbols(words))
+    markup = _POWER.sub(lambda match: _with_power(match[1], f"{match[2]}{match[3]}".lstrip("+")), markup)
+    markup = re.sub(r"\^(-?\d)", lambda match: f"<sup>{_minus(match[1])}</sup>", markup)
+    markup = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", markup))
     for sign, entity in _SIGNS.items():
-        marked = marked.replace(sign, entity)
-    return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", marked))
+        markup = markup.replace(sign, entity)
+    return Html(re.sub(r"\b([A-Za-z])_([A-Za-z0-9])\b", r"\1<sub>\2</sub>", markup))
 
 
 def _scientific(zeros: int, digits: str) -> Html:
@@ -145,7 +145,8 @@ def outcome(words: str, completed: bool, within: bool | None) -> Html:
 
 def ending(entry: Mapping[str, Any]) -> str:
     """Status of a run, with the time if it ended early."""
-    word, when = str(entry.get("status", "completed")).replace("_", " "), entry.get("diverged_at")
+    word = str(entry.get("status", "completed")).replace("_", " ")
+    when = entry.get("diverged_at")
     return word if when is None else f"{word} at {when:.3g} s"
 
 

@@ -35,8 +35,8 @@ def marked(pattern: str, content: str, inside: Callable[[str], Html], outside: C
 
 def tag(name: str, *content: Any, **attributes: str) -> Html:
     """An element; `class_` stands for the attribute `class`."""
-    named = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
-    return Html(f"<{name}{named}>{join(*content)}</{name}>")
+    attribute_text = "".join(f' {key.rstrip("_")}="{html.escape(value)}"' for key, value in attributes.items())
+    return Html(f"<{name}{attribute_text}>{join(*content)}</{name}>")
 
 
 def bullets(items: Sequence[Any]) -> Html:
@@ -63,9 +63,9 @@ def table(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[
     for row in rows:
         first = tag("th", row[0], scope="row", **style(0))
         body.append(tag("tr", first, *(tag("td", cell, **style(i)) for i, cell in enumerate(row[1:], 1))))
-    whole = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
+    table_element = tag("table", *head_rows, tag("tbody", *body), class_="wide" if wide else "fit")
     scrolls = wide or _letters(head, rows, numeric) > _PHONE
-    return tag("div", whole, class_="scroll wide" if scrolls else "scroll", tabindex="0")
+    return tag("div", table_element, class_="scroll wide" if scrolls else "scroll", tabindex="0")
 
 
 def _letters(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequence[int]) -> float:
@@ -74,8 +74,8 @@ def _letters(head: Sequence[Any], rows: Sequence[Sequence[Any]], numeric: Sequen
     widest: dict[int, int] = {}
     for row in (head, *rows):
         for column, cell in enumerate(row):
-            whole = column in numeric and row is not head
-            parts = [plain(cell)] if whole else plain(cell).split()
+            is_unbroken = column in numeric and row is not head
+            parts = [plain(cell)] if is_unbroken else plain(cell).split()
             widest[column] = max([widest.get(column, 0), *map(len, parts)])
     return sum(widest.values()) + _BETWEEN * len(widest)
 

@@ -26,14 +26,14 @@ class PlottingProcess:
 
     def __init__(self, process: subprocess.Popen[bytes] | None):
         self._process = process
-        self._asked: tuple[Path, str | None] | None = None
+        self._request: tuple[Path, str | None] | None = None
 
     def plot(self, run: Path, width: str | None) -> None:
         """Begin to plot the run in a file `run.nc`, with PDF files where a width is given."""
-        self._asked = run, width
+        self._request = run, width
         if self._process is not None and self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended; `plotted` then plots here
-                self._process.stdin.write(pickle.dumps(self._asked))
+                self._process.stdin.write(pickle.dumps(self._request))
                 self._process.stdin.close()
 
     def plotted(self) -> Plotted:
@@ -42,12 +42,12 @@ class PlottingProcess:
         Raises:
             UnreadableResult: the file of the run cannot be read.
         """
-        assert self._asked is not None, "`plot` comes first"
+        assert self._request is not None, "`plot` comes first"
         if self._process is not None and self._process.stdout is not None:
             data = self._process.stdout.read()
             if self._process.wait() == 0 and data:
                 return pickle.loads(data)  # written by our own process
-        return _plot(*self._asked)
+        return _plot(*self._request)
 
 
 @contextlib.contextmanager
@@ -80,9 +80,9 @@ def serve() -> None:
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     _ = figures.plot_run  # imports matplotlib before there is anything to do
-    asked = sys.stdin.buffer.read()
-    if asked:
-        pickle.dump(_plot(*pickle.loads(asked)), answer)
+    request = sys.stdin.buffer.read()
+    if request:
+        pickle.dump(_plot(*pickle.loads(request)), answer)
         answer.close()
 
 

@@ -69,14 +69,14 @@ LEFT_OUT = (
 
 def _section(number: int, rows: PredictionTable):
     cells = [[prose(cell) for cell in row] for row in rows.rows]
-    whole = table([prose(cell) for cell in rows.head], cells, wide=len(rows.head) > 3)
-    return section(f"table-{number}", rows.title, tag("p", prose(rows.sentence)), whole)
+    content = table([prose(cell) for cell in rows.head], cells, wide=len(rows.head) > 3)
+    return section(f"table-{number}", rows.title, tag("p", prose(rows.sentence)), content)
 
 
 def tables(prediction: Prediction) -> list[PredictionTable]:
     """All tables, the most important first, without empty ones."""
-    made = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
-    return [table for make in made if (table := make(prediction)).rows]
+    makers = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
+    return [table for make in makers if (table := make(prediction)).rows]
 
 
 def _points(prediction: Prediction) -> PredictionTable:
@@ -101,13 +101,14 @@ def _points(prediction: Prediction) -> PredictionTable:
 
 
 def _margins(prediction: Prediction) -> PredictionTable:
-    known, dt = prediction.margins, prediction.operating_point.linear.dt
+    margins = prediction.margins
+    dt = prediction.operating_point.linear.dt
     rows = [
-        ("sampling limit at these gains", _time(known["sampling_time"]), f"sampling time {_time(dt)}"),
-        ("delay margin, controller to actuators", _time(known["delay"]), "beyond the nominal model"),
-        ("margin of an additional first-order lag", _time(known["lag"]), "beyond the nominal model"),
-        ("gain margin, decreasing", _number(known["gain_low"]), "of the nominal effect of the input"),
-        ("gain margin, increasing", _number(known["gain_high"]), "of the nominal effect of the input"),
+        ("sampling limit at these gains", _time(margins["sampling_time"]), f"sampling time {_time(dt)}"),
+        ("delay margin, controller to actuators", _time(margins["delay"]), "beyond the nominal model"),
+        ("margin of an additional first-order lag", _time(margins["lag"]), "beyond the nominal model"),
+        ("gain margin, decreasing", _number(margins["gain_low"]), "of the nominal effect of the input"),
+        ("gain margin, increasing", _number(margins["gain_high"]), "of the nominal effect of the input"),
     ]
     return PredictionTable(
         "Robustness margins", ("margin", "limit", "remark"), rows, "At the operating point closest to instability."
@@ -131,16 +132,17 @@ _SHOWN = (0.1, 1.0, 10.0)  # rad/s
 
 
 def _errors(prediction: Prediction) -> PredictionTable:
-    frequency, names = prediction.frequency, prediction.operating_point.built.closed_loop.plant.outputs
+    frequency = prediction.frequency
+    names = prediction.operating_point.built.closed_loop.plant.outputs
     rows = []
     for i, name in enumerate(names):
-        error, missed = prediction.error[:, i], prediction.estimation[:, i]
-        at = [_number(float(np.interp(w, frequency, error))) for w in _SHOWN]
-        worse = frequency[missed > 1]
+        error, estimation = prediction.error[:, i], prediction.estimation[:, i]
+        gains = [_number(float(np.interp(w, frequency, error))) for w in _SHOWN]
+        worse = frequency[estimation > 1]
         rows.append(
             (
                 name,
-                *at,
+                *gains,
                 f"{_number(error.max())} at {_number(frequency[error.argmax()])} rad/s",
                 f"{_number(worse[0])} rad/s" if worse.size else "none",
             )
@@ -154,7 +156,8 @@ def _errors(prediction: Prediction) -> PredictionTable:
 
 
 def _noise(prediction: Prediction) -> PredictionTable:
-    noise, unit = prediction.noise, prediction.operating_point.built.closed_loop.plant.input_unit
+    noise = prediction.noise
+    unit = prediction.operating_point.built.closed_loop.plant.input_unit
     rows = [
         (f"input, {unit}, for 1 cm/s or 0.01 rad/s of noise", _number(0.01 * noise.of_input.max())),
         ("estimate, m/s^2 or rad/s^2, for the same noise", _number(0.01 * noise.of_estimate.max())),
@@ -181,8 +184,10 @@ def _closed_forms(prediction: Prediction) -> PredictionTable:
 
 
 def _authority(prediction: Prediction) -> PredictionTable:
-    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
-    force, most = force_label(plant).replace("force", "", 1), int(authority.demand.argmax())
+    authority = prediction.authority
+    plant = prediction.operating_point.built.closed_loop.plant
+    force = force_label(plant).replace("force", "", 1)
+    most = int(authority.demand.argmax())
     finite = np.isfinite(authority.high).any()
     rows = [
         ("share of the time in which the demand is met", _percent(authority.held)),
@@ -202,11 +207,11 @@ def _authority(prediction: Prediction) -> PredictionTable:
 
 
 def _metrics(prediction: Prediction) -> PredictionTable:
-    known = prediction.operating_point.built.known_metrics()
+    metrics = prediction.operating_point.built.known_metrics()
     rows = []
     for name, value in (prediction.metrics or {}).items():
-        shown, unit = for_people(value, known[name].unit)
-        rows.append((name, _number(shown), unit))
+        displayed, unit = for_people(value, metrics[name].unit)
+        rows.append((name, _number(displayed), unit))
     return PredictionTable(
         "Predicted metrics of the steady window",
         ("metric", "predicted", "unit"),

@@ -62,21 +62,21 @@ def shown(result: RunResult, plotted: Callable[[], Plotted]) -> RunPageContents:
 
 
 def write_run_page(
-    path: Path, run: RunRecord, shown: RunPageContents, predicted: Mapping[str, float] | None = None
+    path: Path, run: RunRecord, contents: RunPageContents, predicted: Mapping[str, float] | None = None
 ) -> None:
     """Write the page of a run.
 
     Args:
         path: of the page.
         run: its record.
-        shown: what it looks like.
+        contents: what it shows.
         predicted: predicted metrics of the steady window, where there are any.
 
     Raises:
         OSError: the file cannot be written.
     """
-    replay = Html("") if shown.replay is None else replay_section([shown.replay])
-    write_whole(path, _page(run, shown.figures, replay, predicted))
+    replay = Html("") if contents.replay is None else replay_section([contents.replay])
+    write_whole(path, _page(run, contents.figures, replay, predicted))
 
 
 def _page(
@@ -90,20 +90,20 @@ def _page(
         sections.append(section("faults", "Faults", _table(fault_rows(facts.faults, input_names(run.series)))))
     if facts.transitions is not None:
         supervision = transition_rows(facts.transitions, lost_thrusters(run.series))
-        below = [tag("p", prose(one)) for one in supervision.sentences]
-        sections.append(section("supervision", supervision.title, _table(supervision), *below))
+        sentences = [tag("p", prose(sentence)) for sentence in supervision.sentences]
+        sections.append(section("supervision", supervision.title, _table(supervision), *sentences))
     if facts.navigation is not None:
-        assumed = navigation_rows(facts.navigation)
-        below = [tag("p", prose(one)) for one in assumed.sentences]
-        sections.append(section("navigation", assumed.title, _table(assumed), *below))
+        navigation = navigation_rows(facts.navigation)
+        sentences = [tag("p", prose(sentence)) for sentence in navigation.sentences]
+        sections.append(section("navigation", navigation.title, _table(navigation), *sentences))
     if certificate is not None:
         hypotheses = certificate_rows(certificate, facts.window)
-        below = [tag("p", prose(one)) for one in hypotheses.sentences]
-        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *below))
+        sentences = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
+        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *sentences))
         if "memory" in certificate:
-            learnt = memory_rows(certificate)
-            below = [tag("p", prose(one)) for one in learnt.sentences]
-            sections.append(section("memory", learnt.title, _table(learnt), *below))
+            memory = memory_rows(certificate)
+            sentences = [tag("p", prose(sentence)) for sentence in memory.sentences]
+            sections.append(section("memory", memory.title, _table(memory), *sentences))
     plotted = [
         figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
         for name, picture in figures.items()
@@ -122,11 +122,11 @@ def _page(
 
 def _table(rows: RunTable) -> Html:
     """A table of a run. Units stand beside the names, where a narrow screen shows them without scrolling."""
-    shown = lambda cell: prose(cell) if isinstance(cell, str) else number(cell, _DIGITS)
+    formatted = lambda cell: prose(cell) if isinstance(cell, str) else number(cell, _DIGITS)
     named = lambda name: _explained(name, rows.meanings[name]) if name in rows.meanings else prose(name)
-    columns = sorted(range(len(rows.head)), key=lambda place: (place > 0, rows.head[place] != "unit"))
-    cells = [[named(row[i]) if not i else shown(row[i]) for i in columns] for row in rows.rows]
-    numeric = [place for place, i in enumerate(columns) if i and rows.head[i] != "unit"]
+    columns = sorted(range(len(rows.head)), key=lambda column: (column > 0, rows.head[column] != "unit"))
+    cells = [[named(row[i]) if not i else formatted(row[i]) for i in columns] for row in rows.rows]
+    numeric = [column for column, i in enumerate(columns) if i and rows.head[i] != "unit"]
     return table([prose(rows.head[i]) for i in columns], cells, numeric=numeric)
 
 

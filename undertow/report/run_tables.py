@@ -33,45 +33,45 @@ class RunTable(NamedTuple):
 
 def metrics_rows(
     steady: Mapping[str, Any] | None,
-    whole: Mapping[str, Any],
+    whole_run: Mapping[str, Any],
     window: tuple[float, float] | None,
-    known: Mapping[str, Metric],
+    metrics: Mapping[str, Metric],
     predicted: Mapping[str, float] | None = None,
 ) -> RunTable:
     """Predicted and measured metrics of the steady window, and the metrics of the whole run."""
     rows = []
-    for name, metric in known.items():
-        if name in whole:
-            said = lambda values, name=name, metric=metric: _measured(values[name], metric.unit)
-            shown = [said(predicted) if name in predicted else ""] if predicted else []
-            late = said(steady) if steady and name in steady else "-"
-            rows.append((name, *shown, late, said(whole), for_people(0.0, metric.unit)[1]))
+    for name, metric in metrics.items():
+        if name in whole_run:
+            displayed = lambda values, name=name, metric=metric: _measured(values[name], metric.unit)
+            predicted_cell = [displayed(predicted) if name in predicted else ""] if predicted else []
+            steady_cell = displayed(steady) if steady and name in steady else "-"
+            rows.append((name, *predicted_cell, steady_cell, displayed(whole_run), for_people(0.0, metric.unit)[1]))
     head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
-    return RunTable("Metrics", head, rows, meanings={name: known[name].meaning for name, *_ in rows})
+    return RunTable("Metrics", head, rows, meanings={name: metrics[name].meaning for name, *_ in rows})
 
 
 def prediction_rows(
-    compared: "Sequence[MetricComparison]", window: tuple[float, float] | None, known: Mapping[str, Metric]
+    compared: "Sequence[MetricComparison]", window: tuple[float, float] | None, metrics: Mapping[str, Metric]
 ) -> RunTable:
     """Predicted and measured metrics of the steady window, and by how much they differ."""
     rows = []
-    for one in compared:
-        unit = known[one.name].unit
-        shown = (_measured(value, unit) for value in (one.predicted, one.measured))
-        departs = "-" if isinf(one.departure) else f"{100 * one.departure:.0f} %"
-        rows.append((one.name, *shown, departs, for_people(0.0, unit)[1]))
+    for comparison in compared:
+        unit = metrics[comparison.name].unit
+        cells = (_measured(value, unit) for value in (comparison.predicted, comparison.measured))
+        departure = "-" if isinf(comparison.departure) else f"{100 * comparison.departure:.0f} %"
+        rows.append((comparison.name, *cells, departure, for_people(0.0, unit)[1]))
     return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
 
 
 def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float] | None) -> RunTable:
     """The share of the time for which each hypothesis of the stability proof held, and its first failure."""
     rows = []
-    for one in certificate["hypotheses"]:
-        if one["whole"] is None:
-            rows.append((f"{one['sentence']} (not testable: {one['unknown']})", "-", "-", "-"))
+    for hypothesis in certificate["hypotheses"]:
+        if hypothesis["whole"] is None:
+            rows.append((f"{hypothesis['sentence']} (not testable: {hypothesis['unknown']})", "-", "-", "-"))
             continue
-        first = "never" if one["first_failure"] is None else f"{one['first_failure']:.4g} s"
-        rows.append((one["sentence"], _share(one["steady"]), _share(one["whole"]), first))
+        first = "never" if hypothesis["first_failure"] is None else f"{hypothesis['first_failure']:.4g} s"
+        rows.append((hypothesis["sentence"], _share(hypothesis["steady"]), _share(hypothesis["whole"]), first))
     head = ("hypothesis", _span(window), "whole run", "first fails at")
     return RunTable("Certificate: hypotheses of the stability proof", head, rows, _consequences(certificate))
 
@@ -79,7 +79,8 @@ def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float]
 def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
     """The largest weights of each axis of a memory, and how sure they are."""
     rows: list[tuple[str | float, ...]] = [
-        (one["axis"], one["regressor"], one["weight"], _share(one["variance"])) for one in certificate["memory"]
+        (entry["axis"], entry["regressor"], entry["weight"], _share(entry["variance"]))
+        for entry in certificate["memory"]
     ]
     sentences = [
         "The largest weights of each axis, in the unit of its acceleration. A variance of 100 % means that the motion "
@@ -88,11 +89,11 @@ def memory_rows(certificate: Mapping[str, Any]) -> RunTable:
         f"exceeds {_number(certificate['memory_bound'])}.",
     ]
     if "inertia" in certificate:
-        both = zip(certificate["inertia"], certificate["inertia_error"], strict=True)
-        found = ", ".join(
-            f"{ratio:.2f} +- {error:.2f}" if error < 1 else f"{ratio:.2f} (nothing found)" for ratio, error in both
+        estimates = zip(certificate["inertia"], certificate["inertia_error"], strict=True)
+        ratios = ", ".join(
+            f"{ratio:.2f} +- {error:.2f}" if error < 1 else f"{ratio:.2f} (nothing found)" for ratio, error in estimates
         )
-        sentences.append(f"Inertia of each axis over that of the nominal model, by probing: {found}.")
+        sentences.append(f"Inertia of each axis over that of the nominal model, by probing: {ratios}.")
     return RunTable("What the memory learnt", ("axis", "entry", "weight", "variance left"), rows, tuple(sentences))
 
 
@@ -100,14 +101,21 @@ def fault_rows(faults: Sequence[Mapping[str, Any]], inputs: Sequence[str]) -> Ru
     """Faults of a run, as its scenario has them, thrusters by their names: those of the inputs."""
     seconds = lambda value: f"{value:g} s" if isinstance(value, int | float) else f"{value[0]:g} to {value[1]:g} s"
     rows: list[tuple[str | float, ...]] = []
-    for one in faults:
-        target, number = one["target"], one.get("number", "")
+    for fault in faults:
+        target = fault["target"]
+        number = fault.get("number", "")
         if target == "thruster" and isinstance(number, int):
             number = inputs[number - 1]
         target = f"{target} {number}".rstrip()
-        severity, lasts = one.get("severity", "-"), one.get("duration")
+        severity, duration = fault.get("severity", "-"), fault.get("duration")
         rows.append(
-            (target, one["mode"], str(severity), seconds(one["onset"]), seconds(lasts) if lasts else "to the end")
+            (
+                target,
+                fault["mode"],
+                str(severity),
+                seconds(fault["onset"]),
+                seconds(duration) if duration else "to the end",
+            )
         )
     return RunTable("Faults", ("target", "mode", "severity", "onset", "duration"), rows)
 
@@ -115,31 +123,32 @@ def fault_rows(faults: Sequence[Mapping[str, Any]], inputs: Sequence[str]) -> Ru
 def navigation_rows(navigated: Mapping[str, Any]) -> RunTable:
     """What the navigation filter assumed of each sensor, its innovations, and whether it was as accurate as it said."""
     listed = lambda values: ", ".join(dict.fromkeys(f"{value:.3g}" for value in values)) or "-"
-    times = lambda one: ", ".join(
-        dict.fromkeys("constant" if time is None else f"{time:.3g}" for time in one["correlation_time"])
+    times = lambda sensor: ", ".join(
+        dict.fromkeys("constant" if time is None else f"{time:.3g}" for time in sensor["correlation_time"])
     )
     rows: list[tuple[str | float, ...]] = [
         (
-            one["sensor"],
-            listed(one["noise"]),
-            listed(one["correlated"]),
-            times(one) or "-",
-            one["innovation_rms"],
-            one["innovation_correlation"],
-            _share(one["inconsistent"]),
+            sensor["sensor"],
+            listed(sensor["noise"]),
+            listed(sensor["correlated"]),
+            times(sensor) or "-",
+            sensor["innovation_rms"],
+            sensor["innovation_correlation"],
+            _share(sensor["inconsistent"]),
         )
-        for one in navigated["sensors"]
+        for sensor in navigated["sensors"]
     ]
     head = ("sensor", "noise", "correlated error", "over (s)", "innovations", "correlation", "inconsistent for")
     nees = navigated["nees"]
-    said = "is not known before the steady window" if nees is None else f"is {nees:.3g}"
+    nees_words = "is not known before the steady window" if nees is None else f"is {nees:.3g}"
     sentences = (
-        f"NEES, the normalised estimation error squared of position, velocity and attitude, {said}; 9 is expected.",
+        f"NEES, the normalised estimation error squared of position, velocity and attitude, {nees_words}; 9 is "
+        "expected.",
         "Noise and correlated errors are the standard deviations that the filter assumed, in the units of the "
         "readings. Innovations are the rms of normalised ones and the correlation of successive ones over 30 s, at "
         "worst or, where they are consistent, at the end; 1 and 0 are as assumed. A constant error that no other "
         "sensor contradicts is in none of them.",
-        *(f"{one}." for one in navigated["findings"]),
+        *(f"{finding}." for finding in navigated["findings"]),
     )
     return RunTable("Navigation filter", head, rows, sentences)
 
@@ -154,9 +163,11 @@ def transition_rows(
         losses: names of these thrusters, and when, s; None where no monitor watched them.
     """
     sentences = [f"The supervisor took {name} out of use at {time:.6g} s." for name, time in losses or ()]
-    if losses is not None and not losses and any(one.reason in _TRACKING for one in transitions):
+    if losses is not None and not losses and any(transition.reason in _TRACKING for transition in transitions):
         sentences.append(_NOTHING_FOUND)
-    rows: list[tuple[str | float, ...]] = [(f"{one.time:.6g} s", one.state.name, one.why()) for one in transitions]
+    rows: list[tuple[str | float, ...]] = [
+        (f"{transition.time:.6g} s", transition.state.name, transition.why()) for transition in transitions
+    ]
     return RunTable("Supervision", ("time", "state", "reason: value, limit"), rows, tuple(sentences))
 
 
@@ -177,11 +188,11 @@ def _consequences(certificate: Mapping[str, Any]) -> tuple[str, ...]:
             f"5) the proof allows a residual of {_number(certificate['residual'])}."
         )
     if "estimation_within" in certificate:
-        kept, allowed = certificate["estimation_within"], certificate["estimation_bound"]
+        within, bounds = certificate["estimation_within"], certificate["estimation_bound"]
         moving = "|d_dot| of what the memory does not explain" if "memory" in certificate else "|d_dot|"
         sentences.append(
             f"|d_hat - d| is within the bound that follows from the largest recorded {moving} (up to "
-            f"{_number(None if None in allowed else max(allowed))}) for {_share(kept['steady'])} of the steady window."
+            f"{_number(None if None in bounds else max(bounds))}) for {_share(within['steady'])} of the steady window."
         )
     return tuple(sentences)
 

@@ -40,8 +40,10 @@ class ServoPacket(NamedTuple):
         magic = int.from_bytes(data[:2], "little")
         form = _FORMS.get(magic)
         if form is None:
-            known = " or ".join(map(str, CHANNELS_OF))
-            raise BadInput("packet", f"begin with {known}", str(magic) if len(data) > 1 else f"{len(data)} bytes")
+            magic_numbers = " or ".join(map(str, CHANNELS_OF))
+            raise BadInput(
+                "packet", f"begin with {magic_numbers}", str(magic) if len(data) > 1 else f"{len(data)} bytes"
+            )
         if len(data) != form.size:
             raise BadInput("packet", f"have {form.size} bytes with {magic}", str(len(data)))
         _, frame_rate, frame_count, *pwm = form.unpack(data)
@@ -62,7 +64,7 @@ def reply(timestamp: float, state: VehicleOutputs, channels: Channels, depth: fl
         depth: of the scenario's origin below the surface, m.
     """
     north, east, down = state.position.tolist()
-    found: dict[str, Any] = {
+    message: dict[str, Any] = {
         "timestamp": timestamp,
         "imu": {"gyro": state.body_velocity[3:].tolist(), "accel_body": state.specific_force.tolist()},
         "position": [north, east, down + depth],
@@ -70,12 +72,12 @@ def reply(timestamp: float, state: VehicleOutputs, channels: Channels, depth: fl
         "velocity": state.velocity.tolist(),
     }
     if len(state.battery):
-        found["battery"] = dict(zip(("voltage", "current"), state.battery.tolist(), strict=True))
+        message["battery"] = dict(zip(("voltage", "current"), state.battery.tolist(), strict=True))
     if len(state.propellers):
         speeds = channels.of_outputs(_PER_MINUTE * state.propellers, neutral=0.0)
-        found["rpm"] = {f"rpm_{number}": speeds[number] for number in sorted(speeds)}
-    return b"\n" + _compact(found) + b"\n"
+        message["rpm"] = {f"rpm_{number}": speeds[number] for number in sorted(speeds)}
+    return b"\n" + _compact(message) + b"\n"
 
 
-def _compact(found: Mapping[str, Any]) -> bytes:
-    return json.dumps(found, separators=(",", ":"), allow_nan=False).encode("ascii")
+def _compact(message: Mapping[str, Any]) -> bytes:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False).encode("ascii")

@@ -62,16 +62,16 @@ def serve(
     measured = latency or Durations()
     due = time.monotonic() + every
     while not session.ended and session.vehicle.time < duration - _LITTLE:
-        answered, begun = None, 0.0
+        newest_reply, arrival = None, 0.0
         for datagram, sender in _arriving(link, due):
-            begun = begun or time.perf_counter()
-            answered = session.answer(datagram, sender, time.monotonic()) or answered
-            if answered is not None and session.vehicle.time >= duration - _LITTLE:
+            arrival = arrival or time.perf_counter()
+            newest_reply = session.answer(datagram, sender, time.monotonic()) or newest_reply
+            if newest_reply is not None and session.vehicle.time >= duration - _LITTLE:
                 break
-        if answered is not None:
+        if newest_reply is not None:
             with contextlib.suppress(OSError):  # the network is down: ArduPilot sends its packet again
-                link.sendto(answered, session.sender)
-            measured.add(time.perf_counter() - begun)
+                link.sendto(newest_reply, session.sender)
+            measured.add(time.perf_counter() - arrival)
         if time.monotonic() >= due:
             report(status_line(session, measured))
             due = time.monotonic() + every
@@ -80,8 +80,8 @@ def serve(
 def status_line(session: Session, latency: Durations) -> str:
     """What is going on, in one line."""
     if session.sender is None:
-        others = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""
-        return f"waiting for ArduPilot{others}"
+        complaint = f"; {session.counts['invalid']} other packets: {session.complaint}" if session.complaint else ""
+        return f"waiting for ArduPilot{complaint}"
     north, east, down = session.vehicle.state().position
     parts = [
         f"{session.vehicle.time:.1f} s",

@@ -49,12 +49,16 @@ class Session:
     """
 
     def __init__(self, vehicle: SteppedVehicle, channels: Channels):
-        self.vehicle, self._channels, self._depth = vehicle, channels, vehicle.depth or 0.0
+        self.vehicle = vehicle
+        self._channels = channels
+        self._depth = vehicle.depth or 0.0
         self._neutral = float(vehicle.esc.neutral)
         self.counts = dict.fromkeys(_COUNTS, 0)
         self.complaint, self.ended, self.frame_rate, self.undriven = "", False, 0, 0
         self.sender: Any = None
-        self._last, self._received, self._answer = -1, -np.inf, b""
+        self._last = -1
+        self._received = -np.inf
+        self._answer = b""
         self._smaller: int | None = None  # frame count that was smaller than the last one
 
     def answer(self, datagram: bytes, sender: Any, now: float) -> bytes | None:
@@ -72,23 +76,25 @@ class Session:
             self.counts["invalid"] += 1
             self.complaint = str(error)
             return None
-        other = sender != self.sender
-        anew = packet.frame_count == 0 and self.sender is not None and sender[0] == self.sender[0]
-        if other and now - self._received < SILENCE and not anew:
+        from_another = sender != self.sender
+        new_process = packet.frame_count == 0 and self.sender is not None and sender[0] == self.sender[0]
+        if from_another and now - self._received < SILENCE and not new_process:
             self.counts["strangers"] += 1
             return None
-        if not other and packet.frame_count < self._last and now - self._received < SILENCE:
+        if not from_another and packet.frame_count < self._last and now - self._received < SILENCE:
             follows = self._smaller is not None and packet.frame_count - self._smaller in (0, 1)
             self._smaller = packet.frame_count
             if not follows:
                 self.counts["late"] += 1
                 return None
         self._smaller = None
-        known, self.sender, self._received = self.sender, sender, now
-        if packet.frame_count == self._last and not other:
+        previous_sender = self.sender
+        self.sender = sender
+        self._received = now
+        if packet.frame_count == self._last and not from_another:
             self.counts["repeated"] += 1
             return self._answer
-        self._place(packet.frame_count, other and known is not None)
+        self._place(packet.frame_count, from_another and previous_sender is not None)
         self.undriven = undriven
         self._advance(packet, pulses)
         return self._answer

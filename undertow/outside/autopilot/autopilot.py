@@ -110,7 +110,10 @@ class Autopilot(Uncopied):
         checks.positive("blend", blend, "s")
         form = Format(attitude, velocity)
         form.check()
-        self._loop, self.precision, self.sampling_time, self._blend = loop, precision, float(period), float(blend)
+        self._loop = loop
+        self.precision = precision
+        self.sampling_time = float(period)
+        self._blend = float(blend)
         conversion = output_of(output, loop.plant, loop.controller, esc)
         self.unit, self.plant = conversion.unit, loop.plant
         with runtime.on_processor(), runtime.in_precision(precision):
@@ -145,21 +148,29 @@ class Autopilot(Uncopied):
         if self._log is not None:
             self._log.close()
 
-    def _compile(self, of: Functions) -> None:
-        self._form, zero = of.form, jnp.zeros(len(self._loop.plant.outputs))
-        self._begin = step_of(lambda law, _, given: ((), of.first(law, given)), of.controller, (), of.given)
-        memory, going = self._begin.outputs[0], (of.given, of.applied, of.time + self.sampling_time)
-        self._go_on = step_of(
-            lambda law, memory, given: of.following(law, memory, *given), of.controller, memory, going
+    def _compile(self, functions: Functions) -> None:
+        self._form, zero = functions.form, jnp.zeros(len(self._loop.plant.outputs))
+        self._begin = step_of(
+            lambda law, _, received: ((), functions.first(law, received)), functions.controller, (), functions.given
         )
-        self._convert = step_of(lambda output, _, u: ((), output.of(u)), of.output, (), of.applied)
-        self._at = step_of(lambda reference, _, t: ((), reference.at(t)), starting_at(of.reference, zero), (), of.time)
+        memory = self._begin.outputs[0]
+        inputs = (functions.given, functions.applied, functions.time + self.sampling_time)
+        self._go_on = step_of(
+            lambda law, memory, received: functions.following(law, memory, *received),
+            functions.controller,
+            memory,
+            inputs,
+        )
+        self._convert = step_of(lambda output, _, u: ((), output.of(u)), functions.output, (), functions.applied)
+        self._at = step_of(
+            lambda reference, _, t: ((), reference.at(t)), starting_at(functions.reference, zero), (), functions.time
+        )
         self.backend = self._go_on.backend
         # What every step needs, looked up once. The arrays of the state are those of every step.
         self._supervisor = state_in(self._go_on.state)
         self._takes_raw_readings = self._loop.controller.takes_raw_readings
-        self._shapes = [place.shape for place in self._begin.inputs.motion]
-        self._no_report = jax.tree.map(lambda place: np.full(place.shape, np.nan), self._begin.inputs.actuator)
+        self._shapes = [leaf.shape for leaf in self._begin.inputs.motion]
+        self._no_report = jax.tree.map(lambda leaf: np.full(leaf.shape, np.nan), self._begin.inputs.actuator)
 
     def start(
         self,
@@ -203,8 +214,8 @@ class Autopilot(Uncopied):
         report = self._report(propellers, 0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
-        held = np.full_like(before, np.nan) if applied is None else before.copy()  # the caller's may change
-        self._received = ReceivedStep(motion, report, self._target(target), self._health(health), held, 0.0)
+        applied_input = np.full_like(before, np.nan) if applied is None else before.copy()  # the caller's may change
+        self._received = ReceivedStep(motion, report, self._target(target), self._health(health), applied_input, 0.0)
         put(self._begin.inputs, self._received[:4])
         self._begin()
         self._clock.begin()
@@ -262,9 +273,9 @@ class Autopilot(Uncopied):
         motion = self._motion(position, velocity, attitude)
         if _is_no_rotation(motion.attitude):
             motion = motion._replace(attitude=np.full(4, np.nan))  # so drivers say that they have none yet
-        given = self._command.copy() if applied is None else self._reported(applied)
+        applied_input = self._command.copy() if applied is None else self._reported(applied)
         report = self._no_report if propellers is None else self._report(propellers, np.nan)
-        goal = None if target is None else self._target(target)  # before anything changes
+        new_target = None if target is None else self._target(target)  # before anything changes
         healthy = self._health(health)
         passed = self._clock.passed(dt)
         elapsed = self.sampling_time if dt is None else float(dt)
@@ -272,7 +283,7 @@ class Autopilot(Uncopied):
             passed = elapsed  # whatever it is: a supervisor knows what to do with it
         elif not passed:
             return self._convert.outputs.copy()
-        self._received = ReceivedStep(motion, report, goal or self._target(None), healthy, given, elapsed)
+        self._received = ReceivedStep(motion, report, new_target or self._target(None), healthy, applied_input, elapsed)
         put(self._go_on.inputs, (*self._received[:5], passed))
         self._go_on()
         if not self.supervised:
@@ -305,7 +316,7 @@ class Autopilot(Uncopied):
             BadInput: `start` was not called.
         """
         self._check_started("save")
-        return packed(self._identity(), self._kept())
+        return packed(self._identity(), self._state_arrays())
 
     def restore(self, state: bytes) -> None:
         """Go on from a state that `save` gave.
@@ -313,13 +324,13 @@ class Autopilot(Uncopied):
         Raises:
             BadInput: it is damaged, or of another controller; everything stays as it was.
         """
-        restore_arrays(self._kept(), state, self._identity())
+        restore_arrays(self._state_arrays(), state, self._identity())
 
-    def _kept(self) -> list[np.ndarray]:
+    def _state_arrays(self) -> list[np.ndarray]:
         """Everything that changes from step to step."""
         steps = self._go_on.state, self._go_on.outputs, self._at.numbers, self._convert.outputs
-        own = self._command, self._before, self._blended, self._started, self._broken, self._restarts
-        return [*jax.tree.leaves(steps), *own, self._clock.numbers]
+        arrays = self._command, self._before, self._blended, self._started, self._broken, self._restarts
+        return [*jax.tree.leaves(steps), *arrays, self._clock.numbers]
 
     def _identity(self) -> bytes:
         """What states have in common that may be exchanged: structure and numbers of the controller, and formats."""
@@ -356,8 +367,9 @@ class Autopilot(Uncopied):
             BadInput: there is no such request, the scenario has no supervisor, or `start` was not called.
         """
         self._check_started("request")
-        checks.choice("request", what, tuple(one.name.lower() for one in Request))
-        supervised, request = self._supervised("request"), Request[what.upper()]
+        checks.choice("request", what, tuple(known_request.name.lower() for known_request in Request))
+        supervised = self._supervised("request")
+        request = Request[what.upper()]
         supervised.request[...] = int(request)
         if request is Request.RUN:
             supervised.place.held[...] = 0
@@ -412,31 +424,31 @@ class Autopilot(Uncopied):
         return {"command": command} | self._loop.controller.signals()
 
     def _motion(self, position: Any, velocity: Any, attitude: Any) -> MeasuredMotion:
-        given = zip(MeasuredMotion._fields, (position, attitude, velocity), self._shapes, strict=True)
-        return MeasuredMotion(*(numbers(name, value, shape) for name, value, shape in given))
+        parts = zip(MeasuredMotion._fields, (position, attitude, velocity), self._shapes, strict=True)
+        return MeasuredMotion(*(numbers(name, value, shape) for name, value, shape in parts))
 
     def _report(self, propellers: Any, missing: float) -> Any:
         """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
-        places, form = jax.tree.flatten(self._begin.inputs.actuator)
+        leaves, form = jax.tree.flatten(self._begin.inputs.actuator)
         if propellers is None:
-            return jax.tree.unflatten(form, [np.full(place.shape, missing) for place in places])
+            return jax.tree.unflatten(form, [np.full(leaf.shape, missing) for leaf in leaves])
         parts = propellers if isinstance(propellers, tuple) else (propellers,)
-        if not places:
+        if not leaves:
             raise BadInput("propellers", "be left out: the actuators of this plant report nothing", "given")
-        if len(parts) != len(places):
-            must = "be the speeds alone" if len(places) == 1 else "be (speeds, accelerations)"
+        if len(parts) != len(leaves):
+            must = "be the speeds alone" if len(leaves) == 1 else "be (speeds, accelerations)"
             raise BadInput("propellers", must, f"{len(parts)} parts")
-        found = [numbers("propellers", part, place.shape) for part, place in zip(parts, places, strict=True)]
-        return jax.tree.unflatten(form, found)
+        values = [numbers("propellers", part, leaf.shape) for part, leaf in zip(parts, leaves, strict=True)]
+        return jax.tree.unflatten(form, values)
 
     def _health(self, health: Any) -> Any:
         """Health of the actuators, of the form that the loop has; all work unless it is given."""
-        place = self._begin.inputs.health
-        if place is None and health is not None:
+        like = self._begin.inputs.health
+        if like is None and health is not None:
             raise BadInput("health", "be left out: no actuator of this scenario announces a failure", "given")
-        if place is None:
+        if like is None:
             return None
-        return np.ones(place.shape) if health is None else numbers("health", health, place.shape)
+        return np.ones(like.shape) if health is None else numbers("health", health, like.shape)
 
     def _target(self, target: Any) -> Target:
         """The target as given, or of the scenario's reference now."""
@@ -445,14 +457,14 @@ class Autopilot(Uncopied):
             self._at()
             return self._at.outputs
         shape = np.shape(self._begin.inputs.target.position)
-        several = isinstance(target, tuple | list) and len(target) and np.ndim(target[0]) > 0
-        parts = target if several or np.ndim(target) == 2 else (target,)
+        has_parts = isinstance(target, tuple | list) and len(target) and np.ndim(target[0]) > 0
+        parts = target if has_parts or np.ndim(target) == 2 else (target,)
         if len(parts) > 3:
             raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
-        found: list[Any] = [numbers("target", part, shape) for part in parts]
-        for part in found:
+        values: list[Any] = [numbers("target", part, shape) for part in parts]
+        for part in values:
             checks.finite("target", part)
-        return Target(*found, *[np.zeros(shape)] * (3 - len(found)))
+        return Target(*values, *[np.zeros(shape)] * (3 - len(values)))
 
     def _place_reference(self, position: np.ndarray) -> None:
         with runtime.on_processor(), runtime.in_precision(self.precision):
@@ -460,19 +472,20 @@ class Autopilot(Uncopied):
         put(self._at.numbers, eqx.filter(placed, eqx.is_array))
 
     def _input(self, applied: Any) -> np.ndarray:
-        found = numbers("applied", applied, self._command.shape)
-        checks.finite("applied", found)
-        return found
+        values = numbers("applied", applied, self._command.shape)
+        checks.finite("applied", values)
+        return values
 
     def _reported(self, applied: Any) -> np.ndarray:
         """The applied input; for entries that are not finite the commanded one."""
-        found = numbers("applied", applied, self._command.shape)
-        return np.where(np.isfinite(found), found, self._command)
+        values = numbers("applied", applied, self._command.shape)
+        return np.where(np.isfinite(values), values, self._command)
 
     def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
         low, high, most = transfer(self._loop.controller)
-        begun, command = np.clip(applied, low, high), self._go_on.outputs.command
+        begun = np.clip(applied, low, high)
+        command = self._go_on.outputs.command
         beyond = begun - command
         supervised.beyond[...] = beyond - np.clip(beyond, -most, most)
         command[...] += supervised.beyond
@@ -496,21 +509,22 @@ class Autopilot(Uncopied):
             return
         self._logged = True
         memory = self._go_on.state
-        own = {
+        step_signals = {
             "measured_position": memory.y.position,
             "measured_velocity": memory.y.velocity,
             "reference": memory.r.position,
             "commanded_input": self._command,
         }
         signals = self._go_on.outputs.signals
-        self._log.append(self._clock.time, own | signals | self._received.numbers())
+        self._log.append(self._clock.time, step_signals | signals | self._received.numbers())
 
 
 def _given(scenario: Any, allow_code: bool, sampling_time: float | None) -> tuple[ClosedLoop, str, float | None]:
     """Closed loop, precision and sampling time of what an autopilot is made from."""
     if isinstance(scenario, ClosedLoop):
         return scenario, "float64", None
-    built, placed = scenario, isinstance(scenario, Built)
+    built = scenario
+    placed = isinstance(scenario, Built)
     if not isinstance(built, Built):
         built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
     if built.scenario.loop.kind != "sampled":

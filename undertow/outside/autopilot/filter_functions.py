@@ -53,25 +53,25 @@ class FilterFunctions:
         self.filter = in_present_precision(navigation)
         self._report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
         self.pose = EstimatedMotion(jnp.zeros(3), jnp.zeros(6), jnp.array([1.0, 0, 0, 0]))
-        still = motion_of(self._measurement(self.pose), jnp.zeros(3), jnp.zeros(()))
-        self.at_rest = [sensor.reading(still) for sensor in self.filter.sensors]
+        motion_at_rest = motion_of(self._measurement(self.pose), jnp.zeros(3), jnp.zeros(()))
+        self.at_rest = [sensor.reading(motion_at_rest) for sensor in self.filter.sensors]
         self.sensors = {
-            name: one.size for name, one in zip(sensor_names(self.filter.sensors), self.at_rest, strict=True)
+            name: reading.size for name, reading in zip(sensor_names(self.filter.sensors), self.at_rest, strict=True)
         }
         self.delays = [float(sensor.sampling.delay) for sensor in self.filter.sensors]
-        self.nothing = tuple(Received(0 * one, jnp.asarray(False), jnp.zeros(())) for one in self.at_rest)
+        self.nothing = tuple(Received(0 * reading, jnp.asarray(False), jnp.zeros(())) for reading in self.at_rest)
 
-    def first(self, own: AbstractFilter, pose: EstimatedMotion) -> Any:
+    def first(self, navigation: AbstractFilter, pose: EstimatedMotion) -> Any:
         """State for a motion that is known."""
-        return own.start(self._measurement(pose))
+        return navigation.start(self._measurement(pose))
 
-    def following(self, own: AbstractFilter, state: Any, elapsed: Any, received: tuple[Received, ...]):
+    def following(self, navigation: AbstractFilter, state: Any, elapsed: Any, received: tuple[Received, ...]):
         """State and answer `elapsed` (s) later, with what the sensors delivered since."""
-        state = own.update(state, elapsed, received)
-        y = own.measurement(state)
+        state = navigation.update(state, elapsed, received)
+        y = navigation.measurement(state)
         assert y.body is not None
         motion = EstimatedMotion(y.position[:3], y.body.nu, y.body.attitude)
-        return state, FilterAnswer(motion, y.actuator, own.diagnostics(state))
+        return state, FilterAnswer(motion, y.actuator, navigation.diagnostics(state))
 
     def _measurement(self, pose: EstimatedMotion):
         return measurement_of_pose(pose.position, pose.attitude, pose.velocity, self._report)

@@ -44,7 +44,9 @@ class Functions:
     """
 
     def __init__(self, loop: ClosedLoop, form: Format, output: Output):
-        self.controller, self.output, self.reference = loop.controller, output, loop.reference
+        self.controller = loop.controller
+        self.output = output
+        self.reference = loop.reference
         truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
         self.form = None if truth.body is None else form
         kind = jax.dtypes.canonicalize_dtype(float)
@@ -59,17 +61,17 @@ class Functions:
         self.given = StepInputs(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
         self.applied, self.time = number(loop.plant.inputs()), number(())
 
-    def first(self, law: AbstractController, given: StepInputs) -> tuple[ControllerMemory, Answer]:
+    def first(self, law: AbstractController, inputs: StepInputs) -> tuple[ControllerMemory, Answer]:
         """The step with which control begins."""
-        return first_step(law, self._measured(law, given), given.target)
+        return first_step(law, self._measured(law, inputs), inputs.target)
 
-    def following(self, law: AbstractController, memory: ControllerMemory, given: StepInputs, applied: Any, dt: Any):
+    def following(self, law: AbstractController, memory: ControllerMemory, inputs: StepInputs, applied: Any, dt: Any):
         """A step `dt` (s) after the last one."""
-        return next_step(law, memory, self._measured(law, given), given.target, applied, dt)
+        return next_step(law, memory, self._measured(law, inputs), inputs.target, applied, dt)
 
-    def _measured(self, law: AbstractController, given: StepInputs):
-        measured = given.motion.measurement(law.model.coordinates, self.form, given.actuator)
-        return measured._replace(health=given.health)
+    def _measured(self, law: AbstractController, inputs: StepInputs):
+        measured = inputs.motion.measurement(law.model.coordinates, self.form, inputs.actuator)
+        return measured._replace(health=inputs.health)
 
 
 def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
@@ -78,11 +80,12 @@ def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:
         return np.ones(loop.plant.inputs(), dtype=jax.dtypes.canonicalize_dtype(float))
     if loop.faults is None:
         return None
-    faults, key = loop.faults, key_of_seed(0)
+    faults = loop.faults
+    key = key_of_seed(0)
 
     def health(truth: Measurement):
         realization = faults.realize(key)
         state = faults.init(realization, truth, jnp.zeros(loop.plant.inputs()))
         return faults.measurement(realization, state, jnp.zeros(()), truth)[0].health
 
-    return jax.tree.map(lambda one: np.ones(one.shape, one.dtype), jax.eval_shape(health, truth))
+    return jax.tree.map(lambda leaf: np.ones(leaf.shape, leaf.dtype), jax.eval_shape(health, truth))

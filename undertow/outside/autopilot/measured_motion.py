@@ -76,10 +76,12 @@ class Format(NamedTuple):
             rotation = rotation_from_quaternion(quaternion)
             angles = euler_from_rotation(rotation)
         else:
-            quaternion, angles = quaternion_from_euler(attitude), attitude
+            quaternion = quaternion_from_euler(attitude)
+            angles = attitude
             rotation = rotation_from_quaternion(quaternion)
         if self.velocity == "rates":
-            rates, nu = velocity, Kinematics(rotation).to_body(velocity)
+            rates = velocity
+            nu = Kinematics(rotation).to_body(velocity)
         else:
             nu = velocity if self.velocity == "body" else _in_body_axes(rotation, velocity)
             rates = Kinematics(rotation).to_world(nu)

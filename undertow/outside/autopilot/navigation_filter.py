@@ -67,23 +67,35 @@ class NavigationFilter(Uncopied):
         if not isinstance(navigation, SensorNavigation):
             raise BadInput("navigation", "be one of sensors: `kalman` or `observer`", built.scenario.navigation.kind)
         self.sampling_time = built.scenario.loop.dt
-        self._clock, self._started = StepClock(self.sampling_time), np.zeros((), dtype=bool)
+        self._clock = StepClock(self.sampling_time)
+        self._started = np.zeros((), dtype=bool)
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             self._compile(FilterFunctions(navigation.filter, built.closed_loop.plant))
-        declared, values = self.declared_signals(), self._go_on.outputs.signals
-        made = lambda path: StepLog(path, filter_signals(declared, values), self.sampling_time, self)
-        self._log = None if log is None else made(log)
+        declared = self.declared_signals()
+        values = self._go_on.outputs.signals
+        make_log = lambda path: StepLog(path, filter_signals(declared, values), self.sampling_time, self)
+        self._log = None if log is None else make_log(log)
 
     def close_log(self) -> None:
         """Finish the log, if there is one; later steps are not written."""
         if self._log is not None:
             self._log.close()
 
-    def _compile(self, of: FilterFunctions) -> None:
-        self.sensors, self._delays, self._signals = of.sensors, of.delays, of.filter.signals()
-        self._begin = step_of(lambda own, _, pose: ((), of.first(own, pose)), of.filter, (), of.pose)
-        state, given = jax.tree.map(jnp.asarray, self._begin.outputs), (jnp.zeros(()), of.nothing)
-        self._go_on = step_of(lambda own, state, given: of.following(own, state, *given), of.filter, state, given)
+    def _compile(self, functions: FilterFunctions) -> None:
+        self.sensors = functions.sensors
+        self._delays = functions.delays
+        self._signals = functions.filter.signals()
+        self._begin = step_of(
+            lambda navigation, _, pose: ((), functions.first(navigation, pose)), functions.filter, (), functions.pose
+        )
+        state = jax.tree.map(jnp.asarray, self._begin.outputs)
+        inputs = (jnp.zeros(()), functions.nothing)
+        self._go_on = step_of(
+            lambda navigation, state, inputs: functions.following(navigation, state, *inputs),
+            functions.filter,
+            state,
+            inputs,
+        )
         self.backend = self._go_on.backend
 
     def start(
@@ -100,20 +112,20 @@ class NavigationFilter(Uncopied):
         Raises:
             BadInput: a shape is wrong, a number is not finite, or a sensor is unknown.
         """
-        turned = np.shape(attitude) == (3,)
-        given = EstimatedMotion(
+        as_angles = np.shape(attitude) == (3,)
+        motion = EstimatedMotion(
             numbers("position", position, (3,)),
             numbers("velocity", velocity, (6,)),
-            numbers("attitude", attitude, (3,) if turned else (4,)),
+            numbers("attitude", attitude, (3,) if as_angles else (4,)),
         )
-        for name, value in zip(EstimatedMotion._fields, given, strict=True):
+        for name, value in zip(EstimatedMotion._fields, motion, strict=True):
             checks.finite(name, value)
-        length = 1.0 if turned else np.linalg.norm(given.attitude)
+        length = 1.0 if as_angles else np.linalg.norm(motion.attitude)
         if not length > 0:
             raise BadInput("attitude", "be a quaternion of some length", "zero")
-        angles = quaternions(given.attitude) if turned else given.attitude / length
+        angles = quaternions(motion.attitude) if as_angles else motion.attitude / length
         received = self._received(readings or {}, {})
-        put(self._begin.inputs, given._replace(attitude=angles))
+        put(self._begin.inputs, motion._replace(attitude=angles))
         self._begin()
         put(self._go_on.state, self._begin.outputs)
         self._clock.begin()
@@ -137,9 +149,9 @@ class NavigationFilter(Uncopied):
             raise BadInput("start", "be called before `step`", "not")
         received = self._received(readings, ages or {})
         before = self._clock.time
-        passed = self._clock.passed(dt)
-        on_time = passed == self.sampling_time  # then rounded as the times of a simulation are
-        return self._stepped(self._clock.time - before if on_time else passed, received)
+        elapsed = self._clock.passed(dt)
+        on_time = elapsed == self.sampling_time  # then rounded as the times of a simulation are
+        return self._stepped(self._clock.time - before if on_time else elapsed, received)
 
     def signals(self) -> dict[str, np.ndarray]:
         """Values of the signals of the last step, such as the standard deviation of each output."""
@@ -163,7 +175,7 @@ class NavigationFilter(Uncopied):
         """The state; a filter that is made alike goes on from it with the same bits."""
         if not self._started:
             raise BadInput("start", "be called before `save`", "not")
-        return packed(self._identity(), self._kept())
+        return packed(self._identity(), self._state_arrays())
 
     def restore(self, state: bytes) -> None:
         """Go on from a state that `save` gave.
@@ -171,9 +183,9 @@ class NavigationFilter(Uncopied):
         Raises:
             BadInput: it is damaged, or of another filter; everything stays as it was.
         """
-        restore_arrays(self._kept(), state, self._identity())
+        restore_arrays(self._state_arrays(), state, self._identity())
 
-    def _kept(self) -> list[np.ndarray]:
+    def _state_arrays(self) -> list[np.ndarray]:
         steps = jax.tree.leaves((self._go_on.state, self._go_on.outputs))
         return [*steps, self._started, self._clock.numbers]
 
@@ -182,23 +194,25 @@ class NavigationFilter(Uncopied):
         return repr(form).encode() + b"".join(number.tobytes() for number in jax.tree.leaves(self._go_on.numbers))
 
     def _received(self, readings: Mapping[str, Any], ages: Mapping[str, float]) -> list[tuple[Any, bool, float]]:
-        for what, given in (("readings", readings), ("ages", ages)):
-            if not isinstance(given, Mapping):
-                raise BadInput(what, "be a mapping from the name of a sensor", repr(given))
-            for name in given:
+        for argument, by_sensor in (("readings", readings), ("ages", ages)):
+            if not isinstance(by_sensor, Mapping):
+                raise BadInput(argument, "be a mapping from the name of a sensor", repr(by_sensor))
+            for name in by_sensor:
                 if name not in self.sensors:
                     raise BadInput(
-                        what, "be of sensors of the scenario", repr(name), hint=did_you_mean(name, self.sensors)
+                        argument, "be of sensors of the scenario", repr(name), hint=did_you_mean(name, self.sensors)
                     )
-        found = []
+        received = []
         for (name, size), delay in zip(self.sensors.items(), self._delays, strict=True):
             new = name in readings and readings[name] is not None
-            given = readings[name] if new else np.zeros(size)
-            value = numbers(f"readings[{name!r}]", [given] if size == 1 and np.ndim(given) == 0 else given, (size,))
+            reading = readings[name] if new else np.zeros(size)
+            value = numbers(
+                f"readings[{name!r}]", [reading] if size == 1 and np.ndim(reading) == 0 else reading, (size,)
+            )
             age = ages.get(name, delay)
             checks.not_negative(f"ages[{name!r}]", age)
-            found.append((value, new, age))
-        return found
+            received.append((value, new, age))
+        return received
 
     def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
         put(self._go_on.inputs, (elapsed, received))
@@ -207,6 +221,6 @@ class NavigationFilter(Uncopied):
         if self._log is not None:
             attitude = attitudes_of_quaternions(motion.attitude[None], "NED", "FRD")[0]
             velocities = {"body_velocity": motion.velocity[:3], "angular_velocity": motion.velocity[3:]}
-            own = {"position": motion.position, "attitude": attitude} | velocities
-            self._log.append(self._clock.time, own | self._go_on.outputs.signals)
+            estimate = {"position": motion.position, "attitude": attitude} | velocities
+            self._log.append(self._clock.time, estimate | self._go_on.outputs.signals)
         return motion

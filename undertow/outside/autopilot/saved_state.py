@@ -17,8 +17,8 @@ _HASH, _SUM = 32, 4  # bytes
 def packed(identity: bytes, arrays: Sequence[np.ndarray]) -> bytes:
     """Arrays as bytes; `identity` tells states of one autopilot from those of others."""
     body = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
-    whole = _MAGIC + hashlib.sha256(identity).digest() + body
-    return whole + zlib.crc32(whole).to_bytes(_SUM, "little")
+    content = _MAGIC + hashlib.sha256(identity).digest() + body
+    return content + zlib.crc32(content).to_bytes(_SUM, "little")
 
 
 def unpacked(state: Any, identity: bytes, like: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -29,17 +29,20 @@ def unpacked(state: Any, identity: bytes, like: Sequence[np.ndarray]) -> list[np
     """
     if not isinstance(state, bytes | bytearray | memoryview):
         raise BadInput("state", "be the bytes that `save` gives", f"a {type(state).__name__}")
-    given, head = bytes(state), len(_MAGIC) + _HASH
-    if not given.startswith(_MAGIC):
-        raise BadInput("state", "be the bytes that `save` gives", f"{len(given)} other bytes")
-    whole, ends = given[:-_SUM], given[-_SUM:]
-    if zlib.crc32(whole).to_bytes(_SUM, "little") != ends:
+    data = bytes(state)
+    header_size = len(_MAGIC) + _HASH
+    if not data.startswith(_MAGIC):
+        raise BadInput("state", "be the bytes that `save` gives", f"{len(data)} other bytes")
+    content = data[:-_SUM]
+    checksum = data[-_SUM:]
+    if zlib.crc32(content).to_bytes(_SUM, "little") != checksum:
         raise BadInput("state", "be undamaged", "damaged: its checksum is wrong")
     sizes = [array.nbytes for array in like]
-    if whole[len(_MAGIC) : head] != hashlib.sha256(identity).digest() or len(whole) != head + sum(sizes):
+    is_same = content[len(_MAGIC) : header_size] == hashlib.sha256(identity).digest()
+    if not is_same or len(content) != header_size + sum(sizes):
         raise BadInput("state", "be that of the same controller with the same numbers and formats", "of another")
-    ends_at = np.cumsum([head, *sizes])
-    parts = [whole[start:end] for start, end in itertools.pairwise(ends_at)]
+    ends_at = np.cumsum([header_size, *sizes])
+    parts = [content[start:end] for start, end in itertools.pairwise(ends_at)]
     return [np.frombuffer(part, array.dtype).reshape(array.shape) for part, array in zip(parts, like, strict=True)]
 
 

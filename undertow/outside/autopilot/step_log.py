@@ -61,15 +61,17 @@ class ReceivedStep(NamedTuple):
 
     def numbers(self) -> dict[str, Any]:
         """The numbers by name of the signal; reports of several kinds one behind the other."""
-        found = {f"received_{name}": value for name, value in zip(MeasuredMotion._fields, self.motion, strict=True)}
+        numbers_by_name = {
+            f"received_{name}": value for name, value in zip(MeasuredMotion._fields, self.motion, strict=True)
+        }
         reports = jax.tree.leaves(self.actuator)
         if reports:
-            found["received_report"] = np.concatenate([np.ravel(one) for one in reports])
+            numbers_by_name["received_report"] = np.concatenate([np.ravel(report) for report in reports])
         if self.health is not None:
-            found["received_health"] = self.health
+            numbers_by_name["received_health"] = self.health
         reference = {"reference_velocity": self.target.velocity, "reference_acceleration": self.target.acceleration}
-        found |= reference | {"applied_input": self.applied, "elapsed": self.elapsed}
-        return {name: value for name, value in found.items() if np.size(value)}
+        numbers_by_name |= reference | {"applied_input": self.applied, "elapsed": self.elapsed}
+        return {name: value for name, value in numbers_by_name.items() if np.size(value)}
 
 
 class StepLog:
@@ -105,7 +107,9 @@ class StepLog:
     ):
         path = _free(Path(path))
         self.path = path
-        self._period, self._offset, self._last = period, 0.0, -np.inf
+        self._period = period
+        self._offset = 0.0
+        self._last = -np.inf
         if path.suffix != ".mcap":
             raise BadInput("log", "be a file whose name ends in .mcap", str(path))
         facts = {"sampling_time": f"{period!r} s"} | dict(facts or {})
@@ -141,7 +145,7 @@ class StepLog:
 def _free(path: Path) -> Path:
     """The path, or, where a file is there, the next one with a number at which there is nothing."""
     numbered = (path.with_stem(f"{path.stem}-{i}") for i in itertools.count(2))
-    return next(one for one in numbered if not one.exists()) if path.is_file() else path
+    return next(candidate for candidate in numbered if not candidate.exists()) if path.is_file() else path
 
 
 def _close(writer: BackgroundWriter, path: Path) -> None:
@@ -162,16 +166,18 @@ def law_signals(
         declared: signals of the law.
         values: examples of them.
     """
-    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    outputs = plant.outputs
+    inputs = thruster_columns(plant.inputs())
     axes = law.model.coordinates.axes or outputs
-    found = {}
+    series = {}
     for name, signal in (_STEPS | dict(declared)).items():
-        ours, first = name in _STEPS, next(iter(signal.dimensions), "")
+        ours = name in _STEPS
+        first = next(iter(signal.dimensions), "")
         shape = (len(inputs if first == "actuator" else outputs),) if ours else np.shape(values[name])
         columns = {"axis": outputs if ours else axes, "actuator": inputs}.get(first, ())
         unit = signal.unit_for(plant.output_units, plant.input_unit)
-        found[name] = Series(np.zeros(1), np.zeros((1, *shape)), columns, unit, signal.meaning)
-    return found
+        series[name] = Series(np.zeros(1), np.zeros((1, *shape)), columns, unit, signal.meaning)
+    return series
 
 
 def received_signals(plant: AbstractPlant, form: Format | None, numbers: Mapping[str, Any]) -> dict[str, Series]:
@@ -182,19 +188,22 @@ def received_signals(plant: AbstractPlant, form: Format | None, numbers: Mapping
         form: of the measured motion; None for a plant that is no vehicle.
         numbers: examples, of `ReceivedStep.numbers`.
     """
-    outputs, inputs = plant.outputs, thruster_columns(plant.inputs())
+    outputs = plant.outputs
+    inputs = thruster_columns(plant.inputs())
     names = MeasuredMotion(outputs, (), outputs) if form is None else form.columns()
-    columns = {f"received_{name}": found for name, found in zip(MeasuredMotion._fields, names, strict=True)}
+    columns = {
+        f"received_{name}": column_names for name, column_names in zip(MeasuredMotion._fields, names, strict=True)
+    }
     columns |= dict.fromkeys(("reference_velocity", "reference_acceleration"), outputs)
     columns |= dict.fromkeys(("received_health", "applied_input"), inputs)
-    made = lambda name, value: Series(
+    make_series = lambda name, value: Series(
         np.zeros(1),
         np.zeros((1, *np.shape(value))),
         columns.get(name, ()),
         _RECEIVED[name].unit_for(plant.output_units, plant.input_unit),
         _RECEIVED[name].meaning,
     )
-    return {name: made(name, value) for name, value in numbers.items()}
+    return {name: make_series(name, value) for name, value in numbers.items()}
 
 
 def filter_signals(declared: Mapping[str, Signal], values: Mapping[str, Any]) -> dict[str, Series]:
@@ -204,12 +213,18 @@ def filter_signals(declared: Mapping[str, Signal], values: Mapping[str, Any]) ->
         declared: signals of the filter.
         values: examples of them.
     """
-    known = {name: SIGNALS[name] for name in ("position", "attitude", "body_velocity", "angular_velocity")}
-    found = {
-        name: Series(np.zeros(1), np.zeros((1, len(one.columns))), one.columns, one.unit, f"estimated {one.meaning}")
-        for name, one in known.items()
+    motion = {name: SIGNALS[name] for name in ("position", "attitude", "body_velocity", "angular_velocity")}
+    series = {
+        name: Series(
+            np.zeros(1),
+            np.zeros((1, len(known_signal.columns))),
+            known_signal.columns,
+            known_signal.unit,
+            f"estimated {known_signal.meaning}",
+        )
+        for name, known_signal in motion.items()
     }
     for name, signal in declared.items():
         unit = signal.unit_for(("m", "rad"), "")
-        found[name] = Series(np.zeros(1), np.asarray(values[name])[None], (), unit, signal.meaning)
-    return found
+        series[name] = Series(np.zeros(1), np.asarray(values[name])[None], (), unit, signal.meaning)
+    return series

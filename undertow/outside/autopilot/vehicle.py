@@ -145,14 +145,17 @@ class Vehicle(Uncopied):
         built = scenario
         if not isinstance(built, Built):
             built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
-        settings, self._loop = built.scenario.loop, built.closed_loop
+        settings = built.scenario.loop
+        self._loop = built.closed_loop
         self.sampling_time = float(settings.dt if sampling_time is None else sampling_time)
         self.duration = float(settings.duration)
         self.plant, self.esc, self.unit = self._loop.plant, None, self._loop.plant.input_unit
         if command == "pulses":
             driven = pulse_driven(self.plant, battery_suffices=True)
-            self.esc, self.unit = esc or driven.power.esc or usual_esc(), "us"
-        self.thrusters, self.precision = self.plant.inputs(), built.scenario.precision
+            self.esc = esc or driven.power.esc or usual_esc()
+            self.unit = "us"
+        self.thrusters = self.plant.inputs()
+        self.precision = built.scenario.precision
         self._integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
         self._substeps = settings.substeps
         with runtime.on_processor(), runtime.in_precision(self.precision):
@@ -170,36 +173,38 @@ class Vehicle(Uncopied):
         types, _ = eqx.filter_eval_shape(self._first, realization, self._start)
         state = jax.tree.map(lambda value, like: jnp.asarray(value, like.dtype), self._begin.outputs[0], types)
         zero = np.zeros((), dtype=jax.dtypes.canonicalize_dtype(float))
-        given = _Given(zero, zero, zero, np.zeros(self.thrusters, dtype=zero.dtype))
-        self._go_on = step_of(self._next, (realization, self.esc), state, given)
+        step_inputs = _Given(zero, zero, zero, np.zeros(self.thrusters, dtype=zero.dtype))
+        self._go_on = step_of(self._next, (realization, self.esc), state, step_inputs)
         self.backend = self._go_on.backend
 
     def _first(self, part: Realization, start: Any) -> tuple[PlantState, _Shown]:
         state, observation = plant_step.begin(part, start)
         return state, self._shown(observation, observation.truth, jnp.zeros(()))
 
-    def _next(self, part: tuple[Realization, ESC | None], state: PlantState, given: _Given):
-        realization, speed_controllers = part
-        plant, t = realization.loop.plant, given.t
+    def _next(self, realization_and_esc: tuple[Realization, ESC | None], state: PlantState, step_inputs: _Given):
+        realization, speed_controllers = realization_and_esc
+        plant = realization.loop.plant
+        t = step_inputs.t
         if speed_controllers is None:
-            applied = plant.admissible(state.plant, given.command)
+            applied = plant.admissible(state.plant, step_inputs.command)
         else:
             assert isinstance(plant, HybridVehicle)
-            applied = applied_voltage(plant, speed_controllers, state.plant, given.command)
-        new = plant_step.hold(realization, state, t, given.dt, applied, self._integrate, self._substeps)
+            applied = applied_voltage(plant, speed_controllers, state.plant, step_inputs.command)
+        new = plant_step.hold(realization, state, t, step_inputs.dt, applied, self._integrate, self._substeps)
         status = status_of(realization.loop, new.plant, ())
         going_on = jnp.stack([status == int(good) for good in _GOING_ON]).any()
         # The last valid state is kept.
         new = new._replace(plant=jax.tree.map(lambda n, o: jnp.where(going_on, n, o), new.plant, state.plant))
-        new, observation = plant_step.observe(realization, new, given.end, applied)
+        new, observation = plant_step.observe(realization, new, step_inputs.end, applied)
         before = plant.output(t, state.plant)
-        return new, self._shown(observation._replace(status=status), before, given.dt)
+        return new, self._shown(observation._replace(status=status), before, step_inputs.dt)
 
     def _shown(self, observation: PlantObservation, before: Measurement, dt: Any) -> _Shown:
-        truth, force = observation.truth, ()
+        truth = observation.truth
+        force = ()
         if self._form is not None:
             force = motion_of(truth, before.velocity[:3], dt).specific_force
-        measured, true = (motion_in(self._form, seen) for seen in (observation.measurement, truth))
+        measured, true = (motion_in(self._form, motion) for motion in (observation.measurement, truth))
         return _Shown(observation, measured, true, force)
 
     def restart(self, seed: int | None = None) -> VehicleOutput:
@@ -263,12 +268,12 @@ class Vehicle(Uncopied):
             self._step(command, self.sampling_time)
             return self.output
         checks.positive("dt", dt, "s")
-        whole = int(dt / self.sampling_time * (1 + _WHOLE))
-        rest = dt - whole * self.sampling_time
-        for _ in range(whole):
+        whole_steps = int(dt / self.sampling_time * (1 + _WHOLE))
+        remainder = dt - whole_steps * self.sampling_time
+        for _ in range(whole_steps):
             self._step(command, self.sampling_time)
-        if rest > _WHOLE * self.sampling_time:
-            self._step(command, rest)
+        if remainder > _WHOLE * self.sampling_time:
+            self._step(command, remainder)
         return self.output
 
     def _step(self, command: np.ndarray, dt: float) -> None:
@@ -280,8 +285,8 @@ class Vehicle(Uncopied):
         self._go_on()
         self._show(self._go_on.outputs)
 
-    def _show(self, shown: _Shown) -> None:
-        copied = jax.tree.map(np.copy, shown)
+    def _show(self, output_of_step: _Shown) -> None:
+        copied = jax.tree.map(np.copy, output_of_step)
         observation, measured = copied.observation, copied.measured
         propellers = tuple(jax.tree.leaves(observation.measurement.actuator)) or None
         self.output = VehicleOutput(

@@ -81,9 +81,10 @@ class Exported(NamedTuple):
             BadInput: a file is there already.
             OSError: the folder cannot be written.
         """
-        there = [name for name in self.files if (folder / name).exists()]
-        if there and not overwrite:
-            must, got = "be a folder without the files of an export", f"one with {there[0]}"
+        existing = [name for name in self.files if (folder / name).exists()]
+        if existing and not overwrite:
+            must = "be a folder without the files of an export"
+            got = f"one with {existing[0]}"
             raise BadInput(option, must, got, hint="Use --overwrite")
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self.files.items():
@@ -110,23 +111,33 @@ class CProgram:
             raise BadInput("name", f"not be one of {', '.join(_TAKEN)}, which are in the Makefile", system.name)
         check_compiler()
         c99 = simdjit.c99
-        self.system, self._c99, self._source = system, c99, c99.Source()
+        self.system = system
+        self._c99 = c99
+        self._source = c99.Source()
         self._state, results = jax.eval_shape(system.start, system.inputs)
         self.fields = {"state": fields(self._state), "input": fields(system.inputs), "output": fields(results)}
-        state, given, written = (places(struct, found) for struct, found in self.fields.items())
-        both, name = [*state, *written], system.name
+        state_names, input_names, output_names = (places(struct, members) for struct, members in self.fields.items())
+        name = system.name
+        # Both functions write state and output. Only the step reads the state, which nothing has set before the start.
+        written_names = [*state_names, *output_names]
         arguments = f"{name}_state *state, const {name}_input *input, {name}_output *output"
-        later = (self._state, system.inputs)
-        self._source.add(f"void {name}_start({arguments})", system.start, (system.inputs,), given, both, ("input",))
-        self._source.add(f"void {name}_step({arguments})", system.step, later, [*state, *given], both)
-        self._functions, self._meanings = functions, dict(system.meanings)
+        step_inputs = (self._state, system.inputs)
+        self._source.add(
+            f"void {name}_start({arguments})", system.start, (system.inputs,), input_names, written_names, ("input",)
+        )
+        self._source.add(
+            f"void {name}_step({arguments})", system.step, step_inputs, [*state_names, *input_names], written_names
+        )
+        self._functions = functions
+        self._meanings = dict(system.meanings)
         time = np.zeros((), dtype=_real(system.inputs))
         self.kind = c99.TYPES[str(time.dtype)]
-        for one in functions:
-            self.fields[one.struct] = fields(jax.eval_shape(one.of, time))
-            self._meanings[one.struct] = one.meaning
-            signature, target = self._signature(one), places(one.struct, self.fields[one.struct])
-            self._source.add(signature, one.of, (time,), ["t"], target, ("t",))
+        for function in functions:
+            self.fields[function.struct] = fields(jax.eval_shape(function.of, time))
+            self._meanings[function.struct] = function.meaning
+            signature = self._signature(function)
+            target = places(function.struct, self.fields[function.struct])
+            self._source.add(signature, function.of, (time,), ["t"], target, ("t",))
 
     def files(self) -> dict[str, str]:
         """Source, header, test with its steps, and a Makefile."""
@@ -142,9 +153,10 @@ class CProgram:
 
     def header(self) -> str:
         """The header file."""
-        system, name = self.system, self.system.name
-        structs = [self._struct(what, found) for what, found in self.fields.items()]
-        further = [f"/* {one.comment} */\n{self._signature(one)};\n" for one in self._functions]
+        system = self.system
+        name = self.system.name
+        structs = [self._struct(struct, members) for struct, members in self.fields.items()]
+        further = [f"/* {function.comment} */\n{self._signature(function)};\n" for function in self._functions]
         return _HEADER.format(
             about=system.about,
             guard=f"{name.upper()}_H",
@@ -158,38 +170,40 @@ class CProgram:
             further="\n".join(further) + "\n" if further else "",
         )
 
-    def _signature(self, one: CFunction) -> str:
+    def _signature(self, function: CFunction) -> str:
         name = self.system.name
-        return f"void {name}_{one.what}({self.kind} t, {name}_{one.struct} *{one.struct})"
+        return f"void {name}_{function.what}({self.kind} t, {name}_{function.struct} *{function.struct})"
 
-    def _struct(self, what: str, members: list[Field]) -> str:
+    def _struct(self, struct: str, members: list[Field]) -> str:
         lines = [
-            f"    {self._c99.TYPES[one.dtype]} {one.name}{''.join(f'[{size}]' for size in one.shape)};"
-            + (f" /* {said} */" if (said := self._meanings.get(f"{what}.{one.name}")) else "")
-            for one in members
-            if one.size
+            f"    {self._c99.TYPES[member.dtype]} {member.name}{''.join(f'[{size}]' for size in member.shape)};"
+            + (f" /* {meaning} */" if (meaning := self._meanings.get(f"{struct}.{member.name}")) else "")
+            for member in members
+            if member.size
         ]
         # C has no struct without a member.
         lines = lines or ["    char nothing;"]
-        head = f"/* {self._meanings[what]} */"
-        return "\n".join([head, "typedef struct {", *lines, f"}} {self.system.name}_{what};", ""])
+        head = f"/* {self._meanings[struct]} */"
+        return "\n".join([head, "typedef struct {", *lines, f"}} {self.system.name}_{struct};", ""])
 
     def _vectors(self) -> str:
         """Random steps and what the batch compiler gives for them."""
-        system, chance = self.system, np.random.default_rng(0)
-        kept = jax.tree.map(lambda leaf: np.zeros(leaf.shape, leaf.dtype), self._state)
-        first = CompiledStep(lambda _, __, given: ((), system.start(given)), (), (), system.inputs)
-        later = CompiledStep(lambda _, state, given: system.step(state, given), (), kept, system.inputs)
-        given, results = [], []
+        system = self.system
+        chance = np.random.default_rng(0)
+        zero_state = jax.tree.map(lambda leaf: np.zeros(leaf.shape, leaf.dtype), self._state)
+        first = CompiledStep(lambda _, __, inputs: ((), system.start(inputs)), (), (), system.inputs)
+        later = CompiledStep(lambda _, state, inputs: system.step(state, inputs), (), zero_state, system.inputs)
+        rows_of_inputs, rows_of_outputs = [], []
         for k in range(_VECTORS):
-            taken, inputs = (later if k else first), system.sample(chance, k)
-            put(taken.inputs, inputs)
-            taken()
+            compiled = later if k else first
+            inputs = system.sample(chance, k)
+            put(compiled.inputs, inputs)
+            compiled()
             if k == 0:
                 put(later.state, first.outputs[0])
-            given.append(self._initialiser(jax.tree.leaves(taken.inputs)))
-            results.append(self._initialiser(jax.tree.leaves(later.outputs if k else first.outputs[1])))
-        inputs, outputs = (",\n    ".join(rows) for rows in (given, results))
+            rows_of_inputs.append(self._initialiser(jax.tree.leaves(compiled.inputs)))
+            rows_of_outputs.append(self._initialiser(jax.tree.leaves(later.outputs if k else first.outputs[1])))
+        inputs, outputs = (",\n    ".join(rows) for rows in (rows_of_inputs, rows_of_outputs))
         return _VECTORS_FILE.format(
             about=system.about, name=system.name, count=_VECTORS, inputs=inputs, outputs=outputs
         )
@@ -219,9 +233,9 @@ def has_counterpart(function: Callable, *arguments: Any) -> bool:
     """Whether a function of arrays can be written in C."""
     c99 = simdjit.c99
     count = sum(leaf.size for leaf in jax.tree.leaves(jax.eval_shape(function, *arguments)))
-    given = sum(np.size(leaf) for leaf in jax.tree.leaves(arguments))
+    numbers = sum(np.size(leaf) for leaf in jax.tree.leaves(arguments))
     try:
-        c99.Source().add("void tried(void)", function, arguments, ["x"] * given, ["x"] * count)
+        c99.Source().add("void tried(void)", function, arguments, ["x"] * numbers, ["x"] * count)
     except Unsupported:
         return False
     return True
@@ -229,17 +243,19 @@ def has_counterpart(function: Callable, *arguments: Any) -> bool:
 
 def fields(tree: Any) -> list[Field]:
     """Members for the arrays of a tree, named by their paths."""
-    found = []
+    members = []
     for path, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]:
         steps = [getattr(step, "name", getattr(step, "key", getattr(step, "idx", ""))) for step in path]
-        found.append(Field("_".join(map(str, steps)), tuple(leaf.shape), str(leaf.dtype)))
-    return found
+        members.append(Field("_".join(map(str, steps)), tuple(leaf.shape), str(leaf.dtype)))
+    return members
 
 
 def places(struct: str, members: list[Field]) -> list[str]:
     """Where each number of some members lies."""
     return [
-        f"{struct}->{one.name}{''.join(f'[{i}]' for i in index)}" for one in members for index in np.ndindex(*one.shape)
+        f"{struct}->{member.name}{''.join(f'[{i}]' for i in index)}"
+        for member in members
+        for index in np.ndindex(*member.shape)
     ]
 
 

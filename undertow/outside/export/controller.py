@@ -65,8 +65,8 @@ def export_controller(
         BadInput: a format is unknown, or the controller needs something that has no counterpart in C99.
     """
     form = Format(attitude, velocity)
-    chosen = checked(precision or built.scenario.precision, form)
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    checked_precision = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(checked_precision):
         files = controller_program(built, name, functions_of(built, form, output, esc)).files()
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
@@ -89,67 +89,73 @@ def functions_of(built: Built, form: Format, output: str = "input", esc: ESC | N
     return Functions(loop, form, output_of(output, loop.plant, loop.controller, esc))
 
 
-def controller_program(built: Built, name: str, of: Functions) -> CProgram:
+def controller_program(built: Built, name: str, functions: Functions) -> CProgram:
     """The C program of a controller, in the present precision.
 
     Raises:
         BadInput: the name is none for C, or the controller needs something that has no counterpart in C99.
     """
-    reference = starting_at(of.reference, of.given.target.position)
+    reference = starting_at(functions.reference, functions.given.target.position)
     target = "Target of the scenario's reference at a time."
     further = CFunction("reference", "target", target, reference.at, "Target of the scenario's reference at t, s.")
     try:
-        return CProgram(_system(built, name, of), [further])
+        return CProgram(_system(built, name, functions), [further])
     except Unsupported as error:
         must = "be made of operations that the batch compiler has"
         raise BadInput("controller", must, f"one that needs others: {error}") from None
 
 
-def _system(built: Built, name: str, of: Functions) -> System:
+def _system(built: Built, name: str, functions: Functions) -> System:
     period, unit = built.scenario.loop.dt, built.closed_loop.plant.input_unit
-    inputs = ControllerInput(*of.given, of.applied, np.asarray(period, dtype=of.time.dtype))
+    inputs = ControllerInput(*functions.given, functions.applied, np.asarray(period, dtype=functions.time.dtype))
 
     def answered(memory, answer):
-        return memory, ControllerOutput(answer.command, of.output.of(answer.command))
+        return memory, ControllerOutput(answer.command, functions.output.of(answer.command))
 
     def start(inputs: ControllerInput):
-        return answered(*of.first(of.controller, StepInputs(*inputs[:4])))
+        return answered(*functions.first(functions.controller, StepInputs(*inputs[:4])))
 
     def step(memory, inputs: ControllerInput):
         """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was.
 
         A supervisor gets the time as it is.
         """
-        if of.controller.takes_raw_readings:
-            return answered(*of.following(of.controller, memory, StepInputs(*inputs[:4]), inputs.applied, inputs.dt))
+        if functions.controller.takes_raw_readings:
+            return answered(
+                *functions.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, inputs.dt)
+            )
         usual = jnp.asarray(period, dtype=inputs.dt.dtype)
-        passed = (inputs.dt > 0) & (inputs.dt < jnp.inf)
-        elapsed = jnp.where(passed, jnp.minimum(inputs.dt, MISSED * usual), usual)
-        after, answer = answered(*of.following(of.controller, memory, StepInputs(*inputs[:4]), inputs.applied, elapsed))
-        return jax.tree.map(lambda new, old: jnp.where(passed, new, old), after, memory), answer
+        is_valid = (inputs.dt > 0) & (inputs.dt < jnp.inf)
+        elapsed = jnp.where(is_valid, jnp.minimum(inputs.dt, MISSED * usual), usual)
+        after, answer = answered(
+            *functions.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, elapsed)
+        )
+        return jax.tree.map(lambda new, old: jnp.where(is_valid, new, old), after, memory), answer
 
     def sample(chance: np.random.Generator, _: int) -> ControllerInput:
         random = lambda leaf: np.asarray(leaf + _SPREAD * chance.normal(size=leaf.shape), dtype=leaf.dtype)
         return jax.tree.map(random, inputs)._replace(dt=inputs.dt)
 
     about = made_from("Controller of an underwater vehicle", built.scenario.description)
-    return System(name, about, _meanings(of, unit), start, step, inputs, sample, period)
+    return System(name, about, _meanings(functions, unit), start, step, inputs, sample, period)
 
 
-def _meanings(of: Functions, unit: str) -> dict[str, str]:
+def _meanings(functions: Functions, unit: str) -> dict[str, str]:
     """What structs, members and functions mean; `unit` is that of the plant's input."""
-    outputs = "north, east, down, m, roll, pitch, yaw, rad" if of.form else "outputs of the plant"
+    outputs = "north, east, down, m, roll, pitch, yaw, rad" if functions.form else "outputs of the plant"
     return {
         "state": "State of the controller; keep it between the steps.",
-        "input": f"Input of a step. {described(of.form)}",
-        "output": f"Output of a step: the law's command and the output, {of.output.unit}.",
+        "input": f"Input of a step. {described(functions.form)}",
+        "output": f"Output of a step: the law's command and the output, {functions.output.unit}.",
         "start": "The first step: sets the state; all of its input has to be finite.",
         "step": "A step input->dt after the last one, with input->applied applied since then. What was not measured is "
         f"NAN. After more than {MISSED:g} sampling times the law advances by {MISSED:g} of them; a dt that is zero, "
         "negative or not finite leaves the state as it was. A supervisor gets the time as it is.",
-        "input.motion_position": "north, east, down, m" if of.form else outputs,
-        "input.motion_attitude": "" if of.form is None else _ATTITUDES[of.form.attitude],
-        "input.motion_velocity": f"`{of.form.velocity}`, m/s and rad/s" if of.form else "rates of the outputs",
+        "input.motion_position": "north, east, down, m" if functions.form else outputs,
+        "input.motion_attitude": "" if functions.form is None else _ATTITUDES[functions.form.attitude],
+        "input.motion_velocity": f"`{functions.form.velocity}`, m/s and rad/s"
+        if functions.form
+        else "rates of the outputs",
         "input.actuator_speed": "of each propeller, rad/s; NAN where it is not measured",
         "input.actuator_acceleration": "of each propeller, rad/s^2; NAN where it is not measured",
         "input.target_position": f"to reach: {outputs}",
@@ -159,7 +165,7 @@ def _meanings(of: Functions, unit: str) -> dict[str, str]:
         "input.applied": f"to be set at each step: what was applied since the last, {unit}; output->command, or less",
         "input.dt": "time since the last step, s",
         "output.command": f"of the law, in the order of the thrusters, {unit}; see that it is finite",
-        "output.output": f"for the vehicle, {of.output.unit}",
+        "output.output": f"for the vehicle, {functions.output.unit}",
     }
 
 
@@ -167,8 +173,8 @@ def described(form: Format | None) -> str:
     """The format of a motion, in words; None for a plant that is no vehicle."""
     if form is None:
         return "Position and velocity are the outputs of the plant and their rates."
-    turned = _ATTITUDES[form.attitude]
-    return f"Position north, east, down, m; attitude {turned}; velocity `{form.velocity}`, m/s and rad/s."
+    attitude_format = _ATTITUDES[form.attitude]
+    return f"Position north, east, down, m; attitude {attitude_format}; velocity `{form.velocity}`, m/s and rad/s."
 
 
 _EXAMPLE = """\

@@ -65,8 +65,8 @@ def export_fmu(
         BadInput: a format is unknown, or a part needs something that has no counterpart in C99.
     """
     form = Format(attitude, velocity)
-    chosen = checked(precision or built.scenario.precision, form)
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    checked_precision = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(checked_precision):
         functions = functions_of(built, form, output, esc)
         programs = {
             "controller": (controller_program(built, "controller", functions), _of_controller(built, functions)),
@@ -80,36 +80,38 @@ def export_fmu(
     return Units(Exported(files), without)
 
 
-def _of_controller(built: Built, of: Functions) -> list[Variable]:
-    plant, motion = built.closed_loop.plant, of.given.motion
-    names, goal = Names(plant, of.form), of.given.target.position
-    own = "whether the target is that of the scenario's reference, which begins at the start of the simulation"
-    found = [
-        Variable("scenario_reference", ("model", "scenario_reference", 0), "tunable", "Boolean", "", own, True),
+def _of_controller(built: Built, functions: Functions) -> list[Variable]:
+    plant, motion = built.closed_loop.plant, functions.given.motion
+    names = Names(plant, functions.form)
+    goal = functions.given.target.position
+    meaning = "whether the target is that of the scenario's reference, which begins at the start of the simulation"
+    variables = [
+        Variable("scenario_reference", ("model", "scenario_reference", 0), "tunable", "Boolean", "", meaning, True),
         *names.motion("input", "measured", motion, "measured"),
-        *names.reports("input", "measured", of.given.actuator, "measured"),
+        *names.reports("input", "measured", functions.given.actuator, "measured"),
         *names.outputs("target.position", "target_position", "input", goal, "target"),
         *names.outputs("target.velocity", "target_velocity", "input", goal, "rate of the target", 1),
         *names.outputs("target.acceleration", "target_acceleration", "input", goal, "acceleration of the target", 2),
         *names.actuators("applied", "input", "applied", "input", "input applied since the last step to"),
         *names.actuators("command", "output", "command", "output", "input commanded of"),
     ]
-    if of.output.kind == "wrench":
-        found += names.wrench("output", "output", "output", "output", "force and moment of all thrusters")
-    elif of.output.kind != "input":
+    if functions.output.kind == "wrench":
+        variables += names.wrench("output", "output", "output", "output", "force and moment of all thrusters")
+    elif functions.output.kind != "input":
         entries = [f"thruster_{i + 1}" for i in range(plant.inputs())]
-        found += group("output", "output", "output", "output", entries, of.output.unit, "output", ())
-    return found
+        variables += group("output", "output", "output", "output", entries, functions.output.unit, "output", ())
+    return variables
 
 
-def _of_vehicle(built: Built, of: Functions) -> list[Variable]:
+def _of_vehicle(built: Built, functions: Functions) -> list[Variable]:
     plant, start = built.closed_loop.plant, built.scenario.initial
-    names, zero = Names(plant, of.form), [0.0] * len(plant.outputs)
+    names = Names(plant, functions.form)
+    zero = [0.0] * len(plant.outputs)
     report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
     status = "0 while the motion is valid: " + ", ".join(f"{int(code)} {code.word}" for code in Status if code)
-    place, speed = start.position or zero, start.velocity or zero
+    position, speed = start.position or zero, start.velocity or zero
     return [
-        *names.outputs("initial.position", "initial_position", "parameter", place, "position at the start"),
+        *names.outputs("initial.position", "initial_position", "parameter", position, "position at the start"),
         *names.outputs("initial.velocity", "initial_velocity", "parameter", speed, "rate at the start", 1),
         *names.actuators("command", "input", "command", "input", "commanded input of"),
         *names.wrench("external_wrench", "input", "external_wrench", "input", "load from outside, body axes"),
@@ -125,18 +127,18 @@ def compiled(sources: Mapping[str, str], name: str) -> tuple[bytes | None, str]:
     """The shared library of some sources, and why there is none; "" where there is one."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         return None, f"no library is made on {sys.platform}, {platform.machine()}"
-    chosen = os.environ.get("CC", "")
-    command = shlex.split(chosen) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
+    compiler = os.environ.get("CC", "")
+    command = shlex.split(compiler) or [next(filter(shutil.which, ("cc", "gcc", "clang")), "cc")]
     if shutil.which(command[0]) is None:
-        return None, f"there is no C compiler on this machine ({chosen or 'cc, gcc or clang'})"
+        return None, f"there is no C compiler on this machine ({compiler or 'cc, gcc or clang'})"
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         files = [file for file in sources if file.endswith(".c")]
         command += [*_FLAGS, *files, "-o", f"{name}.so", "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise BadInput("CC", "", f"the C compiler {command[0]} failed on the unit {name}: {done.stderr}")
+        process = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if process.returncode != 0:
+            raise BadInput("CC", "", f"the C compiler {command[0]} failed on the unit {name}: {process.stderr}")
         return (Path(folder) / f"{name}.so").read_bytes(), ""
 
 

@@ -19,7 +19,7 @@ def sources_of(
 ) -> tuple[dict[str, str], ModelDescription]:
     """The files of the folder `sources`, and the unit."""
     system = program.system
-    rows = ",\n    ".join(_row(program, one) for one in variables)
+    rows = ",\n    ".join(_row(program, variable) for variable in variables)
     integer = "int64_t" if program.kind == "double" else "int32_t"
     filled = {"NAME": system.name, "REAL": program.kind, "INTEGER": integer, "VARIABLES_ROWS": rows}
     model = (_CONTROLLER if "target" in program.fields else _VEHICLE) + _COMMON
@@ -29,19 +29,20 @@ def sources_of(
     sources = {f"{system.name}.c": program.text(), f"{system.name}.h": program.header(), "fmu_model.h": model}
     sources |= {name: (_HERE / name).read_text("utf-8") for name in ("fmi2.c", "fmi2.h")}
     digest = hashlib.sha256(repr((sorted(sources.items()), list(variables))).encode()).digest()
-    guid, identity = f"{{{uuid.UUID(bytes=digest[:16])}}}", int.from_bytes(digest[16:24], "little")
+    guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
+    identity = int.from_bytes(digest[16:24], "little")
     sources["fmu_model.h"] = model.replace("@GUID@", guid).replace("@IDENTITY@", f"{identity}ULL")
     compiled_ones = [name for name in sources if name.endswith(".c")]
     return sources, ModelDescription(system.name, guid, system.about, variables, compiled_ones, system.period, duration)
 
 
-def _row(program: CProgram, one: Variable) -> str:
+def _row(program: CProgram, variable: Variable) -> str:
     """The row of a variable in the table in C."""
-    struct, member, index = one.place
-    place = f"offsetof(fmu_model, {member if struct == 'model' else struct})"
+    struct, member, index = variable.place
+    offset = f"offsetof(fmu_model, {member if struct == 'model' else struct})"
     if struct != "model":
-        place += f" + offsetof({program.system.name}_{struct}, {member}) + {index} * sizeof(fmu_real)"
-    return f'{{"{one.name}", FMU_{one.kind.upper()}, {_ROLES[one.role]}, {place}}}'
+        offset += f" + offsetof({program.system.name}_{struct}, {member}) + {index} * sizeof(fmu_real)"
+    return f'{{"{variable.name}", FMU_{variable.kind.upper()}, {_ROLES[variable.role]}, {offset}}}'
 
 
 _COMMON = """

@@ -78,15 +78,15 @@ def model_description(unit: ModelDescription, tool: str) -> str:
     files = ET.SubElement(simulation, "SourceFiles")
     for name in unit.sources:
         ET.SubElement(files, "File", name=name)
-    _units(root, sorted({one.unit for one in unit.variables} - {""}))
+    _units(root, sorted({variable.unit for variable in unit.variables} - {""}))
     categories = ET.SubElement(root, "LogCategories")
     ET.SubElement(categories, "Category", name="logStatusError", description="Why a call failed")
     times = {"startTime": "0", "stopTime": repr(float(unit.duration)), "stepSize": repr(float(unit.period))}
     ET.SubElement(root, "DefaultExperiment", times)
     variables, structure = ET.SubElement(root, "ModelVariables"), ET.SubElement(root, "ModelStructure")
-    for reference, one in enumerate(unit.variables):
-        _variable(variables, one, reference)
-    outputs = [i + 1 for i, one in enumerate(unit.variables) if one.role == "output"]
+    for reference, variable in enumerate(unit.variables):
+        _variable(variables, variable, reference)
+    outputs = [i + 1 for i, variable in enumerate(unit.variables) if variable.role == "output"]
     for name in ("Outputs", "InitialUnknowns"):
         unknowns = ET.SubElement(structure, name)
         for index in outputs:
@@ -98,18 +98,18 @@ def model_description(unit: ModelDescription, tool: str) -> str:
 def _units(root: ET.Element, names: Sequence[str]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name in names:
-        defined = ET.SubElement(definitions, "Unit", name=name)
+        element = ET.SubElement(definitions, "Unit", name=name)
         if name in _UNITS:
-            ET.SubElement(defined, "BaseUnit", {base: repr(power) for base, power in _UNITS[name].items()})
+            ET.SubElement(element, "BaseUnit", {base: repr(power) for base, power in _UNITS[name].items()})
 
 
-def _variable(parent: ET.Element, one: Variable, reference: int) -> None:
-    causality, variability, initial = _ROLES[one.role]
-    given = {"name": one.name, "valueReference": str(reference), "description": one.description}
-    given |= {"causality": causality, "variability": variability}
-    described = ET.SubElement(parent, "ScalarVariable", given | ({"initial": initial} if initial else {}))
-    kind = ET.SubElement(described, one.kind)
-    if one.start is not None:
-        kind.set("start", str(one.start).lower() if one.kind == "Boolean" else repr(one.start))
-    if one.unit:
-        kind.set("unit", one.unit)
+def _variable(parent: ET.Element, variable: Variable, reference: int) -> None:
+    causality, variability, initial = _ROLES[variable.role]
+    attributes = {"name": variable.name, "valueReference": str(reference), "description": variable.description}
+    attributes |= {"causality": causality, "variability": variability}
+    element = ET.SubElement(parent, "ScalarVariable", attributes | ({"initial": initial} if initial else {}))
+    type_element = ET.SubElement(element, variable.kind)
+    if variable.start is not None:
+        type_element.set("start", str(variable.start).lower() if variable.kind == "Boolean" else repr(variable.start))
+    if variable.unit:
+        type_element.set("unit", variable.unit)

@@ -37,9 +37,9 @@ def export_navigation(built: Built, name: str = "navigation", *, precision: str 
     Raises:
         BadInput: the scenario's navigation is not a filter of readings, or needs something without counterpart in C99.
     """
-    chosen = precision or built.scenario.precision
-    checks.choice("precision", chosen, ("float64", "float32"))
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    chosen_precision = precision or built.scenario.precision
+    checks.choice("precision", chosen_precision, ("float64", "float32"))
+    with runtime.on_processor(), runtime.in_precision(chosen_precision):
         files = navigation_program(built, name).files()
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
@@ -61,29 +61,43 @@ def navigation_program(built: Built, name: str) -> CProgram:
         raise BadInput("navigation", must, f"one that needs others: {error}") from None
 
 
-def _system(built: Built, name: str, of: FilterFunctions) -> System:
+def _system(built: Built, name: str, functions: FilterFunctions) -> System:
     period = built.scenario.loop.dt
-    named = dict(zip(of.sensors, of.nothing, strict=True))
-    delays = dict(zip(of.sensors, of.delays, strict=True))
-    whole = {sensor: one._replace(age=jnp.asarray(delays[sensor], dtype=float)) for sensor, one in named.items()}
-    inputs = jax.tree.map(np.asarray, NavigationInput(of.pose, whole, jnp.asarray(period, dtype=float)))
+    nothing_received = dict(zip(functions.sensors, functions.nothing, strict=True))
+    delays = dict(zip(functions.sensors, functions.delays, strict=True))
+    readings_with_delays = {
+        sensor: received._replace(age=jnp.asarray(delays[sensor], dtype=float))
+        for sensor, received in nothing_received.items()
+    }
+    inputs = jax.tree.map(
+        np.asarray, NavigationInput(functions.pose, readings_with_delays, jnp.asarray(period, dtype=float))
+    )
 
     def advanced(state: Any, inputs: NavigationInput, elapsed: Any):
-        return of.following(of.filter, state, elapsed, tuple(inputs.sensor[sensor] for sensor in of.sensors))
+        return functions.following(
+            functions.filter, state, elapsed, tuple(inputs.sensor[sensor] for sensor in functions.sensors)
+        )
 
     def start(inputs: NavigationInput):
-        return advanced(of.first(of.filter, EstimatedMotion(*inputs.motion)), inputs, jnp.zeros_like(inputs.dt))
+        return advanced(
+            functions.first(functions.filter, EstimatedMotion(*inputs.motion)), inputs, jnp.zeros_like(inputs.dt)
+        )
 
     def step(state: Any, inputs: NavigationInput):
         return advanced(state, inputs, inputs.dt)
 
     def sample(chance: np.random.Generator, k: int) -> NavigationInput:
-        def delivered(i: int, at_rest: Any, one: Received) -> Received:
-            reading = at_rest + _SPREAD * chance.normal(size=one.reading.shape)
-            return one._replace(reading=reading.astype(one.reading.dtype), fresh=np.asarray(k % (3 * i + 1) == 0))
+        def delivered(i: int, at_rest: Any, received: Received) -> Received:
+            reading = at_rest + _SPREAD * chance.normal(size=received.reading.shape)
+            return received._replace(
+                reading=reading.astype(received.reading.dtype), fresh=np.asarray(k % (3 * i + 1) == 0)
+            )
 
-        known = zip(of.sensors, map(np.asarray, of.at_rest), strict=True)
-        readings = {sensor: delivered(i, rest, inputs.sensor[sensor]) for i, (sensor, rest) in enumerate(known)}
+        sensors_at_rest = zip(functions.sensors, map(np.asarray, functions.at_rest), strict=True)
+        readings = {
+            sensor: delivered(i, reading_at_rest, inputs.sensor[sensor])
+            for i, (sensor, reading_at_rest) in enumerate(sensors_at_rest)
+        }
         return inputs._replace(sensor=readings)
 
     meanings = {
@@ -102,11 +116,11 @@ def _system(built: Built, name: str, of: FilterFunctions) -> System:
         "output.motion_attitude": "w, x, y, z, body to world",
         "step": "A step input->dt after the last one. Entries of readings that were not measured are NAN.",
     }
-    for sensor, part in zip(of.sensors, of.filter.sensors, strict=True):
+    for sensor, part in zip(functions.sensors, functions.filter.sensors, strict=True):
         meanings[f"input.sensor_{sensor}_reading"] = " ".join(str(type(part).__doc__).split("\n\n")[0].split())
         meanings[f"input.sensor_{sensor}_fresh"] = "whether the reading is new"
         meanings[f"input.sensor_{sensor}_age"] = "s since it was taken"
-    for signal, declared in of.filter.signals().items():
+    for signal, declared in functions.filter.signals().items():
         meanings[f"output.signals_{signal}"] = declared.meaning
     about = made_from("Navigation filter of an underwater vehicle", built.scenario.description)
     return System(name, about, meanings, start, step, inputs, sample, period)

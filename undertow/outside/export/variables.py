@@ -53,13 +53,15 @@ class Names(NamedTuple):
             yield from group("position", struct, "motion_position", role, entries, units, position, start[0])
             yield from group("velocity", struct, "motion_velocity", role, entries, rates, velocity, start[2])
             return
-        turned, angle = (("w", "x", "y", "z"), "") if form.attitude == "quaternion" else (BODY_OUTPUTS[3:], "rad")
-        moving = {"body": BODY_AXES, "world": _WORLD, "rates": BODY_OUTPUTS}[form.velocity]
+        attitude_names, attitude_unit = (
+            (("w", "x", "y", "z"), "") if form.attitude == "quaternion" else (BODY_OUTPUTS[3:], "rad")
+        )
+        velocity_names = {"body": BODY_AXES, "world": _WORLD, "rates": BODY_OUTPUTS}[form.velocity]
         axes = {"body": ", body axes", "world": ", world axes", "rates": ", rates of position and Euler angles"}
         velocity += axes[form.velocity]
         yield from group("position", struct, "motion_position", role, BODY_OUTPUTS[:3], "m", position, start[0])
-        yield from group("attitude", struct, "motion_attitude", role, turned, angle, attitude, start[1])
-        yield from group("velocity", struct, "motion_velocity", role, moving, rates, velocity, start[2])
+        yield from group("attitude", struct, "motion_attitude", role, attitude_names, attitude_unit, attitude, start[1])
+        yield from group("velocity", struct, "motion_velocity", role, velocity_names, rates, velocity, start[2])
 
     def outputs(
         self, name: str, member: str, role: str, start: Any, meaning: str, order: int = 0
@@ -80,8 +82,9 @@ class Names(NamedTuple):
         for word, unit in units.items():
             value = getattr(report, word, None)
             if value is not None:
-                said, member = f"{meaning} {word} of the propeller of", f"actuator_{word}"
-                yield from numbered(f"propeller_{word}", struct, member, role, unit, said, self._owners())
+                description = f"{meaning} {word} of the propeller of"
+                member = f"actuator_{word}"
+                yield from numbered(f"propeller_{word}", struct, member, role, unit, description, self._owners())
 
     def wrench(self, name: str, struct: str, member: str, role: str, meaning: str) -> Iterator[Variable]:
         """Force and moment on a vehicle, or what drives the outputs of another plant."""
@@ -123,9 +126,9 @@ def numbered(
 
 def signals(struct: str, member: str, declared: Mapping[str, Signal]) -> Iterator[Variable]:
     """Outputs for signals that are numbers."""
-    for name, one in declared.items():
-        unit = "" if one.unit == "1" else one.unit
-        yield Variable(name, (struct, f"{member}_{name}", 0), "output", "Real", unit, one.meaning)
+    for name, signal in declared.items():
+        unit = "" if signal.unit == "1" else signal.unit
+        yield Variable(name, (struct, f"{member}_{name}", 0), "output", "Real", unit, signal.meaning)
 
 
 def _per_second(units: Sequence[str]) -> tuple[str, ...]:

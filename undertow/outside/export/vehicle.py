@@ -78,8 +78,8 @@ def export_vehicle(
         BadInput: a format is unknown, or the plant or the disturbance needs something that has no counterpart in C99.
     """
     form = Format(attitude, velocity)
-    chosen = checked(precision or built.scenario.precision, form)
-    with runtime.on_processor(), runtime.in_precision(chosen):
+    checked_precision = checked(precision or built.scenario.precision, form)
+    with runtime.on_processor(), runtime.in_precision(checked_precision):
         files = vehicle_program(built, name, form).files()
     return Exported(files | {"example.c": _EXAMPLE.replace("NAME", name)})
 
@@ -106,15 +106,19 @@ def vehicle_program(built: Built, name: str, form: Format) -> CProgram:
 
 
 def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization: Any) -> System:
-    plant, settings = loop.plant, built.scenario.loop
+    plant = loop.plant
+    settings = built.scenario.loop
     truth = plant.output(jnp.zeros(()), plant.initial_state())
     zero, none = np.zeros(len(plant.outputs)), np.zeros(plant.inputs())
-    given = built.scenario.initial
-    at = lambda values: zero if values is None else np.asarray(values)
+    initial = built.scenario.initial
+    array_of = lambda values: zero if values is None else np.asarray(values)
     kind = jax.dtypes.canonicalize_dtype(float)
-    whole = ExportedVehicleInput(InitialOutputs(at(given.position), at(given.velocity)), none, zero, np.zeros(()))
-    inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), whole)
-    integrate, dt = COMPACT_METHODS[settings.method], jnp.asarray(settings.dt, dtype=float)
+    example = ExportedVehicleInput(
+        InitialOutputs(array_of(initial.position), array_of(initial.velocity)), none, zero, np.zeros(())
+    )
+    inputs = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), example)
+    integrate = COMPACT_METHODS[settings.method]
+    dt = jnp.asarray(settings.dt, dtype=float)
 
     def shown(t: Any, x: Any, applied: Any) -> ExportedVehicleOutput:
         truth, values = plant.output(t, x), plant.diagnostics(x, applied)
@@ -128,7 +132,8 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
     def step(x: Any, inputs: ExportedVehicleInput):
         disturbance = _WithOutsideWrench(loop.disturbance, inputs.external_wrench)
         part = Realization(dataclasses.replace(loop, disturbance=disturbance), realization, ())
-        applied, before = plant.admissible(x, inputs.command), PlantState(x, (), ())
+        applied = plant.admissible(x, inputs.command)
+        before = PlantState(x, (), ())
         after = hold(part, before, inputs.t, dt, applied, integrate, settings.substeps).plant
         return after, shown(inputs.t + dt, after, applied)
 
@@ -150,11 +155,11 @@ def _system(built: Built, name: str, loop: ClosedLoop, form: Format, realization
         "input.external_wrench": "force and moment from outside, body axes, N and N m",
         "input.t": "at the beginning of the step, s",
         "output.applied": f"the command within the limits, {plant.input_unit}",
-        "output.status": "; ".join(f"{int(one)} {one.word}" for one in Status),
+        "output.status": "; ".join(f"{int(code)} {code.word}" for code in Status),
         "step": "A step of one sampling time from input->t on, with the command held.",
     }
-    what = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
-    about = made_from(f"{what}, under its disturbance", built.scenario.description)
+    kind_of_plant = "Plant" if truth.body is None else "Underwater vehicle with its thrusters"
+    about = made_from(f"{kind_of_plant}, under its disturbance", built.scenario.description)
     return System(name, about, meanings, start, step, inputs, sample, settings.dt)
 
 
@@ -181,15 +186,17 @@ class _WithOutsideWrench(AbstractDisturbance):
 
 def _not_exported(loop: ClosedLoop, realization: Any, built: Built) -> str:
     """Key of the disturbance that has no counterpart in C; "" where all have one."""
-    several = isinstance(loop.disturbance, SumOfDisturbances)
+    is_sum = isinstance(loop.disturbance, SumOfDisturbances)
     members = loop.disturbance.members if isinstance(loop.disturbance, SumOfDisturbances) else (loop.disturbance,)
-    realized = realization if several else (realization,)
+    realized = realization if is_sum else (realization,)
     parts = built.scenario.disturbance if isinstance(built.scenario.disturbance, list) else [built.scenario.disturbance]
     x = loop.plant.initial_state()
-    for i, (member, own) in enumerate(zip(members, realized, strict=True)):
-        load = lambda t, member=member, own=own: member.at(own, t, loop.plant.pose(x), loop.plant.no_load())
+    for i, (member, random_part) in enumerate(zip(members, realized, strict=True)):
+        load = lambda t, member=member, random_part=random_part: member.at(
+            random_part, t, loop.plant.pose(x), loop.plant.no_load()
+        )
         if not has_counterpart(load, jnp.zeros(())):
-            return f"disturbance{f'[{i}]' if several else ''} ({parts[i].kind})"
+            return f"disturbance{f'[{i}]' if is_sum else ''} ({parts[i].kind})"
     return ""
 
 

@@ -31,10 +31,10 @@ BLUEROV2_HEAVY = {
     "loop": {"dt": 0.05, "duration": 20.0, "record": 0.05, "substeps": 5},
 }
 
-for name, given in (("BlueROV2Heavy", {"scenario": BLUEROV2_HEAVY}), ("Scenario", {})):
+for name, options in (("BlueROV2Heavy", {"scenario": BLUEROV2_HEAVY}), ("Scenario", {})):
     gymnasium.register(
         f"undertow/{name}-v0",
         entry_point="undertow.outside.gymnasium.env:make",
         vector_entry_point="undertow.outside.gymnasium.vector_env:make_vec",
-        kwargs=given,
+        kwargs=options,
     )

@@ -61,22 +61,23 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """Begin an episode; see the class."""
         super().reset(seed=seed)
         run = int(self.np_random.integers(_SEEDS)) if seed is None else seed % _SEEDS
-        seen = self._episodes.start(np.array([run]), np.array([0]))
+        first_step = self._episodes.start(np.array([run]), np.array([0]))
         self._step, self._over = 0, False
-        return self._shown.observation(seen.observation[0]), info_of(seen, 0) | {"seed": run}
+        return self._shown.observation(first_step.observation[0]), info_of(first_step, 0) | {"seed": run}
 
     def step(self, action: NDArray[Any]):
         """Hold an action for one sampling time."""
         if self._over:
             raise BadInput("reset", "be called before `step`", "not")
-        given = actions_of(action, (self.interface.actions,))
-        seen = self._episodes.step(given[None])
+        checked_action = actions_of(action, (self.interface.actions,))
+        result = self._episodes.step(checked_action[None])
         self._step += 1
-        terminated = bool(seen.status[0] != Status.OK)
+        terminated = bool(result.status[0] != Status.OK)
         truncated = not terminated and self._step >= self._episodes.steps
         self._over = terminated or truncated
-        observation, reward = self._shown.observation(seen.observation[0]), float(self._shown.rewards(seen.reward[0]))
-        return observation, reward, terminated, truncated, info_of(seen, 0)
+        observation = self._shown.observation(result.observation[0])
+        reward = float(self._shown.rewards(result.reward[0]))
+        return observation, reward, terminated, truncated, info_of(result, 0)
 
 
 def make(scenario: str | Path | Mapping[str, Any], **options: Any) -> Env:
@@ -84,24 +85,24 @@ def make(scenario: str | Path | Mapping[str, Any], **options: Any) -> Env:
     return Env(scenario, **options)
 
 
-def actions_of(given: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def actions_of(actions: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Actions as numbers.
 
     Raises:
         BadInput: they have another shape, or are not finite.
     """
     try:
-        found = np.asarray(given, dtype=float)
+        values = np.asarray(actions, dtype=float)
     except (TypeError, ValueError):
-        raise BadInput("action", "be numbers", repr(given)) from None
-    if found.shape != shape:
-        raise BadInput("action", f"have shape {shape}", f"of shape {found.shape}")
-    if not np.isfinite(found).all():
+        raise BadInput("action", "be numbers", repr(actions)) from None
+    if values.shape != shape:
+        raise BadInput("action", f"have shape {shape}", f"of shape {values.shape}")
+    if not np.isfinite(values).all():
         raise BadInput("action", "be finite", "not")
-    return found
+    return values
 
 
-def info_of(seen: EpisodeStep, number: int) -> dict[str, Any]:
+def info_of(result: EpisodeStep, number: int) -> dict[str, Any]:
     """What the agent does not observe: true outputs, tracking error, and the status of the run."""
-    status = Status(int(seen.status[number]))
-    return {"position": seen.position[number], "error": seen.error[number], "status": status.word}
+    status = Status(int(result.status[number]))
+    return {"position": result.position[number], "error": result.error[number], "status": status.word}

@@ -134,26 +134,27 @@ class Episodes:
         if settings.kind != "sampled":
             raise BadInput("loop.kind", "be sampled for an environment", settings.kind)
         weights = _cost(cost)
-        self.dt, self.steps = settings.dt, round(settings.duration / settings.dt)
+        self.dt = settings.dt
+        self.steps = round(settings.duration / settings.dt)
         self._precision = built.scenario.precision
         self.dtype = np.dtype(self._precision)
         with runtime.on_processor(), runtime.in_precision(self._precision):
             model, _ = factory.call(built.closed_loop.plant.model, built.scenario.model.options, folder=text.folder)
             self.interface = policy_interface_of(model, action, scale)
             plan = EpisodeSettings(self.interface, weights, settings.dt, settings.method, settings.substeps)
-            found, constant = variants_of(built, vary or {}, variants)
-            leaves = [jax.tree.leaves(eqx.filter(one, eqx.is_array)) for one in found]
+            built_variants, constant = variants_of(built, vary or {}, variants)
+            leaves = [jax.tree.leaves(eqx.filter(variant, eqx.is_array)) for variant in built_variants]
             self._numbers = [np.stack(column) for column in zip(*leaves, strict=True)]
-            self._compile(plan, _Known(*found[0], key_of_seed(0)), constant, count)
+            self._compile(plan, _Known(*built_variants[0], key_of_seed(0)), constant, count)
 
-    def _compile(self, plan: EpisodeSettings, known: _Known, constant: list[bool], count: int) -> None:
-        arrays, rest = eqx.partition(known, eqx.is_array)
-        whole = lambda arrays: eqx.combine(arrays, rest)
+    def _compile(self, plan: EpisodeSettings, episode: _Known, constant: list[bool], count: int) -> None:
+        arrays, static = eqx.partition(episode, eqx.is_array)
+        combine = lambda arrays: eqx.combine(arrays, static)
         self._form = jax.tree.structure(arrays)
 
         def prepare(arrays: Any) -> tuple[Realization, Any]:
-            known = whole(arrays)
-            return known.loop.realize(known.key), known.start
+            episode = combine(arrays)
+            return episode.loop.realize(episode.key), episode.start
 
         def begin(prepared: tuple[Realization, Any]) -> Any:
             realization, start = prepared
@@ -162,29 +163,31 @@ class Episodes:
         self._starter = Starter(prepare, begin, arrays, [*constant, False])
         realized, (state, _) = self._starter(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays))
         realized, state = jax.tree.map(lambda leaf: leaf[0], (realized, state))
-        still = eqx.filter(known.loop.realize(known.key), eqx.is_array, inverse=True)
-        of_loop = len(jax.tree.leaves(eqx.filter(known.loop, eqx.is_array)))
+        static_realization = eqx.filter(episode.loop.realize(episode.key), eqx.is_array, inverse=True)
+        of_loop = len(jax.tree.leaves(eqx.filter(episode.loop, eqx.is_array)))
         self._same = [*constant[:of_loop], *[False] * (len(jax.tree.leaves(realized)) - of_loop)]
         action = np.asarray(plan.interface.first())
-        function = lambda realized, state, action: _step(plan, eqx.combine(realized, still), state, action)
+        function = lambda realized, state, action: _step(plan, eqx.combine(realized, static_realization), state, action)
         self._stepper = CompiledBatchStep(function, realized, state, action, count, self._same)
         self.backend = self._stepper.backend
 
-    def start(self, seeds: NDArray, which: NDArray) -> EpisodeStep:
+    def start(self, seeds: NDArray, indices: NDArray) -> EpisodeStep:
         """Begin episodes.
 
         Args:
             seeds: of everything random in them, as `seed` of a scenario; shape (k,).
-            which: numbers of the episodes, shape (k,).
+            indices: of the episodes, shape (k,).
         """
         variant = seeds % len(self._numbers[0])
         numbers = [*(column[variant] for column in self._numbers), _keys(seeds)]
         with runtime.on_processor(), runtime.in_precision(self._precision):
-            realized, (state, seen) = self._starter(jax.tree.unflatten(self._form, numbers))
-        varying = [leaf for leaf, same in zip(jax.tree.leaves(realized), self._same, strict=True) if not same]
-        self._stepper.put("numbers", varying, which)
-        self._stepper.put("state", state, which)
-        return seen
+            realized, (state, first_step) = self._starter(jax.tree.unflatten(self._form, numbers))
+        varying = [
+            leaf for leaf, is_constant in zip(jax.tree.leaves(realized), self._same, strict=True) if not is_constant
+        ]
+        self._stepper.put("numbers", varying, indices)
+        self._stepper.put("state", state, indices)
+        return first_step
 
     def step(self, actions: NDArray) -> EpisodeStep:
         """One step of every episode; those that have failed stay as they are."""
@@ -193,20 +196,24 @@ class Episodes:
 
 
 def _begin(plan: EpisodeSettings, realization: Realization, start: Any) -> tuple[_State, EpisodeStep]:
-    zero, action = jnp.zeros(()), plan.interface.first()
-    vehicle, seen = plant_step.begin(realization, start)
+    zero = jnp.zeros(())
+    action = plan.interface.first()
+    vehicle, plant_observation = plant_step.begin(realization, start)
     r = realization.loop.reference.at(zero)
     blank = jnp.concatenate([jnp.zeros(len(plan.interface.bounds())), action])
-    observation = _observed(plan, seen.measurement, r, action, blank)
+    observation = _observed(plan, plant_observation.measurement, r, action, blank)
     state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), going())
-    error = plan.interface.coordinates.difference(r.position, seen.truth.position)
-    return state, EpisodeStep(observation, zero, state.ending.status, seen.truth.position, error)
+    error = plan.interface.coordinates.difference(r.position, plant_observation.truth.position)
+    return state, EpisodeStep(observation, zero, state.ending.status, plant_observation.truth.position, error)
 
 
 def _step(plan: EpisodeSettings, realization: Realization, state: _State, action: Any) -> tuple[_State, EpisodeStep]:
     """As `sampled.control_step`, with the command of an action in place of a law's."""
-    loop, dt, interface = realization.loop, jnp.asarray(plan.dt), plan.interface
-    t, before = instant(state.step, dt), state.vehicle
+    loop = realization.loop
+    dt = jnp.asarray(plan.dt)
+    interface = plan.interface
+    t = instant(state.step, dt)
+    before = state.vehicle
     action = interface.within_bounds(action)
     command = interface.command(action)
     applied = loop.plant.admissible(before.plant, command)
@@ -214,20 +221,20 @@ def _step(plan: EpisodeSettings, realization: Realization, state: _State, action
     states = (before.plant, ()), (vehicle.plant, ())
     (x, _), ending = freeze_on_failure(loop, *states, state.ending, t, dt, command)
     now = instant(state.step + 1, dt)
-    vehicle, seen = plant_step.observe(realization, vehicle._replace(plant=x), now, applied)
+    vehicle, plant_observation = plant_step.observe(realization, vehicle._replace(plant=x), now, applied)
     r = loop.reference.at(now)
-    observation = _observed(plan, seen.measurement, r, action, state.observation)
-    error = interface.coordinates.difference(r.position, seen.truth.position)
+    observation = _observed(plan, plant_observation.measurement, r, action, state.observation)
+    error = interface.coordinates.difference(r.position, plant_observation.truth.position)
     failing = (ending.status != int(Status.OK)) & (state.ending.status == int(Status.OK))
     reward = -_cost_of(plan, error, action, state.action) - plan.cost.failure * failing.astype(float)
     new = _State(vehicle, action, observation, state.step + 1, ending)
-    return new, EpisodeStep(observation, reward, ending.status, seen.truth.position, error)
+    return new, EpisodeStep(observation, reward, ending.status, plant_observation.truth.position, error)
 
 
 def _observed(plan: EpisodeSettings, y: Any, r: Any, action: Any, before: Any) -> Any:
     """The observation; entries that are not finite were not measured, and are those of the observation before."""
-    found = plan.interface.observation(y, r, action)
-    return jnp.where(jnp.isfinite(found), found, before)
+    observation = plan.interface.observation(y, r, action)
+    return jnp.where(jnp.isfinite(observation), observation, before)
 
 
 def _cost_of(plan: EpisodeSettings, error: Any, action: Any, before: Any) -> Any:
@@ -239,16 +246,16 @@ def _cost_of(plan: EpisodeSettings, error: Any, action: Any, before: Any) -> Any
     return ((error / scales) ** 2).sum() + plan.cost.effort * used.mean() + plan.cost.variation * changed.mean()
 
 
-def _cost(given: Any) -> QuadraticCost:
-    if isinstance(given, Mapping):
-        if unknown := set(given) - set(QuadraticCost._fields):
+def _cost(settings: Any) -> QuadraticCost:
+    if isinstance(settings, Mapping):
+        if unknown := set(settings) - set(QuadraticCost._fields):
             raise BadInput(
                 "cost", f"have the keys {', '.join(QuadraticCost._fields)}", ", ".join(sorted(map(str, unknown)))
             )
-        given = QuadraticCost(**given)
-    found = QuadraticCost() if given is None else given
-    found.check()
-    return found
+        settings = QuadraticCost(**settings)
+    cost = QuadraticCost() if settings is None else settings
+    cost.check()
+    return cost
 
 
 def _keys(seeds: NDArray) -> NDArray:

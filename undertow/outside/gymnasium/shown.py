@@ -33,11 +33,11 @@ class AgentInterface(NamedTuple):
         """Spaces of observations and of actions."""
         low, high = self.interface.action_bounds()
         bounds = self.interface.bounds()
-        seen = np.concatenate([-bounds, low]), np.concatenate([bounds, high])
+        limits = np.concatenate([-bounds, low]), np.concatenate([bounds, high])
         if self.normalised:
-            seen = -np.ones_like(seen[0]), np.ones_like(seen[1])
+            limits = -np.ones_like(limits[0]), np.ones_like(limits[1])
         box = lambda low, high: spaces.Box(low.astype(self.dtype), high.astype(self.dtype), dtype=self.dtype)
-        return box(*seen), box(low, high)
+        return box(*limits), box(low, high)
 
     def observation(self, values: NDArray[Any]) -> NDArray[Any]:
         """Observations as shown, of one environment or of many."""

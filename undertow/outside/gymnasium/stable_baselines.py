@@ -28,7 +28,9 @@ def for_stable_baselines(env: VectorEnv) -> Any:
         """Of `for_stable_baselines`."""
 
         def __init__(self) -> None:
-            self.vector, self._seeds, self.reset_infos = env, None, [{} for _ in range(env.num_envs)]
+            self.vector = env
+            self._seeds = None
+            self.reset_infos = [{} for _ in range(env.num_envs)]
             super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
         def seed(self, seed: int | None = None) -> list[int | None]:
@@ -66,7 +68,7 @@ def for_stable_baselines(env: VectorEnv) -> Any:
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             raise BadInput(attr_name, "stay as it is: the environments are one program")
 
-        def env_method(self, method_name: str, *given: Any, indices: Any = None, **options: Any) -> list[Any]:
+        def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **options: Any) -> list[Any]:
             raise BadInput(method_name, "not be called on single environments: they are one program")
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

@@ -34,16 +34,19 @@ def variants_of(built: Built, vary: Vary, count: int) -> tuple[list[Variant], li
         BadInput: a distribution or a key is wrong, or the loops differ in more than numbers.
     """
     if not vary:
-        found = [_variant(built)]
+        variants = [_variant(built)]
     else:
         data = {"scenario": dict(built.text.data), "vary": dict(vary), "trials": count}
         text = Text(data, "", built.text.folder, {})
-        several, cache = trials(validate(text), text), PartCache()
-        found = [_variant(build_data(several, cache, several.data(number))) for number in range(count)]
-    if len(set(map(structure, found))) > 1:
+        campaign_trials = trials(validate(text), text)
+        cache = PartCache()
+        variants = [
+            _variant(build_data(campaign_trials, cache, campaign_trials.data(number))) for number in range(count)
+        ]
+    if len(set(map(structure, variants))) > 1:
         raise BadInput("vary", "change numbers only", "such that the loops have different parts")
-    leaves = [jax.tree.leaves(eqx.filter(one, eqx.is_array)) for one in found]
-    return found, [all(np.array_equal(column[0], other) for other in column) for column in zip(*leaves, strict=True)]
+    leaves = [jax.tree.leaves(eqx.filter(variant, eqx.is_array)) for variant in variants]
+    return variants, [all(np.array_equal(column[0], array) for array in column) for column in zip(*leaves, strict=True)]
 
 
 def _variant(built: Built) -> Variant:

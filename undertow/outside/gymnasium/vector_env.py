@@ -67,37 +67,37 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None):
         """Begin an episode of every environment, or of those in `options["reset_mask"]`; see the class."""
-        which = self._chosen(options)
+        indices = self._chosen(options)
         seeds = self._seeds_of(seed)
         super().reset(seed=int(seed) if isinstance(seed, Integral) else None)
-        runs = np.array([self._run(number, seeds[number]) for number in which.tolist()], dtype=np.uint32)
+        runs = np.array([self._run(number, seeds[number]) for number in indices.tolist()], dtype=np.uint32)
         if not self._started:
             self._observation = np.zeros(self.observation_space.shape or (), self._shown.dtype)
-        seen = self._episodes.start(runs, which)
-        self._observation[which] = self._shown.observation(seen.observation)
-        self._steps[which], self._over[which], self._started = 0, False, True
-        return self._observation.copy(), self._info(seen, which) | self._of("seed", runs, which)
+        first_step = self._episodes.start(runs, indices)
+        self._observation[indices] = self._shown.observation(first_step.observation)
+        self._steps[indices], self._over[indices], self._started = 0, False, True
+        return self._observation.copy(), self._info(first_step, indices) | self._of("seed", runs, indices)
 
     def step(self, actions: NDArray[Any]):
         """Hold an action for one sampling time in every environment, and reset those whose episode is over."""
         if not self._started:
             raise BadInput("reset", "be called before `step`", "not")
-        given = actions_of(actions, (self.num_envs, self.interface.actions))
+        checked_actions = actions_of(actions, (self.num_envs, self.interface.actions))
         renewed = np.flatnonzero(self._over)
-        seen = self._episodes.step(given)
+        result = self._episodes.step(checked_actions)
         self._steps += 1
         if len(renewed):
             runs = np.array([self._run(number, None) for number in renewed.tolist()], dtype=np.uint32)
-            for values, new in zip(seen, self._episodes.start(runs, renewed), strict=True):
+            for values, new in zip(result, self._episodes.start(runs, renewed), strict=True):
                 values[renewed] = new
             self._steps[renewed] = 0
-        terminated = seen.status != Status.OK
+        terminated = result.status != Status.OK
         truncated = ~terminated & (self._steps >= self._episodes.steps)
-        self._over, self._observation = terminated | truncated, self._shown.observation(seen.observation)
-        rewards = self._shown.rewards(seen.reward)
+        self._over, self._observation = terminated | truncated, self._shown.observation(result.observation)
+        rewards = self._shown.rewards(result.reward)
         rewards[renewed] = 0.0
-        every = np.arange(self.num_envs)
-        return self._observation.copy(), rewards, terminated, truncated, self._info(seen, every)
+        all_indices = np.arange(self.num_envs)
+        return self._observation.copy(), rewards, terminated, truncated, self._info(result, all_indices)
 
     def _chosen(self, options: dict[str, Any] | None) -> NDArray[Any]:
         mask = (options or {}).get("reset_mask")
@@ -123,19 +123,19 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
         self._generators[number], _ = seeding.np_random(seed)
         return seed % _SEEDS
 
-    def _info(self, seen: EpisodeStep, which: NDArray[Any]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+    def _info(self, result: EpisodeStep, indices: NDArray[Any]) -> dict[str, Any]:
+        info: dict[str, Any] = {}
         for name in ("position", "error", "status"):
-            found |= self._of(name, getattr(seen, name), which)
-        return found
+            info |= self._of(name, getattr(result, name), indices)
+        return info
 
-    def _of(self, name: str, values: NDArray[Any], which: NDArray[Any]) -> dict[str, Any]:
+    def _of(self, name: str, values: NDArray[Any], indices: NDArray[Any]) -> dict[str, Any]:
         """Values of some environments as Gymnasium has them: an array over all, and which of them it holds."""
-        whole = np.zeros((self.num_envs, *values.shape[1:]), dtype=values.dtype)
-        whole[which] = values
-        known = np.zeros(self.num_envs, dtype=bool)
-        known[which] = True
-        return {name: whole, f"_{name}": known}
+        values_of_all = np.zeros((self.num_envs, *values.shape[1:]), dtype=values.dtype)
+        values_of_all[indices] = values
+        is_held = np.zeros(self.num_envs, dtype=bool)
+        is_held[indices] = True
+        return {name: values_of_all, f"_{name}": is_held}
 
 
 def make_vec(scenario: str | Path | Mapping[str, Any], num_envs: int = 1, **options: Any) -> VectorEnv:

@@ -73,8 +73,8 @@ def actuator(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]
 def control_target(target: MavlinkTarget, pulses: Pulses, time_usec: int) -> list[Any]:
     """A SET_ACTUATOR_CONTROL_TARGET for each group of eight controls."""
     blocks = _blocks(pulses.shares(), _PER_GROUP, 0.0)
-    made = mavlink.MAVLink_set_actuator_control_target_message
-    return [made(time_usec, group, *target, values) for group, values in blocks.items()]
+    make_message = mavlink.MAVLink_set_actuator_control_target_message
+    return [make_message(time_usec, group, *target, values) for group, values in blocks.items()]
 
 
 # Word of the option -> commands, and the highest channel that they reach.
@@ -109,8 +109,8 @@ def _command(target: MavlinkTarget, command: int, parameters: list[float]) -> An
 
 def _blocks(values: Mapping[int, float], size: int, empty: float) -> dict[int, list[float]]:
     """Values by block of channels; `empty` for channels between."""
-    found: dict[int, list[float]] = {}
+    blocks: dict[int, list[float]] = {}
     for channel, value in sorted(values.items()):
-        block, place = divmod(channel - 1, size)
-        found.setdefault(block, [empty] * size)[place] = value
-    return found
+        block, index = divmod(channel - 1, size)
+        blocks.setdefault(block, [empty] * size)[index] = value
+    return blocks

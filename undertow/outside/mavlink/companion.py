@@ -95,12 +95,14 @@ class Companion:
                 raise BadInput(name, "be from 1 to 255", number)
         checks.positive("timeout", timeout, "s")
         self.timeout = float(timeout)
-        self._reader, self._target = OdometryReader(source), MavlinkTarget(target_system, target_component)
+        self._reader = OdometryReader(source)
+        self._target = MavlinkTarget(target_system, target_component)
         text = read_for_link(Path(scenario), allow_code=allow_code, unsupervised=unsupervised)
         self.autopilot = Autopilot(text, attitude="quaternion", log_later=True)
         self._driver = ThrusterDriver(self.autopilot, output, self._target, frame, channels)
         self.channels = self._driver.channels
-        self.counts, self.complaint = dict.fromkeys(_COUNTS, 0), ""
+        self.counts = dict.fromkeys(_COUNTS, 0)
+        self.complaint = ""
         self._last: MavlinkOdometry | None = None  # that was used
         self._placed: MavlinkOdometry | None = None  # the last one with a pose
         self._sent_heartbeat = -np.inf
@@ -189,7 +191,8 @@ class Companion:
         if objection:
             self.counts[objection] += 1
             return None
-        before, self._last = self._last, odometry
+        before = self._last
+        self._last = odometry
         was_reset = before is not None and odometry.resets != before.resets
         if was_reset:
             self._note_reset(odometry)

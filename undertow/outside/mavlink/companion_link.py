@@ -34,7 +34,9 @@ class CompanionLink(AbstractPacingLink):
 
     def __init__(self, companion: Companion, link: UdpLink, clock: AbstractLoopClock | None = None):
         self.form = Format("quaternion", "body")
-        self._companion, self._link, self._clock = companion, link, clock or MonotonicClock()
+        self._companion = companion
+        self._link = link
+        self._clock = clock or MonotonicClock()
         self._messages: list[tuple[Any, Any]] = []  # that have come and were not looked at, with their senders
         self._talked = self._held = -np.inf  # s, last message of the target; last words to the watchdog
         self._answered = 0  # stamp of the measurement that the next command answers, ns
@@ -56,7 +58,8 @@ class CompanionLink(AbstractPacingLink):
         self._link.codec.overtake()
 
     def receive(self, elapsed: float) -> LinkMeasurement | None:
-        now, newest = self._clock.now(), None
+        now = self._clock.now()
+        newest = None
         welcome = [message for message, sender in self._messages if self._is_welcome(message, sender, now)]
         self._messages.clear()
         for message in self._without_superseded(welcome):

@@ -17,7 +17,7 @@ class UdpLink:
     """Sends and receives MAVLink 2 over UDP. Datagrams hold whole messages, as those of autopilots and routers do.
 
     Args:
-        place: `udpin:HOST:PORT` (or `udp:...`) listens there, and answers to where the vehicle's messages come from;
+        endpoint: `udpin:HOST:PORT` (or `udp:...`) listens there, and answers to where the vehicle's messages come from;
             `udpout:HOST:PORT` sends there.
         system, component: our ids.
         key: 32 bytes with which messages are signed, and those of the vehicle must be; None for no signatures.
@@ -35,19 +35,21 @@ class UdpLink:
 
     def __init__(
         self,
-        place: str,
+        endpoint: str,
         system: int = 255,
         component: int = mavlink.MAV_COMP_ID_ONBOARD_COMPUTER,
         key: bytes | None = None,
     ):
-        kind, address = _parsed(place)
+        kind, address = _parsed(endpoint)
         for name, number in (("system", system), ("component", component)):
             if not 1 <= number <= 255:
                 raise BadInput(name, "be from 1 to 255", number)
         self.codec = MessageCodec(system, component, key)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.peer: Any = None
-        self.unsent, self._fixed, self._signed = 0, kind == "udpout", key is not None
+        self.unsent = 0
+        self._fixed = kind == "udpout"
+        self._signed = key is not None
         self._caller: Any = None  # who sent last while the vehicle is unknown
         try:
             if kind == "udpout":
@@ -58,7 +60,7 @@ class UdpLink:
         except OSError as error:
             self.socket.close()
             hint = "Another program may be listening there"
-            raise BadInput("connect", "be free to use", f"{place}: {error.strerror}", hint=hint) from None
+            raise BadInput("connect", "be free to use", f"{endpoint}: {error.strerror}", hint=hint) from None
         self.port = self.socket.getsockname()[1]
 
     def __enter__(self) -> "UdpLink":
@@ -72,7 +74,7 @@ class UdpLink:
 
         With `udpout` only those of the vehicle.
         """
-        found: list[tuple[Any, Any]] = []
+        messages: list[tuple[Any, Any]] = []
         for k in range(_AT_ONCE):
             self.socket.settimeout(0.0 if k else longest)
             try:
@@ -81,8 +83,8 @@ class UdpLink:
                 break
             self._caller = sender
             if not self._fixed or sender == self.peer:
-                found += [(message, sender) for message in self.codec.parsed(data)]
-        return found
+                messages += [(message, sender) for message in self.codec.parsed(data)]
+        return messages
 
     def drain(self) -> None:
         """Forget what has come so far: it is old."""
@@ -106,12 +108,12 @@ class UdpLink:
                 self.unsent += 1
 
 
-def _parsed(place: str) -> tuple[str, tuple[str, int]]:
+def _parsed(endpoint: str) -> tuple[str, tuple[str, int]]:
     """Kind and address of `udpin:HOST:PORT`."""
-    kind, _, rest = place.partition(":")
-    host, _, port = rest.rpartition(":")
+    kind, _, host_and_port = endpoint.partition(":")
+    host, _, port = host_and_port.rpartition(":")
     lowest = 1 if kind == "udpout" else 0  # of which a listener gets any that is free
     if kind not in _KINDS or not host or not port.isdecimal() or not lowest <= int(port) <= 65535:
         hint = "For a serial line, start a router such as mavlink-router or MAVProxy"
-        raise BadInput("connect", "be udpin:HOST:PORT or udpout:HOST:PORT", place, hint=hint)
+        raise BadInput("connect", "be udpin:HOST:PORT or udpout:HOST:PORT", endpoint, hint=hint)
     return kind, (host, int(port))

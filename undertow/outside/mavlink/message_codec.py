@@ -29,22 +29,23 @@ class MessageCodec:
 
     def packed(self, messages: list[Any]) -> list[bytes]:
         """Messages as datagrams, numbered on."""
-        found = []
+        datagrams = []
         if self._signing is not None:
             self._signing.timestamp = max(self._signing.timestamp, present())
         for message in messages:
-            found.append(message.pack(self._packer))
+            datagrams.append(message.pack(self._packer))
             self._packer.seq = (self._packer.seq + 1) % 256
-        return found
+        return datagrams
 
     def packed_ahead(self, messages: list[Any]) -> list[bytes]:
         """As `packed`, for datagrams that a watchdog sends later, instead of what is sent meanwhile."""
         if self._signing is None:
             return self.packed(messages)
-        before, self._signing.timestamp = self._signing.timestamp, ahead_of(self._signing)
-        found = self.packed(messages)
+        before = self._signing.timestamp
+        self._signing.timestamp = ahead_of(self._signing)
+        datagrams = self.packed(messages)
         self._signing.timestamp = before
-        return found
+        return datagrams
 
     def overtake(self) -> None:
         """A watchdog may have sent what was packed ahead: what comes now is newer."""
@@ -56,12 +57,14 @@ class MessageCodec:
         if self._signing is None:
             return parsed(data)
         wrong = self._signing.badsig_count
-        found = _parse(SignedParser(self._signing), data)
-        refused = sum(isinstance(one, mavlink.MAVLink_bad_data) and one.reason == _UNSIGNED for one in found)
+        messages = _parse(SignedParser(self._signing), data)
+        refused = sum(
+            isinstance(message, mavlink.MAVLink_bad_data) and message.reason == _UNSIGNED for message in messages
+        )
         wrong = self._signing.badsig_count - wrong
         self.counts["wrongly signed"] += wrong
         self.counts["unsigned"] += refused - wrong
-        return _known(found)
+        return _known(messages)
 
 
 def parsed(data: bytes) -> list[Any]:
@@ -77,5 +80,7 @@ def _parse(parser: Any, data: bytes) -> list[Any]:
     return parser.parse_buffer(data) or []
 
 
-def _known(found: list[Any]) -> list[Any]:
-    return [one for one in found if not isinstance(one, mavlink.MAVLink_bad_data | mavlink.MAVLink_unknown)]
+def _known(messages: list[Any]) -> list[Any]:
+    return [
+        message for message in messages if not isinstance(message, mavlink.MAVLink_bad_data | mavlink.MAVLink_unknown)
+    ]

@@ -68,18 +68,20 @@ class MessageRequests:
         name = self._open[0]
         self._open.append(self._open.pop(0))  # the next one has its turn if this one is not answered
         self._asked, self._asked_at, self._received[name] = name, now, 0
-        number, microseconds = getattr(mavlink, f"MAVLINK_MSG_ID_{name}"), round(1e6 * self._interval)
+        number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+        microseconds = round(1e6 * self._interval)
         parameters = [float(number), float(microseconds), 0.0, 0.0, 0.0, 0.0, 0.0]
         command = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
         return [mavlink.MAVLink_command_long_message(*self._target, command, 0, *parameters)]
 
     def complaint(self) -> str:
         """Which messages the autopilot refuses, in words; "" where it refuses none."""
-        said = ", ".join(f"{name} ({result})" for name, result in self._rejections.items())
-        return f"the vehicle refuses to send {said}" if said else ""
+        refused = ", ".join(f"{name} ({result})" for name, result in self._rejections.items())
+        return f"the vehicle refuses to send {refused}" if refused else ""
 
     def _note_answer(self, result: int, now: float) -> None:
-        name, self._asked = self._asked, None
+        name = self._asked
+        self._asked = None
         if name is None:
             return
         refused = result in _REJECTIONS
@@ -92,8 +94,9 @@ class MessageRequests:
 
     def _note_what_comes(self, now: float) -> None:
         """What comes often enough since it was asked for needs no answer: not every autopilot gives one."""
-        name, passed = self._asked, now - self._asked_at
-        if name is not None and self._received[name] >= _ENOUGH * passed / self._interval:
+        name = self._asked
+        elapsed = now - self._asked_at
+        if name is not None and self._received[name] >= _ENOUGH * elapsed / self._interval:
             self._asked = None
             self._open.remove(name)
 

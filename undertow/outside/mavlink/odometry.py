@@ -76,9 +76,11 @@ class OdometryReader:
             self._attitude = message
         if kind != "LOCAL_POSITION_NED" or self._attitude is None:
             return None
-        apart = (message.time_boot_ms - self._attitude.time_boot_ms) / 1e3
-        if abs(apart) > _APART:
-            raise BadInput("ATTITUDE_QUATERNION", f"be within {_APART:g} s of LOCAL_POSITION_NED", f"{apart:g} s apart")
+        time_between = (message.time_boot_ms - self._attitude.time_boot_ms) / 1e3
+        if abs(time_between) > _APART:
+            raise BadInput(
+                "ATTITUDE_QUATERNION", f"be within {_APART:g} s of LOCAL_POSITION_NED", f"{time_between:g} s apart"
+            )
         return of_local_position(message, self._attitude)
 
 
@@ -111,14 +113,15 @@ def of_local_position(position: Any, attitude: Any) -> MavlinkOdometry:
     world = np.array([position.vx, position.vy, position.vz], dtype=float)
     rates = np.array([attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed], dtype=float)
     velocity = np.concatenate([in_body_axes(quaternion, world), rates])
-    place = np.array([position.x, position.y, position.z], dtype=float)
-    check_plausible("LOCAL_POSITION_NED", place, velocity)
-    return MavlinkOdometry(1000 * position.time_boot_ms, place, quaternion, velocity)
+    north_east_down = np.array([position.x, position.y, position.z], dtype=float)
+    check_plausible("LOCAL_POSITION_NED", north_east_down, velocity)
+    return MavlinkOdometry(1000 * position.time_boot_ms, north_east_down, quaternion, velocity)
 
 
 def in_body_axes(quaternion: NDArray, world: NDArray) -> NDArray:
     """A vector in body axes from one in world axes; the quaternion (w, x, y, z) is body -> world."""
-    w, v = quaternion[0], -quaternion[1:]
+    w = quaternion[0]
+    v = -quaternion[1:]
     twice = 2 * np.cross(v, world)
     return world + w * twice + np.cross(v, twice)
 
@@ -129,8 +132,8 @@ def _unit(quaternion: NDArray) -> NDArray:
     return quaternion / length if abs(length - 1) <= _LENGTH else np.full(4, np.nan)
 
 
-def _check_frame(name: str, frame: int, known: set[int]) -> None:
-    if frame not in known:
-        names = " or ".join(mavlink.enums["MAV_FRAME"][one].name for one in sorted(known))
+def _check_frame(name: str, frame: int, allowed: set[int]) -> None:
+    if frame not in allowed:
+        names = " or ".join(mavlink.enums["MAV_FRAME"][number].name for number in sorted(allowed))
         got = mavlink.enums["MAV_FRAME"].get(frame)
         raise BadInput(f"ODOMETRY.{name}", f"be {names}", got.name if got else f"{frame}, which is no frame")

@@ -19,7 +19,9 @@ class Permission:
     """
 
     def __init__(self, system: int):
-        self._system, self.armed, self._heartbeat = system, False, -np.inf
+        self._system = system
+        self.armed = False
+        self._heartbeat = -np.inf
         self._mode: Any = None  # in which the law may run; None until it does
         self._present_mode: Any = None
         self._emergency = self._leapt = False

@@ -35,11 +35,13 @@ def read_key(path: str | Path) -> bytes:
     path = Path(path)
     try:
         with path.open("rb") as file:
-            mode, contents = path.stat().st_mode, file.read(_LARGEST + 1)
+            mode = path.stat().st_mode
+            contents = file.read(_LARGEST + 1)
     except OSError as error:
         raise BadInput("--signing-key", "be a file that can be read", f"{path}: {error.strerror}") from None
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        must, hint = "be a file that only its owner may read", f"Run: chmod 600 {path}"
+        must = "be a file that only its owner may read"
+        hint = f"Run: chmod 600 {path}"
         raise BadInput("--signing-key", must, f"{path} with mode {stat.S_IMODE(mode):o}", hint=hint)
     passphrase = contents.rstrip(b"\r\n")
     if passphrase and len(contents) <= _LARGEST and _is_line(passphrase):
@@ -94,7 +96,8 @@ class SignedParser(mavlink.MAVLink):
 
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
         """Whether a message is signed with the key, and newer than the last one of its sender."""
-        times, sender = self.signing.stream_timestamps, (msgbuf[-13], srcSystem, srcComponent)
+        times = self.signing.stream_timestamps
+        sender = (msgbuf[-13], srcSystem, srcComponent)
         before = times.get(sender)
         if super().check_signature(msgbuf, srcSystem, srcComponent):
             return True

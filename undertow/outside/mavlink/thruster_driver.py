@@ -36,7 +36,8 @@ class ThrusterDriver:
         self, autopilot: Autopilot, output: str, target: MavlinkTarget, frame: str | None, channels: str | None
     ):
         plant = pulse_driven(autopilot.plant, battery_suffices=False)
-        self._esc, self._target = plant.power.esc or esc(), target
+        self._esc = plant.power.esc or esc()
+        self._target = target
         self.channels = channels_of_vehicle(np.asarray(plant.thruster_matrix), frame, channels)
         self._commands = commands_of(output, int(self.channels.numbers.max()))
         with runtime.on_processor(), runtime.in_precision(autopilot.precision):

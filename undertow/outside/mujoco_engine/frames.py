@@ -55,7 +55,8 @@ def velocity_map(rotation: NDArray) -> NDArray:
         rotation: body -> world in north, east, down.
     """
     to_body = np.zeros((6, 6))
-    to_body[:3, :3], to_body[3:, 3:] = rotation.T @ FLIP, FLIP
+    to_body[:3, :3] = rotation.T @ FLIP
+    to_body[3:, 3:] = FLIP
     return to_body
 
 

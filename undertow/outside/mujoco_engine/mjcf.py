@@ -27,11 +27,11 @@ class RigidBody(NamedTuple):
 
     def without(self, mass: float, point: ArrayLike) -> "RigidBody":
         """The rest, after a point mass (kg) at a point (m) has been taken out of it."""
-        rest = self.mass - mass
-        at = np.asarray(point, dtype=float)
-        centre = (self.mass * self.centre - mass * at) / rest
-        removed = rest * mass / self.mass * spread(centre - at)
-        return RigidBody(rest, centre, self.inertia - removed)
+        remaining_mass = self.mass - mass
+        position = np.asarray(point, dtype=float)
+        centre = (self.mass * self.centre - mass * position) / remaining_mass
+        removed = remaining_mass * mass / self.mass * spread(centre - position)
+        return RigidBody(remaining_mass, centre, self.inertia - removed)
 
 
 def spread(r: NDArray) -> NDArray:
@@ -91,12 +91,12 @@ def mjcf(vehicle: VehicleModel, timestep: float = 2e-3, added_mass: bool = False
     """
     checks.positive("timestep", timestep, "s")
     mass, weight = float(vehicle.mass), float(vehicle.weight)
-    whole = about_centre(mass, np.asarray(vehicle.r_g), np.asarray(vehicle.inertia))
+    body = about_centre(mass, np.asarray(vehicle.r_g), np.asarray(vehicle.inertia))
     lifted = _LIFTED * mass
-    hull = whole.without(lifted, np.asarray(vehicle.r_b))
+    hull = body.without(lifted, np.asarray(vehicle.r_b))
     if not is_possible(hull.inertia):
         must = "be that of a rigid body: no principal inertia above the sum of the others"
-        raise BadInput("inertia", must, np.linalg.eigvalsh(whole.inertia).round(6), hint="undertow check says more")
+        raise BadInput("inertia", must, np.linalg.eigvalsh(body.inertia).round(6), hint="undertow check says more")
     lift = float(vehicle.buoyancy) / (weight * _LIFTED)
     bodies = [
         _body("rest", hull),
@@ -106,8 +106,8 @@ def mjcf(vehicle: VehicleModel, timestep: float = 2e-3, added_mass: bool = False
         bodies.append(_body("added_mass", _as_body(vehicle), 1.0))
     poses = zip(flip(vehicle.thruster_positions), flip(vehicle.thruster_directions), strict=True)
     sites = [
-        f'<site name="thruster{j}" pos="{_text(at)}" zaxis="{_text(axis)}" type="cylinder" size="0.04 0.04"/>'
-        for j, (at, axis) in enumerate(poses, start=1)
+        f'<site name="thruster{j}" pos="{_text(position)}" zaxis="{_text(axis)}" type="cylinder" size="0.04 0.04"/>'
+        for j, (position, axis) in enumerate(poses, start=1)
     ]
     motors = [
         f'<motor name="thruster{j}" site="thruster{j}" gear="0 0 1 0 0 0"/>' for j in range(1, vehicle.thrusters + 1)

@@ -85,7 +85,8 @@ class Propellers:
 
     def _steady(self, voltage: NDArray) -> NDArray:
         """Speed at which torque and load balance: positive root of q x^2 + l x = k_t |V| / R, with the sign of V."""
-        motor, quadratic = self._motor, _either(voltage, self._torque_coefficients)
+        motor = self._motor
+        quadratic = _either(voltage, self._torque_coefficients)
         linear = motor.friction + motor.torque_constant * motor.back_emf_constant / motor.resistance
         drive = motor.torque_constant * np.abs(voltage) / motor.resistance
         return np.sign(voltage) * (np.sqrt(linear**2 + 4 * quadratic * drive) - linear) / (2 * quadratic)
@@ -146,10 +147,14 @@ def run_in_mujoco(
     body.place(start, np.zeros(6))
     reference = starting_at(reference, jnp.asarray(start))
     command, advance, desired = map(eqx.filter_jit, (controller.command, controller.advance, reference.at))  # pyright: ignore[reportArgumentType] - overloads of filter_jit
-    z, rows, control_steps, status = None, [], round(duration / dt), Status.OK
+    z = None
+    rows = []
+    control_steps = round(duration / dt)
+    status = Status.OK
     for step in range(control_steps + 1):
         t = step * dt
-        y, r = _measured(body, propellers), desired(jnp.asarray(t))
+        y = _measured(body, propellers)
+        r = desired(jnp.asarray(t))
         z = controller.init(y, r) if z is None else z
         volts, _ = command(z, y, r)
         applied = propellers.admissible(np.asarray(volts))

@@ -124,19 +124,20 @@ class Submerged:
 
         Nothing is called here that could make the engine complain: inside a callback MuJoCo 4.0.0 then hangs.
         """
-        data, added_mass = self.data, self._hydrodynamics.added_mass
+        data = self.data
+        added_mass = self._hydrodynamics.added_mass
         data.ctrl[:] = thrust
         mass_matrix, levers = np.empty((6, 6)), np.empty((self.model.nu, 6))
         mujoco.mj_fullM(self.model, data, mass_matrix)
         mujoco.mju_sparse2dense(
             levers, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
         )
-        own = data.qfrc_passive - data.qfrc_bias + levers.T @ thrust
+        force = data.qfrc_passive - data.qfrc_bias + levers.T @ thrust
         rotation = self.rotation()
         to_body = frames.velocity_map(rotation)
         nu = to_body @ data.qvel
         water = self._hydrodynamics.wrench(rotation, nu, self._water) + added_mass @ _turning(nu)
-        qacc = np.linalg.solve(mass_matrix + to_body.T @ added_mass @ to_body, own + to_body.T @ water)
+        qacc = np.linalg.solve(mass_matrix + to_body.T @ added_mass @ to_body, force + to_body.T @ water)
         data.qfrc_applied[:] = to_body.T @ (water - added_mass @ to_body @ qacc)
 
 

@@ -67,17 +67,26 @@ def linear_closed_loop(
         BadInput: as of `linear_controller`.
     """
     built = _without_ledger(sampled_of(scenario, "closed loop"), all_states)
-    at, of = _equilibrium(built, position, load), signals_of(built.closed_loop.plant)
-    plant, law = _plant(built, at, True, all_states), _controller(built, at, all_states)
-    ends = np.cumsum([len(of.measured), len(of.desired)])
-    (b_y, b_r, b_u), (d_y, d_r, _) = np.split(law.B, ends, axis=1), np.split(law.D, ends, axis=1)
-    u_x, shown = np.hstack([d_y @ plant.C, law.C]), np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
-    own = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
-    a, b = own + np.vstack([plant.B, b_u]) @ u_x, np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
-    c, d = np.vstack([shown, u_x]), np.vstack([np.zeros((len(shown), len(of.desired))), d_r])
-    outputs, states = of.measured | of.command, plant.state_labels + law.state_labels
+    point = _equilibrium(built, position, load)
+    signals = signals_of(built.closed_loop.plant)
+    plant = _plant(built, point, True, all_states)
+    law = _controller(built, point, all_states)
+    # The inputs of the law are the measurement y, the reference r and the applied input u. Inside the limits u is the
+    # command, which does not depend on u itself: u = D_y C_plant x + C_law z + D_r r, with the states x and z.
+    ends = np.cumsum([len(signals.measured), len(signals.desired)])
+    b_y, b_r, b_u = np.split(law.B, ends, axis=1)
+    d_y, d_r, _ = np.split(law.D, ends, axis=1)
+    u_of_states = np.hstack([d_y @ plant.C, law.C])
+    y_of_states = np.hstack([plant.C, np.zeros((len(plant.C), law.nstates))])
+    without_u = np.block([[plant.A, np.zeros((plant.nstates, law.nstates))], [b_y @ plant.C, law.A]])
+    a = without_u + np.vstack([plant.B, b_u]) @ u_of_states
+    b = np.vstack([plant.B @ d_r, b_r + b_u @ d_r])
+    c = np.vstack([y_of_states, u_of_states])
+    d = np.vstack([np.zeros((len(y_of_states), len(signals.desired))), d_r])
+    outputs = signals.measured | signals.command
+    states = plant.state_labels + law.state_labels
     system = ct.ss(a, b, c, d, built.scenario.loop.dt)
-    return _named(system, "closed_loop", of.desired | outputs, list(of.desired), list(outputs), states)
+    return _named(system, "closed_loop", signals.desired | outputs, list(signals.desired), list(outputs), states)
 
 
 def _without_ledger(built: Built, all_states: bool) -> Built:
@@ -92,73 +101,90 @@ def _without_ledger(built: Built, all_states: bool) -> Built:
 
 
 def _equilibrium(built: Built, position: Any, load: Any) -> Equilibrium:
-    loop, dt = built.closed_loop, built.scenario.loop.dt
+    loop = built.closed_loop
+    dt = built.scenario.loop.dt
     axes = len(loop.plant.outputs)
-    for name, given in (("position", position), ("load", load)):
-        if given is not None and np.shape(given) != (axes,):
+    for name, value in (("position", position), ("load", load)):
+        if value is not None and np.shape(value) != (axes,):
             raise BadInput(
-                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(given)}"
+                name, f"have {axes} entries ({', '.join(loop.plant.outputs)})", f"of shape {np.shape(value)}"
             )
     with computing(built):
         if position is None:
             if load is not None:
                 raise BadInput("position", "be given with a load")
-            at = operating_point(built).mean
+            point = operating_point(built).mean
         else:
-            at = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
-    if not at.found:
+            point = equilibrium(loop, dt, position, np.zeros(axes) if load is None else load)
+    if not point.found:
         raise BadInput(
-            "load", "leave the loop an equilibrium", f"one in which a state changes by {at.moving:.2g} per s"
+            "load", "leave the loop an equilibrium", f"one in which a state changes by {point.moving:.2g} per s"
         )
-    return at
+    return point
 
 
-def _plant(built: Built, at: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
-    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
-    plant, zero = loop.plant, jnp.zeros(())
+def _plant(built: Built, point: Equilibrium, sampled: bool, all_states: bool) -> ct.StateSpace:
+    loop = point.parts.loop
+    signals = signals_of(built.closed_loop.plant)
+    plant = loop.plant
+    zero = jnp.zeros(())
 
-    def moved(state: Any, u: Any) -> Any:
+    def derivative(state: Any, u: Any) -> Any:
         unloaded = plant.no_load()
-        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(at.at["load"]))
-        return vector_of(plant.dynamics(zero, at.parts.plant_state(state), u, pushed))
+        pushed = unloaded._replace(acceleration=unloaded.acceleration + jnp.asarray(point.at["load"]))
+        return vector_of(plant.dynamics(zero, point.parts.plant_state(state), u, pushed))
 
-    def shown(state: Any) -> Any:
-        return vector_of_measurement(plant.output(zero, at.parts.plant_state(state)))
+    def measurement(state: Any) -> Any:
+        return vector_of_measurement(plant.output(zero, point.parts.plant_state(state)))
 
     with computing(built):
-        state, u = jnp.asarray(at.at["plant"]), jnp.asarray(at.at["u"])
-        a, b = map(np.asarray, jax.jit(jax.jacfwd(moved, argnums=(0, 1)))(state, u))
-        c = np.asarray(jax.jit(jax.jacfwd(shown))(state))
-        names = state_names(at.parts.plant_state(state), "plant")
-        found = StateSpaceMatrices(a, b, c, names)
-        found = found if all_states else seen(with_angles(found, np.asarray(state)))
-    system = ct.ss(found.a, found.b, found.c, np.zeros((len(c), b.shape[1])))
+        state, u = jnp.asarray(point.at["plant"]), jnp.asarray(point.at["u"])
+        a, b = map(np.asarray, jax.jit(jax.jacfwd(derivative, argnums=(0, 1)))(state, u))
+        c = np.asarray(jax.jit(jax.jacfwd(measurement))(state))
+        names = state_names(point.parts.plant_state(state), "plant")
+        matrices = StateSpaceMatrices(a, b, c, names)
+        matrices = matrices if all_states else seen(with_angles(matrices, np.asarray(state)))
+    system = ct.ss(matrices.a, matrices.b, matrices.c, np.zeros((len(c), b.shape[1])))
     if sampled:
         system = ct.sample_system(system, built.scenario.loop.dt, "zoh")
-    return _named(system, "plant", of.applied | of.measured, list(of.applied), list(of.measured), found.names)
+    return _named(
+        system,
+        "plant",
+        signals.applied | signals.measured,
+        list(signals.applied),
+        list(signals.measured),
+        matrices.names,
+    )
 
 
-def _controller(built: Built, at: Equilibrium, all_states: bool) -> ct.StateSpace:
-    loop, of = at.parts.loop, signals_of(built.closed_loop.plant)
-    law, dt = loop.controller, jnp.asarray(built.scenario.loop.dt)
-    sizes = np.cumsum([len(of.measured), len(of.desired)])
+def _controller(built: Built, point: Equilibrium, all_states: bool) -> ct.StateSpace:
+    loop = point.parts.loop
+    signals = signals_of(built.closed_loop.plant)
+    law = loop.controller
+    dt = jnp.asarray(built.scenario.loop.dt)
+    sizes = np.cumsum([len(signals.measured), len(signals.desired)])
 
-    def both(state: Any, given: Any) -> Any:
-        measured, desired, applied = jnp.split(given, sizes)
-        z, y, r = at.parts.law_state(state), measurement_of(loop, measured), target_of(desired)
+    def update_and_command(state: Any, inputs_of_law: Any) -> Any:
+        measured, desired, applied = jnp.split(inputs_of_law, sizes)
+        z = point.parts.law_state(state)
+        y = measurement_of(loop, measured)
+        r = target_of(desired)
         return vector_of(law.advance(z, y, r, applied, dt)), law.command(z, y, r)[0]
 
     with computing(built):
-        x = at.parts.plant_state(jnp.asarray(at.at["plant"]))
-        state, y = jnp.asarray(at.at["law"]), loop.plant.output(jnp.zeros(()), x)
-        given = jnp.concatenate([vector_of_measurement(y), *at.parts.target, jnp.asarray(at.at["u"])])
-        (a, b), (c, d) = jax.tree.map(np.asarray, jax.jit(jax.jacfwd(both, argnums=(0, 1)))(state, given))
-        names = state_names(at.parts.law_state(state), "law")
-    found = StateSpaceMatrices(a, b, c, names)
-    found = found if all_states else seen(found)
-    inputs = of.measured | of.desired | of.applied
-    system = ct.ss(found.a, found.b, found.c, d, built.scenario.loop.dt)
-    return _named(system, "controller", inputs | of.command, list(inputs), list(of.command), found.names)
+        x = point.parts.plant_state(jnp.asarray(point.at["plant"]))
+        state = jnp.asarray(point.at["law"])
+        y = loop.plant.output(jnp.zeros(()), x)
+        inputs_of_law = jnp.concatenate([vector_of_measurement(y), *point.parts.target, jnp.asarray(point.at["u"])])
+        (a, b), (c, d) = jax.tree.map(
+            np.asarray, jax.jit(jax.jacfwd(update_and_command, argnums=(0, 1)))(state, inputs_of_law)
+        )
+        names = state_names(point.parts.law_state(state), "law")
+    matrices = StateSpaceMatrices(a, b, c, names)
+    matrices = matrices if all_states else seen(matrices)
+    inputs = signals.measured | signals.desired | signals.applied
+    system = ct.ss(matrices.a, matrices.b, matrices.c, d, built.scenario.loop.dt)
+    return _named(system, "controller", inputs | signals.command, list(inputs), list(signals.command), matrices.names)
 
 
 def _named(

@@ -31,14 +31,16 @@ class Signals(NamedTuple):
 def signals_of(plant: AbstractPlant) -> Signals:
     """Names and units of the signals of a plant and its controller: `north`, `north_rate`, `input_1`, ..."""
     units = dict(zip(plant.outputs, plant.output_units, strict=True))
-    suffixed = lambda suffix, per: {f"{name}_{suffix}": f"{unit}{per}" for name, unit in units.items()}
+    with_suffix = lambda suffix, per: {f"{name}_{suffix}": f"{unit}{per}" for name, unit in units.items()}
     report = plant.output(jnp.zeros(()), plant.initial_state()).actuator
     reported = {name: "rad/s^2" if name.startswith("acceleration") else "rad/s" for name in state_names(report)}
-    measured = units | suffixed("rate", "/s") | reported
-    desired = suffixed("desired", "") | suffixed("rate_desired", "/s") | suffixed("acceleration_desired", "/s^2")
+    measured = units | with_suffix("rate", "/s") | reported
+    desired = (
+        with_suffix("desired", "") | with_suffix("rate_desired", "/s") | with_suffix("acceleration_desired", "/s^2")
+    )
     inputs = range(1, plant.inputs() + 1)
-    each = lambda name: {f"{name}_{number}": plant.input_unit for number in inputs}
-    return Signals(measured, desired, each("input"), each("applied"))
+    per_actuator = lambda name: {f"{name}_{number}": plant.input_unit for number in inputs}
+    return Signals(measured, desired, per_actuator("input"), per_actuator("applied"))
 
 
 def state_names(tree: Any, prefix: str = "") -> list[str]:
@@ -59,7 +61,8 @@ def vector_of(tree: Any) -> Any:
 def tree_of(like: Any) -> Callable[[Any], Any]:
     """The way back from `vector_of` to trees like one."""
     leaves, form = jax.tree.flatten(like)
-    shapes, types = [np.shape(leaf) for leaf in leaves], [jnp.asarray(leaf).dtype for leaf in leaves]
+    shapes = [np.shape(leaf) for leaf in leaves]
+    types = [jnp.asarray(leaf).dtype for leaf in leaves]
     ends = np.cumsum([0, *(np.prod(shape, dtype=int) for shape in shapes)])
 
     def whole(vector: Any) -> Any:

@@ -41,11 +41,15 @@ def seen(system: StateSpaceMatrices) -> StateSpaceMatrices:
     """
     system = _acting(system)
     stems = [_NUMBER.sub("", name) for name in system.names]
-    kept = [_seen_of_group(system, np.array([one == stem for one in stems])) for stem in dict.fromkeys(stems)]
-    basis, names = np.hstack(kept), []
-    for stem, group in zip(dict.fromkeys(stems), kept, strict=True):
-        whole = [name for name, own in zip(system.names, stems, strict=True) if own == stem]
-        names += whole[: group.shape[1]]
+    bases = [
+        _seen_of_group(system, np.array([stem_of_state == stem for stem_of_state in stems]))
+        for stem in dict.fromkeys(stems)
+    ]
+    basis = np.hstack(bases)
+    names = []
+    for stem, group in zip(dict.fromkeys(stems), bases, strict=True):
+        names_of_group = [name for name, stem_of_name in zip(system.names, stems, strict=True) if stem_of_name == stem]
+        names += names_of_group[: group.shape[1]]
     return system.in_coordinates(basis.T, basis, names)
 
 
@@ -57,20 +61,21 @@ def with_angles(system: StateSpaceMatrices, values: NDArray) -> StateSpaceMatric
         values: of its states, about which it is linear.
     """
     forth, back, names = [], [], []
-    columns, places = np.eye(len(system.names)), iter(range(len(system.names)))
-    for place in places:
-        begun = _QUATERNION.fullmatch(system.names[place])
-        if begun is None:
-            forth.append(columns[[place]])
-            back.append(columns[:, [place]])
-            names.append(system.names[place])
+    columns = np.eye(len(system.names))
+    indices = iter(range(len(system.names)))
+    for index in indices:
+        match = _QUATERNION.fullmatch(system.names[index])
+        if match is None:
+            forth.append(columns[[index]])
+            back.append(columns[:, [index]])
+            names.append(system.names[index])
             continue
-        four = slice(place, place + 4)
-        next(itertools.islice(places, 2, 3))
-        to_angles, to_quaternion = map(np.asarray, _slopes(jnp.asarray(values[four])))
-        forth.append(to_angles @ columns[four])
-        back.append(columns[:, four] @ to_quaternion)
-        names += [f"{begun['prefix']}{angle}" for angle in _ANGLES]
+        quaternion = slice(index, index + 4)
+        next(itertools.islice(indices, 2, 3))
+        to_angles, to_quaternion = map(np.asarray, _slopes(jnp.asarray(values[quaternion])))
+        forth.append(to_angles @ columns[quaternion])
+        back.append(columns[:, quaternion] @ to_quaternion)
+        names += [f"{match['prefix']}{angle}" for angle in _ANGLES]
     return system.in_coordinates(np.vstack(forth), np.hstack(back), names)
 
 
@@ -97,18 +102,20 @@ def _acting(system: StateSpaceMatrices) -> StateSpaceMatrices:
 
 def _seen_of_group(system: StateSpaceMatrices, group: NDArray) -> NDArray:
     """Orthonormal columns, of all states, that span what is seen of a group of states; the states where all is."""
-    whole = np.eye(len(system.names))[:, group]
+    columns = np.eye(len(system.names))[:, group]
     rows = np.vstack([system.c, system.a[~group]])
     rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), np.finfo(float).tiny)
     unseen = _null_space(rows[:, group])
-    own = system.a[np.ix_(group, group)]
+    a_group = system.a[np.ix_(group, group)]
+    # What nothing reads directly may be read later: directions that A turns into others are dropped, until A maps the
+    # rest into itself. That is the unobservable subspace of the group.
     while unseen.shape[1]:
-        leaving = own @ unseen - unseen @ (unseen.T @ own @ unseen)
-        stays = _null_space(leaving / max(np.abs(own).max(), np.finfo(float).tiny))
+        leaving = a_group @ unseen - unseen @ (unseen.T @ a_group @ unseen)
+        stays = _null_space(leaving / max(np.abs(a_group).max(), np.finfo(float).tiny))
         if stays.shape[1] == unseen.shape[1]:
-            return whole @ scipy.linalg.null_space(unseen.T)
+            return columns @ scipy.linalg.null_space(unseen.T)
         unseen = unseen @ stays
-    return whole
+    return columns
 
 
 def _null_space(matrix: NDArray) -> NDArray:

@@ -76,25 +76,27 @@ def controller(scenario: Scenario) -> ct.NonlinearIOSystem:
     """
     built = sampled_of(scenario, "controller")
     with computing(built):
-        of, (realization, states) = signals_of(built.closed_loop.plant), _begun(built)
-        z, whole = vector_of(states[1]), tree_of(states[1])
+        signals = signals_of(built.closed_loop.plant)
+        realization, states = _begun(built)
+        z, state_from = vector_of(states[1]), tree_of(states[1])
         dt = jnp.asarray(built.scenario.loop.dt)
-        sizes = np.cumsum([len(of.measured), len(of.desired)])
+        sizes = np.cumsum([len(signals.measured), len(signals.desired)])
 
         def taken(loop: ClosedLoop, state: Any, u: Any):
             measured, desired, applied = jnp.split(u, sizes)
-            return whole(state), measurement_of(loop, measured), target_of(desired), applied
+            return state_from(state), measurement_of(loop, measured), target_of(desired), applied
 
         def advanced(realization: Realization, t: Any, state: Any, u: Any):
-            law, (z, y, r, applied) = realization.loop.controller, taken(realization.loop, state, u)
+            law = realization.loop.controller
+            z, y, r, applied = taken(realization.loop, state, u)
             return vector_of(law.advance(z, y, r, applied, dt))
 
         def commanded(realization: Realization, t: Any, state: Any, u: Any):
             return realization.loop.controller.command(*taken(realization.loop, state, u)[:3])[0]
 
-        inputs = of.measured | of.desired | of.applied
+        inputs = signals.measured | signals.desired | signals.applied
         names = state_names(states[1], "law")
-        return _system("controller", built, realization, (advanced, commanded), z, (inputs, of.command, names))
+        return _system("controller", built, realization, (advanced, commanded), z, (inputs, signals.command, names))
 
 
 def limits(scenario: Scenario) -> ct.NonlinearIOSystem:
@@ -105,13 +107,16 @@ def limits(scenario: Scenario) -> ct.NonlinearIOSystem:
     """
     built = sampled_of(scenario, "controller")
     with computing(built):
-        of, (realization, states) = signals_of(built.closed_loop.plant), _begun(built)
+        signals = signals_of(built.closed_loop.plant)
+        realization, states = _begun(built)
 
         def limited(realization: Realization, t: Any, state: Any, u: Any):
             return realization.loop.plant.admissible(states[0], u)
 
         nothing = lambda realization, t, state, u: state
-        return _system("limits", built, realization, (nothing, limited), jnp.zeros(0), (of.command, of.applied, []))
+        return _system(
+            "limits", built, realization, (nothing, limited), jnp.zeros(0), (signals.command, signals.applied, [])
+        )
 
 
 def closed_loop(scenario: Scenario) -> ct.NonlinearIOSystem:
@@ -125,29 +130,34 @@ def closed_loop(scenario: Scenario) -> ct.NonlinearIOSystem:
     """
     built = sampled_of(scenario, "closed loop")
     with computing(built):
-        of, (realization, states), settings = signals_of(built.closed_loop.plant), _begun(built), built.scenario.loop
-        start, whole = vector_of(states), tree_of(states)
-        integrate, dt = METHODS[settings.method], jnp.asarray(settings.dt)
+        signals = signals_of(built.closed_loop.plant)
+        realization, states = _begun(built)
+        settings = built.scenario.loop
+        start, state_from = vector_of(states), tree_of(states)
+        integrate = METHODS[settings.method]
+        dt = jnp.asarray(settings.dt)
 
         def following(realization: Realization, u: Any) -> Realization:
             loop = eqx.tree_at(lambda loop: loop.reference, realization.loop, _Held(target_of(u)))
             return realization._replace(loop=loop)
 
         def stepped(realization: Realization, k: Any, state: Any, u: Any):
-            carry, held = (whole(state), (), going()), following(realization, u)
-            return vector_of(sampled.control_step(held, (), dt, integrate, settings.substeps, carry, k)[0])
+            carry = (state_from(state), (), going())
+            with_reference = following(realization, u)
+            return vector_of(sampled.control_step(with_reference, (), dt, integrate, settings.substeps, carry, k)[0])
 
         def shown(realization: Realization, k: Any, state: Any, u: Any):
-            t, (x, z, measuring) = instant(k, dt), whole(state)
+            t = instant(k, dt)
+            x, z, measuring = state_from(state)
             truth = realization.loop.plant.output(t, x)
             applied = following(realization, u).decide(t, x, z, measuring).applied
             return jnp.concatenate([truth.position, truth.velocity, applied])
 
-        kinematic = dict(list(of.measured.items())[: 2 * len(built.closed_loop.plant.outputs)])
+        kinematic = dict(list(signals.measured.items())[: 2 * len(built.closed_loop.plant.outputs)])
         prefixed = zip(("plant", "law", "measuring"), states, strict=True)
         names = [name for prefix, tree in prefixed for name in state_names(tree, prefix)]
-        signals = of.desired, kinematic | of.applied, names
-        return _system("closed_loop", built, realization, (stepped, shown), start, signals, by_number=True)
+        system_signals = signals.desired, kinematic | signals.applied, names
+        return _system("closed_loop", built, realization, (stepped, shown), start, system_signals, by_number=True)
 
 
 def connected(
@@ -162,11 +172,11 @@ def connected(
     if not plant.dt:
         hint = "Take `plant(scenario, sampled=True)`"
         raise BadInput("plant", "be in discrete time, as its controller is", "continuous", hint=hint)
-    given = {name for part in parts.values() for name in part.output_labels}
+    available = {name for part in parts.values() for name in part.output_labels}
     for name, part in parts.items():
         if part.dt != plant.dt:
             raise BadInput(name, f"have the sampling time of the plant, {plant.dt:g} s", f"{part.dt:g} s")
-        lacking = [one for one in part.input_labels if one not in given and not one.endswith("_desired")]
+        lacking = [label for label in part.input_labels if label not in available and not label.endswith("_desired")]
         if lacking:
             raise BadInput(name, "take what the others give", f"without {', '.join(lacking)}")
     desired = [name for name in controller.input_labels if name.endswith("_desired")]
@@ -180,16 +190,18 @@ def reference(scenario: Scenario, time: Any) -> NDArray:
     Raises:
         BadInput: the scenario cannot be used, or the instants are no list of numbers.
     """
-    built, instants = built_of(scenario), numbers("time", time, (np.size(time),))
+    built = built_of(scenario)
+    instants = numbers("time", time, (np.size(time),))
     checks.finite("time", instants, "s")
     with computing(built):
         desired = lambda part, _, t: ((), jnp.concatenate(part.at(t)))
-        at, found = step_of(desired, built.closed_loop.reference, (), np.zeros(())), []
+        step = step_of(desired, built.closed_loop.reference, (), np.zeros(()))
+    references = []
     for now in instants:  # by the program of a step, for the bits of a simulation
-        at.inputs[...] = now
-        at()
-        found.append(at.outputs.copy())
-    return np.array(found).T
+        step.inputs[...] = now
+        step()
+        references.append(step.outputs.copy())
+    return np.array(references).T
 
 
 def built_of(scenario: Scenario) -> Built:
@@ -217,31 +229,35 @@ def measurement_of(loop: ClosedLoop, vector: Any):
 
 def _continuous_plant(built: Built) -> ct.NonlinearIOSystem:
     with computing(built):
-        of, (realization, states) = signals_of(built.closed_loop.plant), _begun(built)
-        x, whole = vector_of(states[0]), tree_of(states[0])
+        signals = signals_of(built.closed_loop.plant)
+        realization, states = _begun(built)
+        x, state_from = vector_of(states[0]), tree_of(states[0])
 
         def moved(realization: Realization, t: Any, state: Any, u: Any):
-            x = whole(state)
+            x = state_from(state)
             return vector_of(realization.motion(t, x, realization.loop.plant.admissible(x, u)))
 
         def shown(realization: Realization, t: Any, state: Any, u: Any):
-            return vector_of_measurement(realization.loop.plant.output(t, whole(state)))
+            return vector_of_measurement(realization.loop.plant.output(t, state_from(state)))
 
         names = state_names(states[0], "plant")
-        return _system("plant", built, realization, (moved, shown), x, (of.applied, of.measured, names), dt=0)
+        return _system("plant", built, realization, (moved, shown), x, (signals.applied, signals.measured, names), dt=0)
 
 
 def _sampled_plant(built: Built) -> ct.NonlinearIOSystem:
     if built.scenario.loop.method == "adaptive":
         raise BadInput("loop.method", "be rk4 or euler for a plant in discrete time", "adaptive")
     with computing(built):
-        of, (realization, states), settings = signals_of(built.closed_loop.plant), _begun(built), built.scenario.loop
+        signals = signals_of(built.closed_loop.plant)
+        realization, states = _begun(built)
+        settings = built.scenario.loop
         first = PlantState(states[0], states[2].navigation, states[2].faults)
-        start, whole = vector_of(first), tree_of(first)
-        integrate, dt = METHODS[settings.method], jnp.asarray(settings.dt)
+        start, state_from = vector_of(first), tree_of(first)
+        integrate = METHODS[settings.method]
+        dt = jnp.asarray(settings.dt)
 
         def measured(realization: Realization, t: Any, state: Any):
-            x, navigation, faults = whole(state)
+            x, navigation, faults = state_from(state)
             truth = realization.loop.plant.output(t, x)
             y, measuring = realization.read(t, truth, MeasurementState(navigation, None, faults))
             return PlantState(x, measuring.navigation, measuring.faults), y
@@ -256,8 +272,8 @@ def _sampled_plant(built: Built) -> ct.NonlinearIOSystem:
 
         prefixed = zip(("plant", "navigation", "faults"), first, strict=True)
         names = [name for prefix, tree in prefixed for name in state_names(tree, prefix)]
-        signals = (of.applied, of.measured, names)
-        return _system("plant", built, realization, (stepped, shown), start, signals)
+        system_signals = (signals.applied, signals.measured, names)
+        return _system("plant", built, realization, (stepped, shown), start, system_signals)
 
 
 def _system(
@@ -285,24 +301,27 @@ def _system(
     inputs, outputs, states = signals
     period = built.scenario.loop.dt if dt is None else dt
     instant = jnp.zeros((), dtype=int) if by_number else jnp.zeros(())
-    given = (instant, start, jnp.zeros(len(inputs)))
+    arguments = (instant, start, jnp.zeros(len(inputs)))
 
     def called(function: Callable) -> Callable:
-        step = step_of(lambda part, _, given: ((), function(part, *given)), realization, (), given)
+        step = step_of(lambda part, _, arguments: ((), function(part, *arguments)), realization, (), arguments)
         at, state, u = step.inputs
 
-        def call(t: float, x: NDArray, taken: NDArray, params: Any) -> NDArray:
-            at[...], state[...], u[...] = _number(t, period) if by_number else t, x, taken
+        def call(t: float, x: NDArray, input_vector: NDArray, params: Any) -> NDArray:
+            at[...] = _number(t, period) if by_number else t
+            state[...] = x
+            u[...] = input_vector
             step()
             return step.outputs.astype(float)
 
         return call
 
-    updated, shown = map(called, functions)
+    updated, output = map(called, functions)
     system: Any = ct.nlsys(
-        updated, shown, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
+        updated, output, inputs=list(inputs), outputs=list(outputs), states=states, dt=period or 0, name=name
     )
-    system.units, system.start = inputs | outputs, np.asarray(start, dtype=float)
+    system.units = inputs | outputs
+    system.start = np.asarray(start, dtype=float)
     return system
 
 
@@ -316,14 +335,16 @@ def _number(t: float, dt: float) -> int:
 
 def _begun(built: Built) -> tuple[Realization, tuple[Any, Any, MeasurementState]]:
     """The loop with its random parts sampled, and the states of plant, law and measuring at t = 0, as in a run."""
-    loop, key, start = built.closed_loop, key_of_seed(built.scenario.seed), _start(built)
+    loop = built.closed_loop
+    key = key_of_seed(built.scenario.seed)
+    start = _start(built)
     sampled_once = lambda loop, key: eqx.filter(loop.realize(key)[1:], eqx.is_array)
     first = lambda loop, key: sampled.begin(loop.realize(key), start, ())[0]
     step = step_of(lambda loop, _, key: ((), (sampled_once(loop, key), first(loop, key))), loop, (), key)
     step()
     arrays, states = jax.tree.map(jnp.asarray, step.outputs)
-    rest = eqx.filter(loop.realize(key)[1:], eqx.is_array, inverse=True)
-    return Realization(loop, *eqx.combine(arrays, rest)), states
+    static = eqx.filter(loop.realize(key)[1:], eqx.is_array, inverse=True)
+    return Realization(loop, *eqx.combine(arrays, static)), states
 
 
 def _start(built: Built) -> tuple[Any, Any]:

@@ -63,15 +63,16 @@ class RealTimeLoop:
     ):
         self._autopilot, self._link, self._clock, self._stop, self._begun = autopilot, link, clock, stop, begun
         self._report, self._every = report, every
-        self._report_due, self._steps_reported = clock.now() + every, 0
-        self._looked: float | None = None  # when measurements were looked for last, s
+        self._report_due = clock.now() + every
+        self._steps_reported = 0
+        self._last_look: float | None = None  # when measurements were looked for last, s
         self._period = autopilot.sampling_time
-        chosen = LoopSettings() if settings is None else settings
-        self._settings = chosen.checked(autopilot.plant.inputs())
-        self._deadline = self._period if chosen.deadline is None else chosen.deadline
-        self._standstill = max(chosen.max_age, _STANDSTILL * self._period)
+        loop_settings = LoopSettings() if settings is None else settings
+        self._settings = loop_settings.checked(autopilot.plant.inputs())
+        self._deadline = self._period if loop_settings.deadline is None else loop_settings.deadline
+        self._standstill = max(loop_settings.max_age, _STANDSTILL * self._period)
         safe = self._settings.safe
-        self.session = ControlSession(autopilot, link.form, chosen.max_age, safe, chosen.from_safe)
+        self.session = ControlSession(autopilot, link.form, loop_settings.max_age, safe, loop_settings.from_safe)
         self.statistics = LoopStatistics()
 
     def run(self, steps: float = math.inf, periods: float = math.inf) -> Reason:
@@ -94,31 +95,32 @@ class RealTimeLoop:
         if received is None:
             return self._why_no_start()
         self._begun()
-        clock, period, seen = self._clock, self._period, self.statistics
-        begin = started = last = clock.now()
-        planned, at, elapsed, waited = 0, 0.0, 0.0, 0.0
+        clock, period, statistics = self._clock, self._period, self.statistics
+        loop_start = started = last = clock.now()
+        planned, instant, elapsed, waited = 0, 0.0, 0.0, 0.0
         while True:
-            begun = clock.now()
+            computing_start = clock.now()
             self._link.send(self._command(received, elapsed))
-            answered = clock.now()
+            command_sent = clock.now()
             self._autopilot.log_step()  # after the command is on its way
-            following = max(planned + 1, math.floor((clock.now() - begin) / period) + 1)
-            self._count(answered - begin - planned * period, following - planned - 1, received is not None)
-            seen.computing.add(answered - begun)
-            seen.lateness.add(started - begin - planned * period)
-            seen.longest_stale = max(seen.longest_stale, waited)
-            if seen.steps > 1 and started - last < 1.5 * period:
-                seen.jitter.add(abs(started - last - period))
-            if seen.steps >= steps or planned + 1 >= periods:
+            following = max(planned + 1, math.floor((clock.now() - loop_start) / period) + 1)
+            self._count(command_sent - loop_start - planned * period, following - planned - 1, received is not None)
+            statistics.computing.add(command_sent - computing_start)
+            statistics.lateness.add(started - loop_start - planned * period)
+            statistics.longest_stale = max(statistics.longest_stale, waited)
+            if statistics.steps > 1 and started - last < 1.5 * period:
+                statistics.jitter.add(abs(started - last - period))
+            if statistics.steps >= steps or planned + 1 >= periods:
                 return Reason.COMPLETED
 
             planned, last = following, started
-            clock.sleep_until(begin + planned * period)
+            clock.sleep_until(loop_start + planned * period)
             if self._stop():
                 return Reason.STOPPED
             started = clock.now()
-            before, at = at, self._instant(started - begin)
-            elapsed = (at - before) * period
+            before = instant
+            instant = self._instant(started - loop_start)
+            elapsed = (instant - before) * period
             if elapsed > self._standstill:
                 return Reason.STALLED
             received = self._link.receive(elapsed)
@@ -128,19 +130,19 @@ class RealTimeLoop:
             if waited > self._settings.max_age:
                 return Reason.LINK_LOST
 
-    def _count(self, answered: float, missed: int, fresh: bool) -> None:
+    def _count(self, response_time: float, missed: int, fresh: bool) -> None:
         """Count a step whose command came `answered` (s) after its planned beginning."""
-        seen = self.statistics
-        seen.steps += 1
-        seen.overruns += answered >= self._deadline
-        seen.missed += missed
-        seen.stale += not fresh
+        statistics = self.statistics
+        statistics.steps += 1
+        statistics.overruns += response_time >= self._deadline
+        statistics.missed += missed
+        statistics.stale += not fresh
 
     def _instant(self, since: float) -> float:
         """Time of a step that begins `since` (s) after the start, as the controller gets it, in periods."""
         periods = since / self._period
-        whole = math.floor(periods + _ROUNDING)
-        return whole if periods - whole <= _LITTLE else periods
+        whole_periods = math.floor(periods + _ROUNDING)
+        return whole_periods if periods - whole_periods <= _LITTLE else periods
 
     def _command(self, received: LinkMeasurement | None, elapsed: float) -> np.ndarray:
         """The command for a measurement, or without one."""
@@ -154,16 +156,17 @@ class RealTimeLoop:
 
         The safe output is sent meanwhile.
         """
-        begin, planned = self._clock.now(), 0
+        wait_start = self._clock.now()
+        planned = 0
         while not self._stop() and not self._link.ended:
             received = self._link.receive(self._period if planned else 0.0)
             if received is not None and not received.missing():
                 return received
-            if self._clock.now() - begin > self._settings.patience:
+            if self._clock.now() - wait_start > self._settings.patience:
                 return None
             self._link.await_measurement(self._settings.safe)
             planned += 1
-            self._clock.sleep_until(begin + planned * self._period)
+            self._clock.sleep_until(wait_start + planned * self._period)
         return None
 
     def _why_no_start(self) -> Reason:
@@ -172,10 +175,10 @@ class RealTimeLoop:
         return Reason.STOPPED if self._stop() else Reason.NO_START
 
     def _by_measurements(self, link: AbstractPacingLink, steps: float, periods: float) -> Reason:
-        begin = self._clock.now()
+        loop_start = self._clock.now()
         while not self._stop():
             self.turn(link, LOOK)
-            if self.statistics.steps >= steps or self._clock.now() - begin >= periods * self._period:
+            if self.statistics.steps >= steps or self._clock.now() - loop_start >= periods * self._period:
                 return Reason.COMPLETED
             if link.ended:
                 return Reason.LINK_ENDED
@@ -186,11 +189,12 @@ class RealTimeLoop:
         """Wait at most so long (s) for a measurement and answer it, or send the safe output where that is due."""
         link.wait(longest)
         now = link.time(self._clock.now())
-        elapsed = now - (now if self._looked is None else self._looked)
-        self._looked = now
+        elapsed = now - (now if self._last_look is None else self._last_look)
+        self._last_look = now
         if elapsed > self._standstill + LOOK:
             link.discard()
-        begun, was_running = self._clock.now(), self.session.running
+        computing_start = self._clock.now()
+        was_running = self.session.running
         measurement = link.receive(elapsed)
         objection = link.objection()
         command = self.session.follow(measurement, now, objection)
@@ -199,7 +203,7 @@ class RealTimeLoop:
                 link.note_begin()
             self.statistics.steps += 1  # whoever sees the command sees it counted
             link.send(command)
-            self.statistics.computing.add(self._clock.now() - begun)
+            self.statistics.computing.add(self._clock.now() - computing_start)
             self._autopilot.log_step()
         elif was_running and not self.session.running:
             link.note_stop(self.session.state(objection))

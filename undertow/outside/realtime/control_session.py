@@ -51,7 +51,8 @@ class ControlSession:
         self._period = round(autopilot.sampling_time * _SECOND)
         self._nothing = _nothing_measured(autopilot, form)
         self._rate = MeasurementRate(autopilot.sampling_time)
-        self.running, self.counts = False, {"starts": 0, "between steps": 0, "irregular": 0}
+        self.running = False
+        self.counts = {"starts": 0, "between steps": 0, "irregular": 0}
         self._located = self._safe_sent = -np.inf  # s, when a pose came last, and when the safe output was sent
         self._stamp: int | None = None  # of the last measurement, ns
         self._stepped = 0  # stamp of the last step, ns
@@ -67,10 +68,10 @@ class ControlSession:
         measured = self._nothing if measurement is None else measurement
         return self._given_to(self._autopilot.step, measured, applied=measured.applied, dt=dt)
 
-    def _given_to(self, method: Callable[..., np.ndarray], measured: LinkMeasurement, **more: Any) -> np.ndarray:
+    def _given_to(self, method: Callable[..., np.ndarray], measured: LinkMeasurement, **options: Any) -> np.ndarray:
         motion = measured.position, measured.velocity, measured.attitude
-        more |= {"target": measured.target, "propellers": measured.propellers, "health": measured.health}
-        return method(*motion, **more)
+        options |= {"target": measured.target, "propellers": measured.propellers, "health": measured.health}
+        return method(*motion, **options)
 
     def follow(self, measurement: LinkMeasurement | None, now: float, objection: str = "") -> np.ndarray | None:
         """The command that answers a measurement; None where there is none. Call it often, also without one.
@@ -103,7 +104,9 @@ class ControlSession:
             return None
         else:
             command = self.step(measurement, self._passed(measurement))
-        self._stepped, self.running, self._operator_objected = measurement.stamp, True, False
+        self._stepped = measurement.stamp
+        self.running = True
+        self._operator_objected = False
         return command
 
     def _stop_if_lost(self, now: float, objection: str) -> None:
@@ -113,7 +116,8 @@ class ControlSession:
         self._operator_objected |= bool(objection)
         lost = now - self._located > self._max_age or self._rate.irregular
         if self.running and (lost or objection):
-            self.running, self._safe_sent = False, -np.inf
+            self.running = False
+            self._safe_sent = -np.inf
 
     def is_safe_output_due(self, now: float) -> bool:
         """Whether the safe output should be sent now, which is noted: the controller has run, and waits."""
@@ -133,7 +137,8 @@ class ControlSession:
 
     def _begin(self, measurement: LinkMeasurement) -> np.ndarray | None:
         """The first command, or the first after a stop; None where the measurement is none to start with."""
-        missing, again = measurement.missing(), self.counts["starts"] > 0
+        missing = measurement.missing()
+        again = self.counts["starts"] > 0
         self._unfit = f": {missing} not measured" if missing else ""
         if missing:
             return None
@@ -163,9 +168,9 @@ class ControlSession:
 
     def _passed(self, measurement: LinkMeasurement) -> float | None:
         """Time since the last step, s; None for the sampling time, and where the clock of the sender was set."""
-        passed = measurement.stamp - self._stepped
-        was_set = measurement.elapsed == 0 or passed <= 0
-        return None if was_set or abs(passed - self._period) <= _EXACT else passed / _SECOND
+        elapsed = measurement.stamp - self._stepped
+        was_set = measurement.elapsed == 0 or elapsed <= 0
+        return None if was_set or abs(elapsed - self._period) <= _EXACT else elapsed / _SECOND
 
 
 def _nothing_measured(autopilot: Autopilot, form: Format | None) -> LinkMeasurement:
@@ -173,5 +178,6 @@ def _nothing_measured(autopilot: Autopilot, form: Format | None) -> LinkMeasurem
     outputs = len(autopilot.plant.outputs)
     if form is None:
         return LinkMeasurement(np.full(outputs, np.nan), np.full(outputs, np.nan))
-    names, unknown = form.columns(), lambda columns: np.full(len(columns), np.nan)
+    names = form.columns()
+    unknown = lambda columns: np.full(len(columns), np.nan)
     return LinkMeasurement(unknown(names.position), unknown(names.velocity), unknown(names.attitude))

@@ -67,8 +67,8 @@ class Datagram(NamedTuple):
         """As bytes, for a vehicle of so many actuators."""
         numbers = (self.session, self.sequence, self.time, self.answered)
         head = _HEADER.pack(_MAGIC, _VERSION, self.kind, FLAG * self.flag, actuators, *numbers)
-        whole = head + np.asarray(self.values, dtype="<f8").tobytes()
-        return whole + _SUM.pack(zlib.crc32(whole))
+        checked = head + np.asarray(self.values, dtype="<f8").tobytes()
+        return checked + _SUM.pack(zlib.crc32(checked))
 
 
 class Refused(Exception):
@@ -90,13 +90,14 @@ def unpacked(data: bytes, kind: int, actuators: int) -> Datagram:
     """
     if len(data) != size_of(kind, actuators):
         raise Refused("wrong size")
-    whole, (checksum,) = data[: -_SUM.size], _SUM.unpack(data[-_SUM.size :])
-    if zlib.crc32(whole) != checksum:
+    checked = data[: -_SUM.size]
+    (checksum,) = _SUM.unpack(data[-_SUM.size :])
+    if zlib.crc32(checked) != checksum:
         raise Refused("damaged")
-    magic, version, found, flags, count, session, sequence, time, answered = _HEADER.unpack_from(whole)
-    if (magic, version, found, count) != (_MAGIC, _VERSION, kind, actuators) or flags not in (0, FLAG):
+    magic, version, kind_received, flags, count, session, sequence, time, answered = _HEADER.unpack_from(checked)
+    if (magic, version, kind_received, count) != (_MAGIC, _VERSION, kind, actuators) or flags not in (0, FLAG):
         raise Refused("foreign")
-    values = np.frombuffer(whole, dtype="<f8", offset=_HEADER.size).astype(float)
+    values = np.frombuffer(checked, dtype="<f8", offset=_HEADER.size).astype(float)
     unknown = np.isnan(values) & (kind == MEASUREMENT)  # what was not measured
     if not (unknown | (np.abs(values) < _LARGEST)).all():
         raise Refused("invalid")
@@ -125,21 +126,21 @@ class DatagramFilter:
         names += ("repeated", "far ahead", "left unread")
         self.counts: dict[str, int] = dict.fromkeys(names, 0)
         self.newest: Datagram | None = None
-        self._far = 0  # sequence number of the last datagram that was ahead
+        self._far_ahead = 0  # sequence number of the last datagram that was ahead
 
     def take(self, data: bytes) -> Datagram | None:
         """The datagram, if it can be used; otherwise it is counted."""
         try:
-            found = unpacked(data, self._kind, self._actuators)
-            if self.newest is not None and found.session != self.newest.session:
+            datagram = unpacked(data, self._kind, self._actuators)
+            if self.newest is not None and datagram.session != self.newest.session:
                 raise Refused("other session")
-            self._check_order(found.sequence)
+            self._check_order(datagram.sequence)
         except Refused as why:
             self.counts[str(why)] += 1
             return None
         self.counts["received"] += 1
-        self.newest = found
-        return found
+        self.newest = datagram
+        return datagram
 
     def _check_order(self, sequence: int) -> None:
         """Check that a datagram is later than the last one; one far ahead counts where another follows it.
@@ -152,10 +153,10 @@ class DatagramFilter:
             ahead = (sequence - self.newest.sequence) % _SEQUENCES
             if not 0 < ahead <= _SEQUENCES // 2:
                 raise Refused("repeated")
-            if ahead > _WINDOW and not 0 < (sequence - self._far) % _SEQUENCES <= _WINDOW:
-                self._far = sequence
+            if ahead > _WINDOW and not 0 < (sequence - self._far_ahead) % _SEQUENCES <= _WINDOW:
+                self._far_ahead = sequence
                 raise Refused("far ahead")
-        self._far = sequence
+        self._far_ahead = sequence
 
 
 class Sender:
@@ -189,13 +190,13 @@ def _next(sequence: int, steps: int) -> int:
     return (sequence + steps - 1) % (_SEQUENCES - 1) + 1
 
 
-def address_of(place: str, name: str) -> tuple[str, int]:
+def address_of(address: str, name: str) -> tuple[str, int]:
     """Host and port of HOST:PORT.
 
     Raises:
         BadInput: it is none.
     """
-    host, colon, port = place.rpartition(":")
+    host, colon, port = address.rpartition(":")
     if not (colon and host and port.isascii() and port.isdecimal() and 0 < int(port) < 65536):
-        raise BadInput(name, "be HOST:PORT with a port from 1 to 65535", repr(place))
+        raise BadInput(name, "be HOST:PORT with a port from 1 to 65535", repr(address))
     return host, int(port)

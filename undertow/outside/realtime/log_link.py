@@ -58,13 +58,14 @@ class LogLink(AbstractLink):
         self._plant, self._log = plant, log
         names = ["received_position", "received_velocity"] + ["received_attitude"] * (self.form is not None)
         targets = ["reference", "reference_velocity", "reference_acceleration"]
-        several = [name for name in ("received_report", "received_health") if name in log]
-        used = [*names, *targets, *several, "applied_input", "elapsed", "commanded_input"]
+        optional = [name for name in ("received_report", "received_health") if name in log]
+        used = [*names, *targets, *optional, "applied_input", "elapsed", "commanded_input"]
         steps = self._whole_steps(log, used, path)
         rows = {name: log[name].values[:steps] for name in used}
         self._motion, self._target = [rows[name] for name in names], [rows[name] for name in targets]
         self._applied, self._elapsed, self._expected = rows["applied_input"], rows["elapsed"], rows["commanded_input"]
-        self._health, self._time = rows.get("received_health"), log["elapsed"].time[:steps]
+        self._health = rows.get("received_health")
+        self._time = log["elapsed"].time[:steps]
         self._reports = self._split(rows["received_report"]) if "received_report" in rows else None
         self._found = np.full_like(self._expected, np.nan)
         self._row = self._answered = 0
@@ -92,7 +93,8 @@ class LogLink(AbstractLink):
             raise BadInput("--link", "name a log that begins with the start of the controller", str(path), hint=_HINT)
 
     def receive(self, elapsed: float) -> LinkMeasurement | None:
-        k, self._row = self._row, self._row + 1
+        k = self._row
+        self._row += 1
         if k >= len(self._time):
             self.ended = "the log ended"
             return None
@@ -123,15 +125,15 @@ class LogLink(AbstractLink):
 
         Steps of the log that were not replayed do not count.
         """
-        done = min(self._answered, len(self._time))
-        expected, found = self._expected[:done], self._found[:done]
+        steps = min(self._answered, len(self._time))
+        expected, replayed = self._expected[:steps], self._found[:steps]
         names = self._log["commanded_input"].column_names()
         columns = []
         for i, name in enumerate(names):
-            apart = expected[:, i] != found[:, i]
-            if apart.any():
-                largest = float(np.abs(expected[:, i] - found[:, i]).max())
-                columns.append(Difference(name, int(apart.sum()), float(self._time[np.argmax(apart)]), largest))
+            differs = expected[:, i] != replayed[:, i]
+            if differs.any():
+                largest = float(np.abs(expected[:, i] - replayed[:, i]).max())
+                columns.append(Difference(name, int(differs.sum()), float(self._time[np.argmax(differs)]), largest))
         return columns
 
 

@@ -19,13 +19,14 @@ class Durations:
     def __init__(self) -> None:
         self._counts = np.zeros(_INTERVALS + 1, dtype=np.int64)
         self._sum = self._square = 0.0
-        self._least, self._largest = np.inf, -np.inf
+        self._least = np.inf
+        self._largest = -np.inf
         self.number = 0
 
     def add(self, duration: float) -> None:
         """Note one duration, s; a negative one counts as zero in the histogram."""
-        place = np.log(max(duration, _SHORTEST) / _SHORTEST) / np.log(_RATIO)
-        self._counts[min(int(place), _INTERVALS)] += 1
+        interval = np.log(max(duration, _SHORTEST) / _SHORTEST) / np.log(_RATIO)
+        self._counts[min(int(interval), _INTERVALS)] += 1
         self._sum += duration
         self._square += duration**2
         self._least, self._largest = min(self._least, duration), max(self._largest, duration)
@@ -36,22 +37,26 @@ class Durations:
         if not self.number:
             return np.nan
         rank = np.ceil(share * self.number - _ROUNDING)
-        reached = int(np.searchsorted(np.cumsum(self._counts), rank))
-        if reached in (0, _INTERVALS):  # below the first interval or above the last
-            return self._largest if reached else max(self._least, 0.0)
-        return float(np.clip(_SHORTEST * _RATIO ** (reached + 0.5), self._least, self._largest))
+        interval = int(np.searchsorted(np.cumsum(self._counts), rank))
+        if interval in (0, _INTERVALS):  # below the first interval or above the last
+            return self._largest if interval else max(self._least, 0.0)
+        return float(np.clip(_SHORTEST * _RATIO ** (interval + 0.5), self._least, self._largest))
 
     def summary(self) -> dict[str, float]:
         """Number, mean, rms, p50, p99, p99.9 and maximum; times in s; {} without one."""
         if not self.number:
             return {}
-        found = {"number": self.number, "mean": self._sum / self.number, "rms": (self._square / self.number) ** 0.5}
-        return found | {name: self.quantile(share) for name, share in _SHARES.items()} | {"max": self._largest}
+        statistics = {
+            "number": self.number,
+            "mean": self._sum / self.number,
+            "rms": (self._square / self.number) ** 0.5,
+        }
+        return statistics | {name: self.quantile(share) for name, share in _SHARES.items()} | {"max": self._largest}
 
     def milliseconds(self) -> dict[str, float]:
         """Median, 99th percentile and longest, ms; {} without one."""
-        found = self.summary()
-        return {name: 1e3 * found[name] for name in ("p50", "p99", "max")} if found else {}
+        statistics = self.summary()
+        return {name: 1e3 * statistics[name] for name in ("p50", "p99", "max")} if statistics else {}
 
     def __str__(self) -> str:
         return ", ".join(f"{name} {value:.2f} ms" for name, value in self.milliseconds().items()) or "no step yet"

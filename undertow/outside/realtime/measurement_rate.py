@@ -22,7 +22,8 @@ class MeasurementRate:
     """
 
     def __init__(self, sampling_time: float):
-        self._sampling_time, self._window = sampling_time, max(WINDOW, _SHORTEST * sampling_time)
+        self._sampling_time = sampling_time
+        self._window = max(WINDOW, _SHORTEST * sampling_time)
         self._late: deque[float] = deque(maxlen=MOST)  # when
         self.irregular, self.counted = False, 0
 

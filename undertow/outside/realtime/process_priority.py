@@ -23,7 +23,8 @@ def scheduled(priority: int | None, processor: int | None) -> Iterator[None]:
         BadInput: the system has no such thing, or does not permit it.
     """
     scheduler, processors = _scheduler(priority), _processors(processor)
-    followers = {one.native_id for one in threading.enumerate() if one.native_id} - {threading.get_native_id()}
+    native_ids = {python_thread.native_id for python_thread in threading.enumerate() if python_thread.native_id}
+    followers = native_ids - {threading.get_native_id()}
     try:
         _prioritize(priority, followers)
         if processor is not None:
@@ -56,10 +57,10 @@ def _processors(processor: int | None) -> set[int] | None:
         return None
     if not hasattr(os, "sched_setaffinity"):
         raise BadInput("--cpu", "be left out on a system that cannot bind threads to processors", processor)
-    found = os.sched_getaffinity(0)
-    if processor not in found:
-        raise BadInput("--cpu", f"be one of {', '.join(map(str, sorted(found)))}", processor)
-    return found
+    allowed = os.sched_getaffinity(0)
+    if processor not in allowed:
+        raise BadInput("--cpu", f"be one of {', '.join(map(str, sorted(allowed)))}", processor)
+    return allowed
 
 
 def _prioritize(priority: int | None, followers: set[int]) -> None:

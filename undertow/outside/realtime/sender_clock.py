@@ -19,7 +19,7 @@ class SenderClock:
         self._longest, self.jumps = longest, 0
         self._newest: float | None = None  # s, time of the newest message by the sender's clock
         self._offset = self._at = 0.0  # s, ours less the sender's, and when it was looked at
-        self._other: tuple[float, float] | None = None  # since when there is another offset, and that
+        self._other_offset: tuple[float, float] | None = None  # since when there is another offset, and that
 
     def objection(self, time: float, now: float) -> str:
         """Why a message is not used; "" where it is of the present.
@@ -49,13 +49,13 @@ class SenderClock:
 
     def _has_settled(self, offset: float, now: float) -> bool:
         """Whether another offset has gone on for long enough; that of a message that comes again and again grows."""
-        if self._other is not None:
-            since, first = self._other
-            passed = now - since
-            if abs(offset - first) <= 0.5 * passed + _STEADY:
-                return passed >= _SETTLES
-        self._other = now, offset
+        if self._other_offset is not None:
+            since, first = self._other_offset
+            elapsed = now - since
+            if abs(offset - first) <= 0.5 * elapsed + _STEADY:
+                return elapsed >= _SETTLES
+        self._other_offset = now, offset
         return False
 
     def _accept(self, time: float, offset: float, now: float) -> None:
-        self._newest, self._offset, self._at, self._other = time, offset, now, None
+        self._newest, self._offset, self._at, self._other_offset = time, offset, now, None

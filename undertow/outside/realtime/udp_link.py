@@ -29,17 +29,18 @@ class UdpVehicleLink(AbstractLink):
     period, so that it knows where to send its measurements. The newest measurement counts.
 
     Args:
-        place: HOST:PORT.
+        address: HOST:PORT.
         built: the scenario.
 
     Raises:
         BadInput: no such host, or the plant is no vehicle.
     """
 
-    def __init__(self, place: str, built: Built):
+    def __init__(self, address: str, built: Built):
         _check_vehicle(built)
-        host, port = address_of(place, "--link")
-        self.form, self._actuators = Format("quaternion", "body"), built.closed_loop.plant.inputs()
+        host, port = address_of(address, "--link")
+        self.form = Format("quaternion", "body")
+        self._actuators = built.closed_loop.plant.inputs()
         try:
             self._peer = socket.gethostbyname(host), port
         except (OSError, UnicodeError):
@@ -48,7 +49,7 @@ class UdpVehicleLink(AbstractLink):
         self._socket.setblocking(False)
         self._received = DatagramFilter(MEASUREMENT, self._actuators)
         self._sender = Sender(COMMAND, self._actuators, int.from_bytes(os.urandom(4), "little"))
-        self._sent = self._unsent = self._others = 0
+        self._sent = self._unsent = self._foreign = 0
         self._watchdog: Watchdog | None = None
         self._safe = np.zeros(self._actuators)
 
@@ -57,23 +58,24 @@ class UdpVehicleLink(AbstractLink):
         return self._socket.fileno()
 
     def receive(self, elapsed: float) -> LinkMeasurement | None:
-        found = None
+        newest = None
         for _ in range(_AT_ONCE):
             try:
                 data, sender = self._socket.recvfrom(_LONGEST)
             except OSError:  # nothing there, or the vehicle does not listen
                 break
             if sender != self._peer:
-                self._others += 1
+                self._foreign += 1
                 continue
-            taken = self._received.take(data)
-            found = found if taken is None else taken
+            datagram = self._received.take(data)
+            newest = newest if datagram is None else datagram
         else:
             self._received.counts["left unread"] += 1
-        if found is None:
+        if newest is None:
             return None
-        motion, applied = found.values[:MOTION], found.values[MOTION:]
-        return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if found.flag else None)
+        motion = newest.values[:MOTION]
+        applied = newest.values[MOTION:]
+        return LinkMeasurement(motion[:3], motion[7:], motion[3:7], applied=applied if newest.flag else None)
 
     def guard(self, safe: np.ndarray, longest: float) -> None:
         self._safe, self._watchdog = safe, Watchdog(self._socket, longest)
@@ -103,7 +105,7 @@ class UdpVehicleLink(AbstractLink):
         self._socket.close()
 
     def counts(self) -> dict[str, int]:
-        return {"sent": self._sent, "not sent": self._unsent, "another sender": self._others} | self._received.counts
+        return {"sent": self._sent, "not sent": self._unsent, "another sender": self._foreign} | self._received.counts
 
 
 class UdpVehicleServer:
@@ -113,7 +115,7 @@ class UdpVehicleServer:
 
     Args:
         built: the scenario.
-        place: HOST:PORT to listen on.
+        address: HOST:PORT to listen on.
 
     Attributes:
         last_command: that was received last.
@@ -122,19 +124,20 @@ class UdpVehicleServer:
         BadInput: the address cannot be used, or the plant is no vehicle.
     """
 
-    def __init__(self, built: Built, place: str):
+    def __init__(self, built: Built, address: str):
         _check_vehicle(built)
-        self._period, self._actuators = float(built.scenario.loop.dt), built.closed_loop.plant.inputs()
+        self._period = float(built.scenario.loop.dt)
+        self._actuators = built.closed_loop.plant.inputs()
         self._received = DatagramFilter(COMMAND, self._actuators)
         self._sender = Sender(MEASUREMENT, self._actuators, int.from_bytes(os.urandom(4), "little"))
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind(address_of(place, "--serve"))
+            self._socket.bind(address_of(address, "--serve"))
         except (OSError, UnicodeError) as error:
             self._socket.close()
             hint = "Another program may be listening there"
             reason = getattr(error, "strerror", None) or "no such host"
-            raise BadInput("--serve", "be free to use", f"{place}: {reason}", hint=hint) from None
+            raise BadInput("--serve", "be free to use", f"{address}: {reason}", hint=hint) from None
         except BadInput:
             self._socket.close()
             raise
@@ -173,13 +176,15 @@ class UdpVehicleServer:
             self._answer(command.sequence, sender)
 
     def _answer(self, sequence: int, sender: tuple[str, int]) -> None:
-        found = self._measurement
-        known = found.applied is not None
-        applied = found.applied if known else np.zeros(self._actuators)
+        measurement = self._measurement
+        input_known = measurement.applied is not None
+        applied = measurement.applied if input_known else np.zeros(self._actuators)
         # Of `both` and `both`: the quaternion follows the Euler angles, and body velocity the rates.
-        values = np.concatenate([found.position, found.attitude[3:], found.velocity[6:], applied])
+        values = np.concatenate([measurement.position, measurement.attitude[3:], measurement.velocity[6:], applied])
         with contextlib.suppress(OSError):
-            self._socket.sendto(self._sender.pack(values, round(1e9 * self._vehicle.time), sequence, known), sender)
+            self._socket.sendto(
+                self._sender.pack(values, round(1e9 * self._vehicle.time), sequence, input_known), sender
+            )
 
 
 def _check_vehicle(built: Built) -> None:

@@ -33,7 +33,9 @@ class VehicleLink(AbstractLink):
         self._vehicle = Vehicle(built, attitude="both", velocity="both")
         self.backend = self._vehicle.backend
         self.form = Format("both", "both") if len(self._vehicle.output.attitude) else None
-        self._command, self._began, self._sent = np.zeros(self._vehicle.thrusters), False, 0
+        self._command = np.zeros(self._vehicle.thrusters)
+        self._began = False
+        self._sent = 0
 
     @property
     def time(self) -> float:
@@ -50,7 +52,8 @@ class VehicleLink(AbstractLink):
         """Hold the command for a time, s; a failed vehicle stays where it is."""
         status = self._vehicle.step(self._command, elapsed).status
         if status is not Status.OK:
-            self.ended, self.failed = f"the vehicle failed at {self.time:.4g} s: {status.sentence}", True
+            self.ended = f"the vehicle failed at {self.time:.4g} s: {status.sentence}"
+            self.failed = True
 
     def send(self, command: np.ndarray) -> None:
         self._command, self._sent = numbers("command", command, self._command.shape).copy(), self._sent + 1

@@ -49,7 +49,7 @@ class Watchdog:
 
     def hold(self, address: tuple[str, int], datagrams: Sequence[bytes]) -> None:
         """A sign of life, with what stops the vehicle from now on."""
-        self._tell([list(address), [one.hex() for one in datagrams]])
+        self._tell([list(address), [datagram.hex() for datagram in datagrams]])
 
     def alive(self) -> None:
         """A sign of life."""
@@ -94,7 +94,8 @@ def watch(connection: socket.socket, timeout: float, pipe: int) -> None:
             if message == _DONE:
                 return
             if message is not None:
-                address, datagrams = tuple(message[0]), [bytes.fromhex(one) for one in message[1]]
+                address = tuple(message[0])
+                datagrams = [bytes.fromhex(encoded) for encoded in message[1]]
 
 
 def _send(connection: socket.socket, address: Any, datagrams: Sequence[bytes]) -> None:

@@ -56,7 +56,8 @@ class CompiledController:
         check_vehicle(built)
         plant, law = built.closed_loop.plant, built.closed_loop.controller
         self.autopilot = Autopilot(text, attitude="quaternion", velocity="body", log_later=True)
-        self.output, self.thrusters = output, plant.inputs()
+        self.output = output
+        self.thrusters = plant.inputs()
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             conversion = output_of(output, plant, law, None)
             self.label = thruster_label(conversion.unit)

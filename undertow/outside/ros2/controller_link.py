@@ -148,7 +148,8 @@ class ControllerLink(AbstractPacingLink):
 
     def _take_clock(self) -> None:
         for message in self._clock.take() if self._clock else ():
-            now, before = nanoseconds_of(message.clock), self._simulated
+            now = nanoseconds_of(message.clock)
+            before = self._simulated
             if now < 0:
                 self._reporter.trouble(
                     "ignored (/clock)", f"/clock is at {now / SECOND:g} s, before zero: it is ignored"
@@ -160,7 +161,8 @@ class ControllerLink(AbstractPacingLink):
             elif now < before - RESTART * SECOND:
                 back = f"/clock went back by {(before - now) / SECOND:g} s: the controller begins again"
                 self._reporter.trouble("restarts", back)
-                self._senders, self._begins_again = SenderClock(self._settings.max_age), True
+                self._senders = SenderClock(self._settings.max_age)
+                self._begins_again = True
 
     def _take_targets(self) -> None:
         for message in self._targets.take():
@@ -171,7 +173,8 @@ class ControllerLink(AbstractPacingLink):
 
     def _measurement(self, message: ros.Odometry) -> LinkMeasurement | None:
         """The measurement of an odometry; None of one that is not of the present."""
-        stamp, topic = nanoseconds_of(message.header.stamp), self._odometry.topic
+        stamp = nanoseconds_of(message.header.stamp)
+        topic = self._odometry.topic
         position, quaternion, velocity = motion_of(message, self._settings.frames, topic)
         self._check_age(stamp, topic)
         jumps = self._senders.jumps
@@ -187,7 +190,9 @@ class ControllerLink(AbstractPacingLink):
         if self._senders.jumps > jumps:
             self._reporter.trouble("restarts", f"the clock of {topic} was set: the controller begins again")
             self._begins_again = True
-        elapsed, self._begins_again, self._used = 0.0 if self._begins_again else None, False, True
+        elapsed = 0.0 if self._begins_again else None
+        self._begins_again = False
+        self._used = True
         return LinkMeasurement(
             position, velocity, quaternion, applied=self._applied, target=self._target, elapsed=elapsed, stamp=stamp
         )

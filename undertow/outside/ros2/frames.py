@@ -40,10 +40,11 @@ def body_velocity_of_rates(angles: ArrayLike, rates: ArrayLike) -> NDArray:
 
     Fossen (2021), Eqs. (2.18) and (2.26).
     """
-    (roll, pitch, yaw), moving = (np.moveaxis(np.asarray(one, dtype=float), -1, 0) for one in (angles, rates))
+    (roll, pitch, yaw), moving = (np.moveaxis(np.asarray(array, dtype=float), -1, 0) for array in (angles, rates))
     (sr, sp, sy), (cr, cp, cy) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
     north, east, down, roll_rate, pitch_rate, yaw_rate = moving
-    forward, across = cy * north + sy * east, cy * east - sy * north
+    forward = cy * north + sy * east
+    across = cy * east - sy * north
     lower = sp * forward + cp * down
     linear = cp * forward - sp * down, cr * across + sr * lower, cr * lower - sr * across
     turning = roll_rate - sp * yaw_rate, cr * pitch_rate + sr * cp * yaw_rate, cr * cp * yaw_rate - sr * pitch_rate

@@ -30,17 +30,17 @@ class Frames(NamedTuple):
     world: tuple[str, ...] = ("odom", "map")
     body: str = "base_link"
 
-    def check_world(self, topic: str, given: str) -> None:
+    def check_world(self, topic: str, frame: str) -> None:
         """Check the frame of a pose."""
-        if given not in self.world:
+        if frame not in self.world:
             hint = "Give `--world-frame` the name, if its axes are east, north, up"
-            raise BadInput(f"{topic} header.frame_id", f"be {' or '.join(self.world)}", repr(given), hint=hint)
+            raise BadInput(f"{topic} header.frame_id", f"be {' or '.join(self.world)}", repr(frame), hint=hint)
 
-    def check_body(self, topic: str, field: str, given: str) -> None:
+    def check_body(self, topic: str, field: str, frame: str) -> None:
         """Check the frame of a velocity or a wrench."""
-        if given != self.body:
+        if frame != self.body:
             hint = "Give `--body-frame` the name, if its axes are forward, port, up and its origin is the vehicle's"
-            raise BadInput(f"{topic} {field}", f"be {self.body}", repr(given), hint=hint)
+            raise BadInput(f"{topic} {field}", f"be {self.body}", repr(frame), hint=hint)
 
 
 class PoseAndVelocity(NamedTuple):
@@ -85,10 +85,10 @@ def target_of(message: Any, frames: Frames, topic: str) -> NDArray:
     """
     frames.check_world(topic, message.header.frame_id)
     quaternion = _attitude(message.pose.orientation, topic)
-    found = np.concatenate([_ned(message.pose.position), attitudes_of_quaternions(quaternion[None], "NED", "FRD")[0]])
-    if not np.isfinite(found).all():
-        raise BadInput(f"{topic} pose", "be finite numbers", found.tolist())
-    return found
+    outputs = np.concatenate([_ned(message.pose.position), attitudes_of_quaternions(quaternion[None], "NED", "FRD")[0]])
+    if not np.isfinite(outputs).all():
+        raise BadInput(f"{topic} pose", "be finite numbers", outputs.tolist())
+    return outputs
 
 
 def wrench_from(message: Any, frames: Frames, topic: str) -> NDArray:
@@ -114,10 +114,10 @@ def thrusters_from(message: Any, count: int, label: str, topic: str) -> NDArray:
     """
     if len(message.data) != count:
         raise BadInput(f"{topic} data", f"have {count} entries, one per thruster", f"{len(message.data)} long")
-    given = message.layout.dim[0].label if message.layout.dim else ""  # which many leave out
-    if given and given != label:
+    label_received = message.layout.dim[0].label if message.layout.dim else ""  # which many leave out
+    if label_received and label_received != label:
         hint = "Run the controller with `--output input`, or leave the label empty"
-        raise BadInput(f"{topic} layout.dim[0].label", f"be `{label}`", f"`{given}`", hint=hint)
+        raise BadInput(f"{topic} layout.dim[0].label", f"be `{label}`", f"`{label_received}`", hint=hint)
     values = np.array(message.data, dtype=float)
     if not np.isfinite(values).all():
         raise BadInput(f"{topic} data", "be finite numbers", values.tolist())
@@ -132,12 +132,12 @@ def _ned(point: Any) -> NDArray:
     return between_ned_and_enu([point.x, point.y, point.z])
 
 
-def _attitude(given: Any, topic: str) -> NDArray:
+def _attitude(quaternion: Any, topic: str) -> NDArray:
     """The quaternion w, x, y, z of ours; all NaN where one entry is not finite."""
-    numbers = np.array([given.w, given.x, given.y, given.z])
+    numbers = np.array([quaternion.w, quaternion.x, quaternion.y, quaternion.z])
     if not np.isfinite(numbers).all():
         return np.full(4, np.nan)
-    square = sum(one * one for one in numbers.tolist())
+    square = sum(number * number for number in numbers.tolist())
     if not abs(square - 1) < _UNIT:
         must = "be of unit length"
         raise BadInput(f"{topic} orientation", must, f"{numbers.tolist()} (w, x, y, z), of length {square**0.5:.4g}")

@@ -78,19 +78,19 @@ class Inlet(Generic[Message]):
     def _taken(self) -> Iterator[Message]:
         while True:
             try:
-                found = self._reader.take(1)  # one by one: a message that cannot be read must cost no other
+                messages = self._reader.take(1)  # one by one: a message that cannot be read must cost no other
             except DDSException:
                 raise
             except Exception:  # of struct, UTF-8, or CycloneDDS's own `Exception`
                 self.malformed += 1
                 continue
-            if not found:
+            if not messages:
                 return
-            if getattr(found[0], "sample_info", None) is None or not found[0].sample_info.valid_data:
+            if getattr(messages[0], "sample_info", None) is None or not messages[0].sample_info.valid_data:
                 continue  # a publisher has left
             self.received += 1
-            self._link.record(self.topic, found[0])
-            yield found[0]
+            self._link.record(self.topic, messages[0])
+            yield messages[0]
 
     def publishers(self) -> int:
         """How many publishers there are."""
@@ -130,7 +130,8 @@ class Link:
         checks.choice("reliability", reliability, RELIABILITIES)
         self.now: Callable[[], int] = time.time_ns
         self.on_trouble: Callable[[str, str], None] = lambda event, sentence: None
-        self._bag, self._qos = bag, _quality(reliability)
+        self._bag = bag
+        self._qos = _quality(reliability)
         try:
             if localhost:
                 _loopback(domain)
@@ -140,7 +141,7 @@ class Link:
             raise BadInput("", "", f"no DDS participant could be made in domain {domain}: {error}", hint=hint) from None
         self._waiting: Any = WaitSet(self._participant)
         self._announced: Any = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
-        self._kept: list[Any] = []
+        self._dds_entities: list[Any] = []
         self._writers: list[DataWriter] = []
 
     def __enter__(self) -> "Link":
@@ -151,7 +152,8 @@ class Link:
 
     def close(self) -> None:
         """Leave the domain: the participant ends, with all that was made of it."""
-        participant, self._participant = self._participant, None
+        participant = self._participant
+        self._participant = None
         if participant is not None:
             participant.__del__()  # CycloneDDS has no other way; references among its objects keep them alive
 
@@ -181,7 +183,7 @@ class Link:
         reader = DataReader(self._participant, self._topic(topic, kind), qos)
         condition = ReadCondition(reader, ViewState.Any | SampleState.NotRead | InstanceState.Any)
         self._waiting.attach(condition)
-        self._kept += [reader, condition]
+        self._dds_entities += [reader, condition]
         return Inlet(self, topic, reader)
 
     def wait(self, seconds: float) -> bool:
@@ -197,13 +199,13 @@ class Link:
 
     def topics(self) -> dict[str, str]:
         """Topics that are published in the domain, and their types in ROS 2."""
-        there: dict[Any, Any] = {}
-        for one in self._announced.read(1000):
-            there[one.key] = one  # without names where the publisher has left
+        publications: dict[Any, Any] = {}
+        for publication in self._announced.read(1000):
+            publications[publication.key] = publication  # without names where the publisher has left
         return {
-            one.topic_name[2:]: one.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
-            for one in there.values()
-            if (one.topic_name or "").startswith("rt/")
+            publication.topic_name[2:]: publication.type_name.replace("::msg::dds_::", "/msg/").removesuffix("_")
+            for publication in publications.values()
+            if (publication.topic_name or "").startswith("rt/")
         }
 
     def record(self, topic: str, message: Any) -> None:
@@ -223,9 +225,9 @@ class Link:
         if not _NAME.fullmatch(topic):
             must = "be a name of ROS 2, such as /odom: letters, digits, underscores, and a slash before each part"
             raise BadInput("topic", must, repr(topic))
-        made = Topic(self._participant, f"rt{topic}", kind, self._qos)
-        self._kept.append(made)
-        return made
+        dds_topic = Topic(self._participant, f"rt{topic}", kind, self._qos)
+        self._dds_entities.append(dds_topic)
+        return dds_topic
 
 
 # What makes that two sides see nothing of each other.
@@ -234,9 +236,10 @@ DIFFERENT_NETWORKS = "Is the domain right, and --localhost given to both sides o
 
 def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
     """Why nothing arrives at a subscriber, in a sentence."""
-    there, expected = link.topics(), ros_type(kind)
-    if inlet.topic in there and there[inlet.topic] != expected:
-        return f"{inlet.topic} is published as {there[inlet.topic]}, but {expected} is expected"
+    types_by_topic = link.topics()
+    expected = ros_type(kind)
+    if inlet.topic in types_by_topic and types_by_topic[inlet.topic] != expected:
+        return f"{inlet.topic} is published as {types_by_topic[inlet.topic]}, but {expected} is expected"
     if inlet.incompatible():
         return (
             f"{inlet.topic} is published with another quality of service than is asked for. "
@@ -244,17 +247,17 @@ def why_nothing(link: Link, inlet: Inlet, kind: type) -> str:
         )
     if inlet.publishers():
         return f"{inlet.topic} has a publisher that sends nothing"
-    alike = sorted(name for name, one in there.items() if one == expected)
-    hint = f"{expected} is published on {', '.join(alike)}: use --remap" if alike else DIFFERENT_NETWORKS
+    same_type = sorted(name for name, message_type in types_by_topic.items() if message_type == expected)
+    hint = f"{expected} is published on {', '.join(same_type)}: use --remap" if same_type else DIFFERENT_NETWORKS
     return f"nobody publishes {inlet.topic} ({expected}). {hint}"
 
 
 def _quality(reliability: str) -> Qos:
     """Quality of service: the default of ROS 2, but for the reliability."""
     reliable = Policy.Reliability.Reliable(duration(milliseconds=100))
-    chosen = reliable if reliability == "reliable" else Policy.Reliability.BestEffort
+    reliability_policy = reliable if reliability == "reliable" else Policy.Reliability.BestEffort
     representation = Policy.DataRepresentation(use_cdrv0_representation=True)
-    return Qos(chosen, Policy.Durability.Volatile, Policy.History.KeepLast(_DEPTH), representation)
+    return Qos(reliability_policy, Policy.Durability.Volatile, Policy.History.KeepLast(_DEPTH), representation)
 
 
 @functools.cache

@@ -52,8 +52,9 @@ class Reporter:
     """
 
     def __init__(self, say: Callable[[str], None]):
-        self._say, self.counts = say, Counter[str]()
-        self._said: dict[str, float] = {}  # when each was explained last, s
+        self._say = say
+        self.counts = Counter[str]()
+        self._explained_at: dict[str, float] = {}  # when each was explained last, s
         self._next = time.monotonic() + STATUS_PERIOD
 
     def say(self, sentence: str) -> None:
@@ -62,8 +63,8 @@ class Reporter:
 
     def warn(self, event: str, sentence: str) -> None:
         """Explain an event, if it is the first one of its kind."""
-        if event not in self._said:
-            self._said[event] = time.monotonic()
+        if event not in self._explained_at:
+            self._explained_at[event] = time.monotonic()
             self._say(f"Warning: {' '.join(sentence.split())}")
 
     def trouble(self, event: str, sentence: str) -> None:
@@ -73,8 +74,8 @@ class Reporter:
 
     def over(self, event: str) -> None:
         """An event has ended: the next one of its kind is explained again, unless it was a short while ago."""
-        if time.monotonic() - self._said.get(event, 0.0) > QUIET:
-            self._said.pop(event, None)
+        if time.monotonic() - self._explained_at.get(event, 0.0) > QUIET:
+            self._explained_at.pop(event, None)
 
     def status(self, line: Callable[[], str], only: Inlet | None = None) -> None:
         """Print a status line, if the last one was a second ago; warn where `only` has several publishers."""

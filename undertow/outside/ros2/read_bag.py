@@ -47,18 +47,18 @@ def read_rosbag2(
     refused: dict[str, list[BadInput]] = {}
     for topic, kind, nanoseconds, data in _messages(Path(path), only):
         try:
-            found = _READERS[kind](_decoded(kind, data, topic), frames, topic)
+            values_by_name = _READERS[kind](_decoded(kind, data, topic), frames, topic)
         except BadInput as error:
             refused.setdefault(topic, []).append(error)
             continue
-        for name, value in found.items():
+        for name, value in values_by_name.items():
             rows.setdefault(topic + name, []).append((nanoseconds / SECOND, value))
     for topic, errors in refused.items():
         warnings.warn(f"Left out: {len(errors)} messages of {topic}. The first: {errors[0]}", stacklevel=2)
     if not rows:
-        which = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
-        raise BadInput(str(path), f"have messages that can be used {which}", "without")
-    return {name: _series(name, each) for name, each in rows.items()}
+        topics_or_types = "of " + ", ".join(sorted(only)) if only else f"of the types {', '.join(_READERS)}"
+        raise BadInput(str(path), f"have messages that can be used {topics_or_types}", "without")
+    return {name: _series(name, samples) for name, samples in rows.items()}
 
 
 def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
@@ -80,9 +80,13 @@ def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int
 
 def _messages_of(file: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
     with Reader(file) as reader:
-        chosen = [one for one in reader.connections if one.msgtype in _READERS and (only is None or one.topic in only)]
-        for one, nanoseconds, data in reader.messages(chosen) if chosen else ():
-            yield one.topic, one.msgtype, nanoseconds, bytes(data)
+        connections = [
+            connection
+            for connection in reader.connections
+            if connection.msgtype in _READERS and (only is None or connection.topic in only)
+        ]
+        for connection, nanoseconds, data in reader.messages(connections) if connections else ():
+            yield connection.topic, connection.msgtype, nanoseconds, bytes(data)
 
 
 def _series(name: str, rows: list[tuple[float, NDArray]]) -> Series:
@@ -99,10 +103,10 @@ def _odometry(message: Any, frames: Frames, topic: str) -> dict[str, NDArray]:
 
 
 def _imu(message: Any, frames: Frames, topic: str) -> dict[str, NDArray]:
-    given = message.orientation
-    vector = lambda one: between_frd_and_flu([one.x, one.y, one.z])
+    orientation = message.orientation
+    vector = lambda xyz: between_frd_and_flu([xyz.x, xyz.y, xyz.z])
     return {
-        "/quaternion": between_attitudes([given.w, given.x, given.y, given.z]),
+        "/quaternion": between_attitudes([orientation.w, orientation.x, orientation.y, orientation.z]),
         "/rates": vector(message.angular_velocity),
         "/specific_force": vector(message.linear_acceleration),
     }

@@ -16,10 +16,10 @@ def stamp_of(nanoseconds: int) -> ros.Time:
     Raises:
         BadInput: as above.
     """
-    seconds, rest = divmod(nanoseconds, SECOND)
+    seconds, remainder = divmod(nanoseconds, SECOND)
     if not 0 <= seconds < 2**31:
         raise BadInput("time", "be between 0 and 2,147,483,647 s", f"{seconds} s")
-    return ros.Time(seconds, rest)
+    return ros.Time(seconds, remainder)
 
 
 def odometry_of(motion: PoseAndVelocity, stamp: ros.Time, frames: Frames) -> ros.Odometry:

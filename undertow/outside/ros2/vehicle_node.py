@@ -75,14 +75,17 @@ class VehicleNode:
         self._imu = link.publisher(topics.imu, ros.Imu)
         self._time = 0  # ns
         link.now = lambda: self._time
-        self._command, self._last = np.zeros(self._vehicle.thrusters), time.monotonic()
+        self._command = np.zeros(self._vehicle.thrusters)
+        self._last = time.monotonic()
 
     def run(self) -> Status:
         """Run to the end, or until KeyboardInterrupt; how the run ended."""
         lock_step = self._settings.pace == "lock-step"
         if lock_step:
             self._await_controller()
-        observed, k, begun = self._vehicle.restart(), 0, time.monotonic()
+        observed = self._vehicle.restart()
+        k = 0
+        begun = time.monotonic()
         while True:
             if lock_step and self._commands.take():
                 self._reporter.trouble("unasked commands", "a command came before its odometry: it is ignored")
@@ -95,7 +98,8 @@ class VehicleNode:
             if k >= self._steps or observed.status is not Status.OK:
                 self._link.flush(0.5)
                 return observed.status
-            observed, k = self._vehicle.step(self._command), k + 1
+            observed = self._vehicle.step(self._command)
+            k += 1
 
     def status(self) -> str:
         """Time and counts in one line."""
@@ -115,7 +119,8 @@ class VehicleNode:
     def _publish(self, observed: VehicleOutput, k: int) -> None:
         """Send the time, then what is observed at it."""
         self._time = round(k * self._vehicle.sampling_time * SECOND)
-        stamp, frames = stamp_of(self._time), self._settings.frames
+        stamp = stamp_of(self._time)
+        frames = self._settings.frames
         motion = PoseAndVelocity(observed.position, observed.attitude, observed.velocity)
         self._clock.publish(ros.Clock(stamp))
         self._imu.publish(imu_of(motion, observed.specific_force, stamp, frames))
@@ -123,17 +128,18 @@ class VehicleNode:
 
     def _take_command(self) -> bool:
         """Take the newest command that can be used; whether there was one."""
-        found: NDArray | None = None
+        command: NDArray | None = None
         for message in self._commands.take():
             try:
-                found = thrusters_from(message, self._vehicle.thrusters, self._label, self._commands.topic)
+                command = thrusters_from(message, self._vehicle.thrusters, self._label, self._commands.topic)
             except BadInput as error:
                 if self._settings.pace == "lock-step":
                     raise
                 self._reporter.trouble(f"ignored ({error.name})", f"{error}. The command is ignored")
-        if found is None:
+        if command is None:
             return False
-        self._command, self._last = found, time.monotonic()
+        self._command = command
+        self._last = time.monotonic()
         self._reporter.over("stopped")
         return True
 
@@ -152,8 +158,8 @@ class VehicleNode:
         until = time.monotonic() + self._settings.patience
         while not self._take_command():
             if time.monotonic() > until:
-                of = f"the odometry of {self._time / SECOND:g} s"
-                why = f"no command came for {of} within {self._settings.patience:g} s"
+                awaited = f"the odometry of {self._time / SECOND:g} s"
+                why = f"no command came for {awaited} within {self._settings.patience:g} s"
                 raise BadInput("", "", why)
             self._link.wait(WAIT)
             self._reporter.status(self.status, self._commands)

@@ -161,12 +161,15 @@ def write_rosbag2(run: Any, folder: str | Path, storage: str = "mcap") -> None:
         )
     names = ("measured_position", "measured_velocity", "position", "velocity", "input", "reference")
     columns = [dataset[name].values.astype(float) for name in names]
-    frames, label = Frames(), thruster_label(dataset["input"].attrs["units"])
+    frames = Frames()
+    label = thruster_label(dataset["input"].attrs["units"])
     with new_bag(Path(folder), storage) as bag:
         for time, *row in zip(dataset["time"].values, *columns, strict=True):
             now = round(float(time) * SECOND)
             stamp = stamp_of(now)
-            measured, true, (applied, reference) = _motion(*row[:2]), _motion(*row[2:4]), row[4:]
+            measured = _motion(*row[:2])
+            true = _motion(*row[2:4])
+            applied, reference = row[4:]
             bag.write(("/clock", ros.Clock(stamp), now))
             bag.write(("/odom", odometry_of(measured, stamp, frames), now))
             bag.write(("/ground_truth", odometry_of(true, stamp, frames), now))
@@ -181,22 +184,23 @@ def _motion(position: NDArray, rates: NDArray) -> PoseAndVelocity:
 
 def _metadata(writer: Writer) -> str:
     """Text of metadata.yaml, of what was written so far. It is JSON, which is YAML, and quick to write."""
-    count, start = sum(writer.counts.values()), {"nanoseconds_since_epoch": writer.min_timestamp}
+    count = sum(writer.counts.values())
+    start = {"nanoseconds_since_epoch": writer.min_timestamp}
     duration = {"nanoseconds": max(0, writer.max_timestamp - writer.min_timestamp)}
     assert writer.storage is not None, "the bag is open"
     name = writer.storage.path.name
     topics = [
         {
             "topic_metadata": {
-                "name": one.topic,
-                "type": one.msgtype,
+                "name": connection.topic,
+                "type": connection.msgtype,
                 "serialization_format": "cdr",
                 "offered_qos_profiles": [],
-                "type_description_hash": one.digest,
+                "type_description_hash": connection.digest,
             },
-            "message_count": writer.counts[one.id],
+            "message_count": writer.counts[connection.id],
         }
-        for one in writer.connections
+        for connection in writer.connections
     ]
     about = {
         "version": writer.version,

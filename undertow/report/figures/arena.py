@@ -23,15 +23,17 @@ _PAGE, _SLANTED = 9.6, 0.85  # width of the figure of the tasks, and of the name
 def arena_plots(board: Board) -> Mapping[str, Callable[[], Figure]]:
     """The figures of a board by name."""
     plots: dict[str, Callable[[], Figure]] = {"tasks": lambda: tasks_figure(board)}
-    shown = [one for one in board.standings if one.robustness]
-    return plots | ({"robustness": lambda: robustness_figure(shown)} if shown else {})
+    standings = [standing for standing in board.standings if standing.robustness]
+    return plots | ({"robustness": lambda: robustness_figure(standings)} if standings else {})
 
 
 def tasks_figure(board: Board) -> Figure:
     """A cell for every law and task, its colour and number the error in tolerances."""
-    laws, tasks = [one.entry.name for one in board.standings], board.tasks
-    errors = np.array([[one.score.mean(board.of_task(task)) for task in tasks] for one in board.standings])
-    left, top = 0.25 + 0.075 * max(map(len, laws)), 1.35
+    laws = [standing.entry.name for standing in board.standings]
+    tasks = board.tasks
+    errors = np.array([[standing.score.mean(board.of_task(task)) for task in tasks] for standing in board.standings])
+    left = 0.25 + 0.075 * max(map(len, laws))
+    top = 1.35
     cell = (min(0.6, (_PAGE - left - _SLANTED) / len(tasks)), 0.24)
     figure = style.blank(_PAGE, top + cell[1] * len(laws) + 0.2)
     style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
@@ -49,11 +51,11 @@ def tasks_figure(board: Board) -> Figure:
     return figure
 
 
-def robustness_figure(shown: Sequence[Standing]) -> Figure:
+def robustness_figure(standings: Sequence[Standing]) -> Figure:
     """A panel for every parameter: the error over its levels; a line ends with a cross where a law is lost."""
     rows = math.ceil(len(PARAMETERS) / _COLUMNS)
-    looks = looks_of([one.entry.name for one in shown[:_SHOWN]])
-    grey = {"others": style.Look("#b5b5b5", "-", 0.7, 1)} if len(shown) > _SHOWN else {}
+    looks = looks_of([standing.entry.name for standing in standings[:_SHOWN]])
+    grey = {"others": style.Look("#b5b5b5", "-", 0.7, 1)} if len(standings) > _SHOWN else {}
     figure = style.blank(0.7 + _COLUMNS * (_WIDTH + 0.55), 0.85 + rows * (_HEIGHT + 0.65))
     style.head(figure, "Error / tolerance over one parameter after the other", {})
     style.key(figure, looks | grey, 0.3, 7)
@@ -61,10 +63,10 @@ def robustness_figure(shown: Sequence[Standing]) -> Figure:
         row, column = divmod(number, _COLUMNS)
         left, top = 0.6 + column * (_WIDTH + 0.55), 0.85 + row * (_HEIGHT + 0.65)
         panel = style.place(figure, left, top, _WIDTH, _HEIGHT)
-        for one in reversed(shown):
-            look = looks.get(one.entry.name, grey.get("others"))
+        for standing in reversed(standings):
+            look = looks.get(standing.entry.name, grey.get("others"))
             if look is not None:
-                _line(panel, one, name, look)
+                _line(panel, standing, name, look)
         panel.set_yscale("log")
         panel.set_ylim(FINEST * 0.8, LOST * 1.4)
         levels = np.array(parameter.levels)
@@ -73,19 +75,20 @@ def robustness_figure(shown: Sequence[Standing]) -> Figure:
         if levels[0] > levels[-1]:
             panel.invert_xaxis()
         ticks = list(parameter.levels[:: 2 if len(levels) > 5 else 1])
-        panel.set_xticks(ticks, [f"{one:g}" for one in ticks])
+        panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         panel.xaxis.minorticks_off()
         panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
         style.label(panel, parameter.label, "error / tolerance" if column == 0 else "")
     return figure
 
 
-def _line(panel: Axes, one: Standing, name: str, look: style.Look) -> None:
+def _line(panel: Axes, standing: Standing, name: str, look: style.Look) -> None:
     """Median errors up to the first level at which a trial is lost."""
-    curve = one.robustness[name]
+    curve = standing.robustness[name]
     lost = np.flatnonzero(curve.high >= LOST)
     end = int(lost[0]) if len(lost) else len(curve.levels)
-    levels, errors = np.array(curve.levels), np.where(np.arange(len(curve.levels)) < end, curve.middle, LOST)
+    levels = np.array(curve.levels)
+    errors = np.where(np.arange(len(curve.levels)) < end, curve.middle, LOST)
     panel.plot(levels[: end + 1], errors[: end + 1], **look.line)
     if end < len(levels):
         panel.plot(levels[end], LOST, "x", color=look.colour, markersize=5, zorder=look.order)

@@ -67,16 +67,16 @@ def distributions_figure(
         counts: name of the combination -> number of its trials, including failed ones.
         units: metric -> unit.
     """
-    shown = [name for name in SHOWN if name in values]
-    rows = -(-len(shown) // _COLUMNS)
-    names = list(dict.fromkeys(name for each in values.values() for name in each))
+    metrics = [name for name in SHOWN if name in values]
+    rows = -(-len(metrics) // _COLUMNS)
+    names = list(dict.fromkeys(name for by_combination in values.values() for name in by_combination))
     looks = dict(zip(names, LOOKS, strict=False))
     key = key_height(looks) if len(looks) > 1 else 0.0
     figure = style.blank(9.6, 0.35 + key + 2.25 * rows)
     style.head(figure, "Empirical CDF of the metrics", {})
     if key:
         style.key(figure, looks, 0.3, beside(looks))
-    for i, metric in enumerate(shown):
+    for i, metric in enumerate(metrics):
         row, column = divmod(i, _COLUMNS)
         panel = style.place(figure, 0.6 + 3.1 * column, 0.65 + key + 2.25 * row, 2.35, 1.45)
         for name, look in looks.items():
@@ -90,44 +90,46 @@ def distributions_figure(
                 linestyle=look.dashes,
                 linewidth=look.width,
             )
-        everything = np.concatenate(list(values[metric].values()))
-        if everything.min() > 0 and everything.max() > _WIDE * everything.min():
+        all_values = np.concatenate(list(values[metric].values()))
+        if all_values.min() > 0 and all_values.max() > _WIDE * all_values.min():
             panel.set_xscale("log")
             panel.xaxis.set_minor_formatter(NullFormatter())  # their numbers would run into one another
         panel.set_ylim(0, 1.04)  # the line at 1 in its whole width
-        said = [style.power(unit) for unit in units[metric].split(", ") if unit]
-        words = ", ".join([titled_name(metric), *said])
+        metric_units = [style.power(unit) for unit in units[metric].split(", ") if unit]
+        words = ", ".join([titled_name(metric), *metric_units])
         style.label(panel, words, "" if column else "share of the trials", below=0.27)  # clear of powers of ten
     return figure
 
 
-def shown_inputs(found: Mapping[str, Mapping[str, float]]) -> list[str]:
+def shown_inputs(correlations: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Inputs that the figure of the sensitivities shows: the first ones, which are those of `vary`."""
-    return list(found)[:_MOST_INPUTS]
+    return list(correlations)[:_MOST_INPUTS]
 
 
-def sensitivity_figure(found: Mapping[str, Mapping[str, float]], varied: int) -> Figure:
+def sensitivity_figure(correlations: Mapping[str, Mapping[str, float]], varied: int) -> Figure:
     """Rank correlation of each metric (columns) with each input (rows), as a matrix.
 
     Args:
-        found: input -> metric -> correlation.
+        correlations: input -> metric -> correlation.
         varied: how many of the inputs are keys of `vary`; a line separates them from the rest.
     """
-    inputs = shown_inputs(found)
-    metrics = list(dict.fromkeys(metric for name in inputs for metric in found[name]))
+    inputs = shown_inputs(correlations)
+    metrics = list(dict.fromkeys(metric for name in inputs for metric in correlations[name]))
     longest = lambda names: _LETTER * max(map(len, names))
-    left, above = longest(inputs) + 0.2, 0.35 + 0.9 * longest(metrics)
-    wide, tall = max(0.36 * len(metrics), 2.0), 0.24 * len(inputs)
+    left = longest(inputs) + 0.2
+    above = 0.35 + 0.9 * longest(metrics)
+    wide = max(0.36 * len(metrics), 2.0)
+    tall = 0.24 * len(inputs)
     figure = style.blank(max(left + wide + 0.6, 6.0), above + tall + 0.15)
     style.head(figure, "Rank correlation of metrics with inputs", {})
     panel = style.place(figure, left, above, wide, tall)
-    field = np.array([[found[name].get(metric, np.nan) for metric in metrics] for name in inputs])
+    field = np.array([[correlations[name].get(metric, np.nan) for metric in metrics] for name in inputs])
     panel.imshow(field, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
     for row, column in np.ndindex(*field.shape):
         if np.isfinite(number := field[row, column]):
             ink = "white" if abs(number) > _DARK else "black"
-            said = f"{number:+.2f}".replace("-", "\u2212") if abs(number) >= _HUNDREDTH else "0.00"
-            panel.text(column, row, said, ha="center", va="center", fontsize=style.TINY, color=ink)
+            label = f"{number:+.2f}".replace("-", "\u2212") if abs(number) >= _HUNDREDTH else "0.00"
+            panel.text(column, row, label, ha="center", va="center", fontsize=style.TINY, color=ink)
     if 0 < varied < len(inputs):
         panel.axhline(varied - 0.5, color=style.INK, linewidth=1.2)
     panel.xaxis.tick_top()

@@ -33,8 +33,9 @@ def certificate(run: xr.Dataset, title: str, bound: float) -> Figure:
         title: of the figure.
         bound: largest size that a weight may have; infinite where it may have any.
     """
-    lived = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
-    time, values_of = lived["time"].values, lambda name: lived[name].values
+    valid_run = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
+    time = valid_run["time"].values
+    values_of = lambda name: valid_run[name].values
     rows = 3 if "weights_peak" in run else 2
     figure = style.blank(_WIDTH, _TOP + rows * _TALL + (rows - 1) * _GAP + _FOOT)
     acting = {"input at a limit": values_of("saturated").max(-1) > 0}
@@ -87,8 +88,8 @@ def _head(figure: Figure, title: str, acting: Iterable[str]) -> None:
 
 def _plot(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
     for name, values, look in curves:
-        shown = np.where(np.isfinite(values), values, np.nan)
-        panel.plot(time, shown, **look.line, label=name)
+        finite_values = np.where(np.isfinite(values), values, np.nan)
+        panel.plot(time, finite_values, **look.line, label=name)
     if key:
         panel.legend(
             loc="lower right",

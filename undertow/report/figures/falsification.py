@@ -14,31 +14,32 @@ _TALL, _GAP = 1.3, 0.65  # height of a panel and space under it, in
 _CUT = 3.0  # least robustness that is shown: runs that failed have any
 
 
-def search_figure(found: Mapping[str, Any]) -> Figure:
+def search_figure(results: Mapping[str, Any]) -> Figure:
     """Robustness of every run, and where each number that varies was tried, against the number of runs.
 
     Args:
-        found: contents of falsify.json.
+        results: contents of falsify.json.
     """
-    vary, robustness = found["vary"], np.array(found["evaluations"]["robustness"], dtype=float)
+    vary = results["vary"]
+    robustness = np.array(results["evaluations"]["robustness"], dtype=float)
     figure = style.blank(6.4, 0.4 + (1 + len(vary)) * (_TALL + _GAP))
     style.head(figure, "Search for a violation", {})
     runs = np.arange(1, len(robustness) + 1)
     broken = robustness <= 0
     panels = [("robustness", np.clip(robustness, -_CUT, _CUT), None)]
-    panels += [(key, np.array(found["evaluations"]["values"][key]), vary[key]) for key in vary]
-    for place, (name, values, bounds) in enumerate(panels):
-        panel = style.place(figure, 0.8, 0.5 + place * (_TALL + _GAP), 5.3, _TALL)
+    panels += [(key, np.array(results["evaluations"]["values"][key]), vary[key]) for key in vary]
+    for number, (name, values, bounds) in enumerate(panels):
+        panel = style.place(figure, 0.8, 0.5 + number * (_TALL + _GAP), 5.3, _TALL)
         looks = ((~broken, "o", style.MEASURED.colour, "kept"), (broken, "x", style.DASHED.colour, "violated"))
-        for which, mark, colour, word in looks:
-            panel.plot(runs[which], values[which], mark, color=colour, markersize=2.5, label=word, zorder=3)
+        for mask, mark, colour, word in looks:
+            panel.plot(runs[mask], values[mask], mark, color=colour, markersize=2.5, label=word, zorder=3)
         if bounds is None:
             panel.axhline(0.0, **style.TRUTH.line)
             panel.legend(fontsize=style.SMALL, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
         else:
             panel.axhline(bounds["nominal"], **style.TRUTH.line)
-            if found["counterexample"] is not None:
-                panel.axhline(found["counterexample"]["values"][name], **style.SOLID.line)
+            if results["counterexample"] is not None:
+                panel.axhline(results["counterexample"]["values"][name], **style.SOLID.line)
         style.label(panel, "runs", "", name)
     return figure
 
@@ -57,13 +58,13 @@ def beside_nominal_figure(nominal: xr.Dataset, broken: xr.Dataset) -> Figure:
         (f"{name} error, {unit}", "error", axes) for name, (unit, axes) in groups.items()
     ]
     blocks.append((f"largest input, {nominal['input'].attrs.get('units', '')}", "input", None))
-    for place, (title, name, entries) in enumerate(blocks):
-        panel = style.place(figure, 0.8, 0.5 + place * (_TALL + _GAP), 5.3, _TALL)
+    for number, (title, name, entries) in enumerate(blocks):
+        panel = style.place(figure, 0.8, 0.5 + number * (_TALL + _GAP), 5.3, _TALL)
         for run, look in ((nominal, style.SOLID), (broken, style.DASHED)):
-            lived = run["time"].values <= run.attrs["ended"]
-            values = run[name].values[lived]
+            is_valid = run["time"].values <= run.attrs["ended"]
+            values = run[name].values[is_valid]
             size = np.abs(values).max(-1) if entries is None else np.sqrt((values[:, entries] ** 2).sum(-1))
-            panel.plot(run["time"].values[lived], size, **look.line)
+            panel.plot(run["time"].values[is_valid], size, **look.line)
         panel.set_xlim(0, float(nominal["time"][-1]))
         style.label(panel, "time, s", "", title)
     return figure

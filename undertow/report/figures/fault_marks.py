@@ -30,9 +30,13 @@ def fault_marks(run: xr.Dataset, facts: RunFacts | None) -> list[Mark]:
         if isinstance(fault["onset"], int | float):
             words.setdefault(float(fault["onset"]), []).append(f"{_target(fault, names)} {fault['mode']}")
     end = float(np.nanmax(run["time"].values, initial=0.0))
-    onsets = [Mark(onset, ", ".join(said), _ONSET, before=True) for onset, said in words.items() if onset <= end]
-    found = [Mark(time, f"{short(name)} out of use", _FOUND, before=False) for name, time in lost_thrusters(run) or ()]
-    return onsets + found
+    onsets = [
+        Mark(onset, ", ".join(descriptions), _ONSET, before=True)
+        for onset, descriptions in words.items()
+        if onset <= end
+    ]
+    losses = [Mark(time, f"{short(name)} out of use", _FOUND, before=False) for name, time in lost_thrusters(run) or ()]
+    return onsets + losses
 
 
 def _target(fault: Mapping[str, Any], names: list[str]) -> str:

@@ -21,12 +21,13 @@ Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
 def fit_linear(panel: Axes, series: Named, start: float) -> None:
     """Fit to the values after `start`, s; earlier values outside the panel are noted above it."""
-    late = _finite([values[time >= start] for _, time, values in series])
-    if not late.size:
+    late_values = _finite([values[time >= start] for _, time, values in series])
+    if not late_values.size:
         return
-    low, high = float(late.min()), float(late.max())
+    low, high = float(late_values.min()), float(late_values.max())
     margin = 0.08 * (high - low) or 0.08 * max(abs(high), 1e-12)
-    low, high = low - margin, high + margin
+    low -= margin
+    high += margin
     panel.set_ylim(low, high)
     _shorten(panel)
     beyond = {}
@@ -35,12 +36,12 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
         if outside.size and outside.max() > 0:
             beyond[name] = plain(values[outside.argmax()])
     if beyond:
-        named = [f"{name} to {value}" for name, value in beyond.items()]
+        peak_words = [f"{name} to {value}" for name, value in beyond.items()]
         peaks = set(beyond.values())
         if len(beyond) == len(series) and len(peaks) == 1:  # all the same, in few words beside the name of the panel
-            named = [f"to {peaks.pop()}"]
-        said = f"first {start:.2g} s: {', '.join(named)}"
-        style.note(panel, said, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
+            peak_words = [f"to {peaks.pop()}"]
+        note = f"first {start:.2g} s: {', '.join(peak_words)}"
+        style.note(panel, note, (1, 1), (0, 2), color=style.INK, ha="right", va="bottom")
 
 
 def _shorten(panel: Axes) -> None:
@@ -69,8 +70,8 @@ def fit_log(panel: Axes, series: Named, start: float) -> None:
 def fit_symmetric(panel: Axes, series: Named, start: float) -> None:
     """Linear about zero, logarithmic outside, for runs that diverged."""
     del start
-    early = max(early_size(time, values) for _, time, values in series)
-    panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(max(early, 1e-12))))
+    early_peak = max(early_size(time, values) for _, time, values in series)
+    panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(max(early_peak, 1e-12))))
     sizes = np.abs(_finite([values for _, _, values in series]))
     if sizes.size and sizes.max() > 0:
         top = 10.0 ** np.floor(np.log10(sizes.max()))

@@ -62,7 +62,8 @@ def small_multiples(
     shares = np.array([block.width for block in blocks]) / sum(block.width for block in blocks)
     for index, name in enumerate(names):
         row, column = divmod(index, columns)
-        left, top = column * cell, _HEAD + row * tall
+        left = column * cell
+        top = _HEAD + row * tall
         lowest = index + columns >= len(names)
         for number, block in enumerate(blocks):
             width = cell * (shares[number] if beside else 1.0)
@@ -81,13 +82,13 @@ def _above(block: Block) -> float:
 
 
 def _plot(panel: Axes, block: Block, column: int) -> None:
-    shown = [_cut(curve, block.window) for curve in block.curves]
-    for curve in shown:
+    curves_in_window = [_cut(curve, block.window) for curve in block.curves]
+    for curve in curves_in_window:
         values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)
         panel.plot(curve.time, values, **curve.look.line, label=curve.name)
-    series = [(curve.name, curve.time, curve.values[:, column]) for curve in shown]
+    series = [(curve.name, curve.time, curve.values[:, column]) for curve in curves_in_window]
     {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric}[block.scale](panel, series, block.limits_from)
-    ends = [curve.time[[0, -1]] for curve in shown if len(curve.time)]
+    ends = [curve.time[[0, -1]] for curve in curves_in_window if len(curve.time)]
     if ends and np.ptp(ends) > 0:
         panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
     for mark in block.marks:

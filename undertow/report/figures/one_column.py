@@ -31,17 +31,19 @@ def one_column(figure: Figure) -> Figure:
     Panels keep their order, their height where the page is tall enough, and the size of their text. A panel with long
     names beside it, or a matrix, may need more than the width of a column.
     """
-    given, figure.dpi = figure.dpi, _FINE
+    resolution = figure.dpi
+    figure.dpi = _FINE
     try:
         return _rearranged(figure, FigureCanvasAgg(figure))
     finally:
-        figure.dpi = given
+        figure.dpi = resolution
 
 
 def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
     for title in list(figure.texts):
         title.remove()
-    panels, across = figure.axes, 2 if len(figure.axes) > _FEW else 1
+    panels = figure.axes
+    across = 2 if len(figure.axes) > _FEW else 1
     _label_last(panels, across)
     for panel in panels:
         for title in panel.findobj(Text):
@@ -49,32 +51,36 @@ def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
                 title.set_text("\n".join(textwrap.wrap(title.get_text(), _LETTERS)))
         _raise_notes(panel)
         _wrap(panel)
-    around = [_around(panel, canvas) for panel in panels]
+    margins = [_around(panel, canvas) for panel in panels]
     # Panels with long names beside them begin further to the right than the others, but end with them.
-    left, right = max((one[0] for one in around if one[0] < _LONG), default=0.4), max(one[1] for one in around)
-    more = [max(one[0] - left, 0.0) for one in around]
-    own = [panel.get_position().width * figure.get_size_inches()[0] if panel.images else 0.0 for panel in panels]
-    wide = max(
+    left = max((margin[0] for margin in margins if margin[0] < _LONG), default=0.4)
+    right = max(margin[1] for margin in margins)
+    indents = [max(margin[0] - left, 0.0) for margin in margins]
+    widths_of_images = [
+        panel.get_position().width * figure.get_size_inches()[0] if panel.images else 0.0 for panel in panels
+    ]
+    panel_width = max(
         (WIDTH - (across - 1) * _GAP) / across - left - right,
-        _NARROWEST + max(more),
-        *map(sum, zip(own, more, strict=True)),
+        _NARROWEST + max(indents),
+        *map(sum, zip(widths_of_images, indents, strict=True)),
     )
     rows = [range(first, min(first + across, len(panels))) for first in range(0, len(panels), across)]
-    above, below = ([max(around[i][side] for i in row) for row in rows] for side in (2, 3))
+    above, below = ([max(margins[i][side] for i in row) for row in rows] for side in (2, 3))
     heights = [max(panels[i].get_position().height for i in row) * figure.get_size_inches()[1] for row in rows]
-    figure.set_size_inches(across * (left + wide + right) + (across - 1) * _GAP, _TALLEST)
+    figure.set_size_inches(across * (left + panel_width + right) + (across - 1) * _GAP, _TALLEST)
     key = _key(figure, canvas)
     room = _TALLEST - key - sum(above) - sum(below) - _GAP * len(rows)
     heights = [max(min(1.0, room / sum(heights)) * height, min(height, _LOWEST)) for height in heights]
     figure.set_size_inches(figure.get_size_inches()[0], key + sum(above) + sum(below) + sum(heights) + _GAP * len(rows))
     top = key
-    for row, over, tall, under in zip(rows, above, heights, below, strict=True):
+    for row, margin_above, panel_height, margin_below in zip(rows, above, heights, below, strict=True):
         for column, i in enumerate(row):
-            _move(panels[i], column * (left + wide + right + _GAP) + left + more[i], top + over, wide - more[i], tall)
-            if more[i]:
+            panel_left = column * (left + panel_width + right + _GAP) + left + indents[i]
+            _move(panels[i], panel_left, top + margin_above, panel_width - indents[i], panel_height)
+            if indents[i]:
                 panels[i].xaxis.label.set_horizontalalignment("right")
                 panels[i].xaxis.set_label_coords(1.0, 0.0, transform=_lifted(panels[i], -0.2))
-        top += over + tall + under + _GAP
+        top += margin_above + panel_height + margin_below + _GAP
     _key(figure, canvas)
     return figure
 
@@ -82,8 +88,8 @@ def _rearranged(figure: Figure, canvas: FigureCanvasAgg) -> Figure:
 def _label_last(panels: list[Axes], across: int) -> None:
     """Leave an x axis that several panels below each other share to the lowest of them to label."""
     axis = [(panel.get_xlabel(), panel.get_xlim()) for panel in panels]
-    for panel, own, below in zip(panels, axis, axis[across:], strict=False):
-        if own == below:
+    for panel, label_and_limits, label_and_limits_below in zip(panels, axis, axis[across:], strict=False):
+        if label_and_limits == label_and_limits_below:
             panel.set_xlabel("")
 
 
@@ -116,16 +122,18 @@ def _lifted(panel: Axes, up: float) -> Transform:
 def _around(panel: Axes, canvas: FigureCanvasAgg) -> tuple[float, float, float, float]:
     """Space that labels take at the left, at the right, above and below, in."""
     renderer, inner = canvas.get_renderer(), panel.get_window_extent()
-    whole, beside = panel.get_tightbbox(renderer), panel.yaxis.get_tightbbox(renderer)
+    outer = panel.get_tightbbox(renderer)
+    beside = panel.yaxis.get_tightbbox(renderer)
     ticks = [label.get_window_extent(renderer).x1 for label in panel.get_xticklabels() if label.get_visible()]
-    if whole is None:
+    if outer is None:
         return 0.0, 0.0, 0.0, 0.0
     # Where a panel is moved to, a tick may stand at its upper edge.
     letters = max((label.get_window_extent(renderer).height for label in panel.get_yticklabels()), default=0.0)
-    left, right = inner.x0 - beside.x0 if beside else 0.0, min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
-    sides = left, right, max(whole.y1 - inner.y1, letters / 2), inner.y0 - whole.y0
+    left = inner.x0 - beside.x0 if beside else 0.0
+    right = min(max(ticks, default=0.0) - inner.x1, _OVER * inner.width)
+    sides = left, right, max(outer.y1 - inner.y1, letters / 2), inner.y0 - outer.y0
     edge = (_EDGE, 0.0, 0.0, 0.0)
-    return tuple(max(side, 0.0) / panel.figure.dpi + more for side, more in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
+    return tuple(max(side, 0.0) / panel.figure.dpi + extra for side, extra in zip(sides, edge, strict=True))  # pyright: ignore[reportReturnType]
 
 
 def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:
@@ -133,7 +141,8 @@ def _key(figure: Figure, canvas: FigureCanvasAgg) -> float:
     wide, tall = figure.get_size_inches()
     top = 0.0
     for old in list(figure.legends):
-        handles, words = old.legend_handles, [text.get_text() for text in old.get_texts()]
+        handles = old.legend_handles
+        words = [text.get_text() for text in old.get_texts()]
         old.remove()
         for columns in range(len(words), 0, -1):
             new = figure.legend(

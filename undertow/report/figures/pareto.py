@@ -15,29 +15,31 @@ _WIDE = 30.0  # ratio of largest and smallest from which on an axis is logarithm
 _WIDTH, _HEIGHT = 4.0, 2.4  # of a panel, in
 
 
-def pareto_figure(found: Findings) -> Figure:
+def pareto_figure(findings: Findings) -> Figure:
     """Medians with their 95 % intervals; dominated ones pale, those with failed trials hollow."""
-    rows = -(-len(found.fronts) // _COLUMNS)
+    rows = -(-len(findings.fronts) // _COLUMNS)
     figure = style.blank(9.6, 0.45 + rows * (_HEIGHT + 0.6))
     style.head(figure, "Pareto fronts: median error against median effort", {})
-    for number, front in enumerate(found.fronts):
+    for number, front in enumerate(findings.fronts):
         row, column = divmod(number, _COLUMNS)
         panel = style.place(figure, 0.62 + 4.75 * column, 0.5 + row * (_HEIGHT + 0.6), _WIDTH, _HEIGHT)
-        _plot(panel, found, front)
+        _plot(panel, findings, front)
     return figure
 
 
-def _plot(panel: Axes, found: Findings, front: Front) -> None:
-    scales = [for_people(1.0, found.units[metric]) for metric in (front.effort, front.error)]
-    of = lambda name, metric, scale: scale * np.array(found.medians[metric][name][:3])
-    for name, look in looks_of(found.names).items():
+def _plot(panel: Axes, findings: Findings, front: Front) -> None:
+    scales = [for_people(1.0, findings.units[metric]) for metric in (front.effort, front.error)]
+    scaled_medians = lambda name, metric, scale: scale * np.array(findings.medians[metric][name][:3])
+    for name, look in looks_of(findings.names).items():
         if name not in front.points:
             continue
-        (x, *across), (y, *along) = of(name, front.effort, scales[0][0]), of(name, front.error, scales[1][0])
+        x, *x_interval = scaled_medians(name, front.effort, scales[0][0])
+        y, *y_interval = scaled_medians(name, front.error, scales[1][0])
         strong = name in front.front
-        alpha, fill = (1.0 if strong else _PALE), ("white" if name in front.incomplete else look.colour)
-        panel.plot(across, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)
-        panel.plot([x, x], along, color=look.colour, alpha=alpha, linewidth=1.2)
+        alpha = 1.0 if strong else _PALE
+        fill = "white" if name in front.incomplete else look.colour
+        panel.plot(x_interval, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)
+        panel.plot([x, x], y_interval, color=look.colour, alpha=alpha, linewidth=1.2)
         panel.plot(x, y, "o", color=look.colour, markerfacecolor=fill, alpha=alpha, markersize=5)
         weight = "bold" if strong else "normal"
         panel.annotate(

@@ -43,23 +43,25 @@ class _View(NamedTuple):
         return self.span * min(room / self.span)
 
 
-def plan_figure(dataset: xr.Dataset, found: Findings) -> Figure:
+def plan_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
     """Path of the first trial of each controller and the reference, on axes that fit the completed runs.
 
     Where the second half of the run takes up little of the whole, it follows on a larger scale.
     """
     time = dataset["time"].values
     paths = [
-        _path(dataset, found, i, name, look.colour) for i, (name, look) in enumerate(looks_of(found.names).items())
+        _path(dataset, findings, i, name, look.colour)
+        for i, (name, look) in enumerate(looks_of(findings.names).items())
     ]
-    desired = _points(dataset["series:reference"].isel({found.dimension: 0, SAMPLES: 0}))
-    shown = [one.points for one in paths if one.completed] or [one.points for one in paths]
-    views = [_view("whole run", np.ones(len(time), bool), [*shown, desired])]
-    late = _view(f"{time[-1] / 2:g} to {time[-1]:g} s", time >= time[-1] / 2, [*shown, desired])
-    views += [late] if late.span.max() < _ENLARGED * views[0].span.max() else []
-    figure, places = _laid_out(views, len(paths))
+    desired = _points(dataset["series:reference"].isel({findings.dimension: 0, SAMPLES: 0}))
+    completed = [candidate for candidate in paths if candidate.completed]
+    point_sets = [candidate.points for candidate in completed or paths]
+    views = [_view("whole run", np.ones(len(time), bool), [*point_sets, desired])]
+    second_half = _view(f"{time[-1] / 2:g} to {time[-1]:g} s", time >= time[-1] / 2, [*point_sets, desired])
+    views += [second_half] if second_half.span.max() < _ENLARGED * views[0].span.max() else []
+    figure, corners_of_views = _laid_out(views, len(paths))
     style.head(figure, "Paths in the horizontal plane, first trial", {"reference": style.TRUTH})
-    for view, corners in zip(views, places, strict=True):
+    for view, corners in zip(views, corners_of_views, strict=True):
         for path, corner in zip(paths, corners, strict=True):
             panel = style.place(figure, *corner, *view.sides(len(paths)))
             panel.plot(*path.points[view.part[: len(path.points)]].T, color=path.colour, linewidth=0.9)
@@ -76,27 +78,30 @@ def plan_figure(dataset: xr.Dataset, found: Findings) -> Figure:
 
 def _laid_out(views: list[_View], paths: int) -> tuple[Figure, list[list[tuple[float, float]]]]:
     """An empty figure, and the left upper corner of each panel, in: the views beside each other where there is room."""
-    across, (left, top) = min(paths, _ABREAST), (_LEFT, _HEAD)
-    places, bottom = [], _HEAD
+    across = min(paths, _ABREAST)
+    left, top = _LEFT, _HEAD
+    corners_of_views, bottom = [], _HEAD
     for view in views:
-        wide, tall = view.sides(paths)
-        if left > _LEFT and (left + across * (wide + _GAP) - _GAP > _WIDTH or paths > across):
+        width, height = view.sides(paths)
+        if left > _LEFT and (left + across * (width + _GAP) - _GAP > _WIDTH or paths > across):
             left, top = _LEFT, bottom
         cells = [divmod(i, across) for i in range(paths)]
-        places.append([(left + column * (wide + _GAP), top + row * (tall + _BELOW)) for row, column in cells])
-        left += across * (wide + _GAP)
-        bottom = max(bottom, top + (cells[-1][0] + 1) * (tall + _BELOW))
-    return style.blank(_WIDTH, bottom - 0.2), places
+        corners_of_views.append(
+            [(left + column * (width + _GAP), top + row * (height + _BELOW)) for row, column in cells]
+        )
+        left += across * (width + _GAP)
+        bottom = max(bottom, top + (cells[-1][0] + 1) * (height + _BELOW))
+    return style.blank(_WIDTH, bottom - 0.2), corners_of_views
 
 
 def _points(position: xr.DataArray) -> np.ndarray:
     return position.sel(axis=list(PLANE[::-1])).transpose("time", "axis").values
 
 
-def _path(dataset: xr.Dataset, found: Findings, i: int, name: str, colour: str) -> _Path:
-    row = dataset.isel({found.dimension: i, SAMPLES: 0})
-    lived = row["series:position"].isel(time=row["time"].values <= float(row["ended"]))
-    return _Path(name, colour, _points(lived), int(row["status"]) == int(Status.OK))
+def _path(dataset: xr.Dataset, findings: Findings, i: int, name: str, colour: str) -> _Path:
+    row = dataset.isel({findings.dimension: i, SAMPLES: 0})
+    valid_positions = row["series:position"].isel(time=row["time"].values <= float(row["ended"]))
+    return _Path(name, colour, _points(valid_positions), int(row["status"]) == int(Status.OK))
 
 
 def _view(words: str, part: np.ndarray, lines: list[np.ndarray]) -> _View:

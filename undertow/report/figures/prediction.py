@@ -32,8 +32,8 @@ def _poles(prediction: Prediction) -> Figure:
     style.head(figure, "Controllable closed-loop poles over the operating range", {})
     panel = style.place(figure, 0.75, 0.75, 8.6, 3.1)
     for point, mark, colour in zip(prediction.points, _MARKS, _COLOURS, strict=False):
-        marked: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
-        panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marked, label=point.where)
+        marker_style: Any = {"color": colour, "markerfacecolor": "none", "markersize": 5.5}
+        panel.plot(np.real(point.poles), np.imag(point.poles), mark, **marker_style, label=point.where)
     panel.set_xscale("symlog", linthresh=1.0, linscale=0.5)
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.5)
     right = max(1.0, *(float(np.real(point.poles).max(initial=0.0)) for point in prediction.points))
@@ -58,15 +58,15 @@ def _frequency(prediction: Prediction) -> Figure:
     names = prediction.operating_point.built.closed_loop.plant.outputs
     looks = {name: style.Look(_COLOURS[i % 6], _DASHES[i % 6], 1.2, 3) for i, name in enumerate(names)}
     style.head(figure, "Frequency response to a disturbance", looks)
-    error = _log(figure, 0.75)
-    missed = _log(figure, 5.55)
+    error_panel = _log(figure, 0.75)
+    estimation_panel = _log(figure, 5.55)
     for i, look in enumerate(looks.values()):
-        error.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look.line)
-        missed.plot(prediction.frequency, np.maximum(prediction.estimation[:, i], 1e-12), **look.line)
-    missed.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
-    style.label(error, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
+        error_panel.plot(prediction.frequency, np.maximum(prediction.error[:, i], 1e-12), **look.line)
+        estimation_panel.plot(prediction.frequency, np.maximum(prediction.estimation[:, i], 1e-12), **look.line)
+    estimation_panel.axhline(1.0, color=style.INK, linewidth=0.8, linestyle=(0, (1, 1.8)))
+    style.label(error_panel, "frequency of d, rad/s", "|e| / |d|, s$^2$", "tracking error")
     style.label(
-        missed,
+        estimation_panel,
         "frequency of d, rad/s",
         r"$|\hat{d} - d| \,/\, |d|$",
         "estimation error; above 1 the estimate adds error",
@@ -75,7 +75,8 @@ def _frequency(prediction: Prediction) -> Figure:
 
 
 def _actuators(prediction: Prediction) -> Figure:
-    authority, plant = prediction.authority, prediction.operating_point.built.closed_loop.plant
+    authority = prediction.authority
+    plant = prediction.operating_point.built.closed_loop.plant
     looks = {"largest demand": style.SOLID, "forward limit": _FORWARD, "reverse limit": _REVERSE}
     figure = style.blank(9.6, 2.9)
     style.head(figure, "Largest force demanded from each actuator, and its limits", looks)

@@ -16,10 +16,10 @@ _OF_OUTPUTS = ("position", "reference", "error", "measured_position")
 def in_degrees(run: xr.Dataset) -> xr.Dataset:
     """A run as people read it: outputs that are angles in degrees, as in tables. Files hold radians."""
     units = run["axis"].attrs["unit_of_each"].split(", ")
-    factors, shown = zip(*(for_people(1.0, unit) for unit in units), strict=True)
+    factors, display_units = zip(*(for_people(1.0, unit) for unit in units), strict=True)
     scaled = {name: run[name].copy(data=run[name].values * factors) for name in _OF_OUTPUTS}
     axis = run["axis"].copy()
-    axis.attrs["unit_of_each"] = ", ".join(shown)
+    axis.attrs["unit_of_each"] = ", ".join(display_units)
     return run.assign(scaled).assign_coords(axis=axis)
 
 
@@ -41,8 +41,8 @@ def per_input(run: xr.Dataset, quantity: str) -> list[str]:
 
 def curve(run: xr.Dataset, name: str, signal: str, look: Look) -> Curve:
     """A signal of a dataset, up to the end of the run."""
-    lived = run["time"].values <= run.attrs.get("ended", np.inf)
-    return Curve(name, run["time"].values[lived], run[signal].values[lived], look)
+    is_valid = run["time"].values <= run.attrs.get("ended", np.inf)
+    return Curve(name, run["time"].values[is_valid], run[signal].values[is_valid], look)
 
 
 def difference(run: xr.Dataset, name: str, signal: str, other: str, look: Look) -> Curve:

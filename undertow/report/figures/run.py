@@ -34,17 +34,18 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
     """Functions that make the figures of a run, by name; see `run_figures`."""
     outputs = axis_names(run)
     inputs = input_names(run)
-    shown = recorded.in_degrees(run)
-    desired = recorded.curve(shown, "desired $x_d$", "reference", style.TRUTH)
-    actual = recorded.curve(shown, "actual $x$", "position", style.SOLID)
-    error = recorded.magnitude(recorded.curve(shown, "|$x_d - x$|", "error", style.SOLID))
+    run_in_degrees = recorded.in_degrees(run)
+    desired = recorded.curve(run_in_degrees, "desired $x_d$", "reference", style.TRUTH)
+    actual = recorded.curve(run_in_degrees, "actual $x$", "position", style.SOLID)
+    error = recorded.magnitude(recorded.curve(run_in_degrees, "|$x_d - x$|", "error", style.SOLID))
     true = recorded.curve(run, "true $d$", "uncertainty", style.MEASURED)
     curves = [true]
     if "estimate" in run:
         curves.append(recorded.curve(run, r"estimate $\hat{d}$", "estimate", style.SOLID))
     commanded = recorded.curve(run, "commanded", "commanded_input", style.DASHED)
     applied = recorded.curve(run, "applied", "input", style.SOLID)
-    places, errors = recorded.places(shown), recorded.per_axis(shown, "|error|")
+    places = recorded.places(run_in_degrees)
+    errors = recorded.per_axis(run_in_degrees, "|error|")
     rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
     marks = fault_marks(run, facts)
@@ -74,14 +75,14 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
 
 def _apart(run: xr.Dataset) -> list[Block]:
     """Measurement error of position and, below it, velocity."""
-    shown = recorded.in_degrees(run)
-    position = recorded.difference(shown, "measured less true", "measured_position", "position", style.SOLID)
-    turns = np.array([unit == "deg" for unit in shown["axis"].attrs["unit_of_each"].split(", ")])
+    run_in_degrees = recorded.in_degrees(run)
+    position = recorded.difference(run_in_degrees, "measured less true", "measured_position", "position", style.SOLID)
+    turns = np.array([unit == "deg" for unit in run_in_degrees["axis"].attrs["unit_of_each"].split(", ")])
     position = position._replace(values=np.where(turns, (position.values + 180) % 360 - 180, position.values))
     velocity = recorded.difference(run, "measured less true", "measured_velocity", "velocity", style.SOLID)
     rates = recorded.per_axis(run, r"error of $\dot{x}$", "/s")
     return [
-        _block(run, [position], recorded.per_axis(shown, "error of $x$"), 0.0),
+        _block(run, [position], recorded.per_axis(run_in_degrees, "error of $x$"), 0.0),
         _block(run, [velocity], rates, 0.0)._replace(titled=False),
     ]
 
@@ -89,8 +90,8 @@ def _apart(run: xr.Dataset) -> list[Block]:
 def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
     failed = run.attrs.get("status", "completed") != "completed"
     peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
-    early = [early_size(curve.time, curve.values) for curve in curves]
-    runaway = failed and max(peaks) > _RUNAWAY * max(early)
+    early_peaks = [early_size(curve.time, curve.values) for curve in curves]
+    runaway = failed and max(peaks) > _RUNAWAY * max(early_peaks)
     scale = "symlog" if runaway else "linear"
     return Block(curves, quantities, 1.4, scale=scale, limits_from=0.0 if failed else start, titled=True)
 

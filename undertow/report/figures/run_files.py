@@ -24,9 +24,9 @@ def plot_run(record: RunRecord, width: str | None = None) -> Plotted:
     pictures: dict[str, str | bytes] = {}
 
     def put(name, figure) -> None:
-        made = files_of(figure, name, width)
-        pictures[name] = _picture(made[f"{name}.svg"], made[f"{name}.png"])
-        files.update(made)
+        files_of_figure = files_of(figure, name, width)
+        pictures[name] = _picture(files_of_figure[f"{name}.svg"], files_of_figure[f"{name}.png"])
+        files.update(files_of_figure)
 
     failures = make_all(lambda: run_plots(record.series, record.facts), put)
     return Plotted(files, pictures, failures)
@@ -38,6 +38,6 @@ def _picture(vector: bytes, raster: bytes) -> str | bytes:
         return vector.decode()
     data = io.BytesIO()
     with Image.open(io.BytesIO(raster)) as image:
-        few = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        few.save(data, "PNG", compress_level=6)
+        quantized = image.convert("RGB").quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        quantized.save(data, "PNG", compress_level=6)
     return data.getvalue()

@@ -101,7 +101,7 @@ def key(figure: Figure, keys: dict[str, Look], top: float, columns: int) -> None
     _legend(figure, keys, columns, loc="upper left", bbox_to_anchor=(0.005, 1.0 - top / height))
 
 
-def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> None:
+def _legend(figure: Figure, keys: dict[str, Look], columns: int, **placement) -> None:
     figure.legend(
         handles=[
             Line2D([], [], color=k.colour, linestyle=k.dashes, linewidth=1.6, label=name)  # pyright: ignore[reportArgumentType] - dashes as Matplotlib takes them
@@ -113,7 +113,7 @@ def _legend(figure: Figure, keys: dict[str, Look], columns: int, **place) -> Non
         handlelength=3.0,
         columnspacing=1.4,
         borderaxespad=0.2,
-        **place,
+        **placement,
     )
 
 

@@ -33,7 +33,9 @@ def thrust_along(thruster: AbstractThruster, inputs: Series, step: float) -> Ser
         inputs: applied, shape (records, N).
         step: time between records, s.
     """
-    state, dt, parts = thruster.initial_state(inputs.shape[1]), jnp.asarray(step, dtype=inputs.dtype), []
+    state = thruster.initial_state(inputs.shape[1])
+    dt = jnp.asarray(step, dtype=inputs.dtype)
+    parts = []
     padded = np.concatenate([inputs, np.repeat(inputs[-1:], -(len(inputs) - 1) % _CHUNK, axis=0)])
     for first in range(0, len(padded) - 1, _CHUNK):
         block = jnp.asarray(padded[first : first + _CHUNK + 1])
@@ -99,8 +101,8 @@ def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, vel
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    found = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
-    return Environment(*(None if series is None else np.asarray(series) for series in found))
+    histories = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
+    return Environment(*(None if series is None else np.asarray(series) for series in histories))
 
 
 @eqx.filter_jit

@@ -103,25 +103,27 @@ def replay_of(
     plant = loop.plant
     if not isinstance(plant, HybridVehicle) or run.sizes["time"] < 2:
         return None
-    lived = run.isel(time=slice(0, max(2, int((run["time"].values <= run.attrs.get("ended", np.inf)).sum()))))
-    lived = lived.map(_finite)
-    with runtime.on_processor(), runtime.in_precision(str(lived["position"].dtype)):
-        return _replay_of(lived, loop, plant, seed, hull_size(plant.vehicle, hull), label)
+    valid_run = run.isel(time=slice(0, max(2, int((run["time"].values <= run.attrs.get("ended", np.inf)).sum()))))
+    valid_run = valid_run.map(_finite)
+    with runtime.on_processor(), runtime.in_precision(str(valid_run["position"].dtype)):
+        return _replay_of(valid_run, loop, plant, seed, hull_size(plant.vehicle, hull), label)
 
 
 def _replay_of(
     run: xr.Dataset, loop: ClosedLoop, plant: HybridVehicle, seed: int, size: np.ndarray, label: str
 ) -> ReplayData:
-    time, frames = run["time"].values, _frames(run["time"].values)
-    shown = run.isel(time=frames)
-    position, reference = shown["position"].values, shown["reference"].values
-    around = environment(loop, seed, shown["time"].values, position, shown["velocity"].values)
+    time = run["time"].values
+    frames = _frames(run["time"].values)
+    records = run.isel(time=frames)
+    position, reference = records["position"].values, records["reference"].values
+    surroundings = environment(loop, seed, records["time"].values, position, records["velocity"].values)
     step = float(time[1] - time[0])
     acting_input = run["acting_input" if "acting_input" in run else "input"].values
     thrust = _finite_values(thrust_along(plant.thruster, acting_input, step)[frames])
-    if around.thrust_share is not None:
-        thrust = thrust * around.thrust_share
-    error, energy = shown["error"].values, _energy(run)[frames]
+    if surroundings.thrust_share is not None:
+        thrust = thrust * surroundings.thrust_share
+    error = records["error"].values
+    energy = _energy(run)[frames]
     series = {
         "position": position[:, :3],
         "attitude": _attitude(position[:, 3:]),
@@ -130,13 +132,13 @@ def _replay_of(
         "thrust": thrust,
         "error": np.stack([_norm(error[:, :3]), np.degrees(_norm(error[:, 3:]))], axis=-1),
         "energy": energy[:, None],
-        "uncertainty": shown["uncertainty"].values,
+        "uncertainty": records["uncertainty"].values,
     }
     optional = {
-        "estimate": shown["estimate"].values if "estimate" in shown else None,
-        "water": around.water,
-        "weights": shown["weights"].values.reshape(len(frames), -1) if "weights" in shown else None,
-        "firing": firing_along(loop.controller, shown),
+        "estimate": records["estimate"].values if "estimate" in records else None,
+        "water": surroundings.water,
+        "weights": records["weights"].values.reshape(len(frames), -1) if "weights" in records else None,
+        "firing": firing_along(loop.controller, records),
     }
     series |= {
         name: _finite_values(values.reshape(len(frames), -1)) for name, values in optional.items() if values is not None
@@ -147,7 +149,7 @@ def _replay_of(
     return ReplayData(
         label=label,
         status=str(run.attrs.get("status", "")),
-        time=shown["time"].values,
+        time=records["time"].values,
         size=size,
         thrusters=Thrusters(vehicle.thruster_names(), positions, np.asarray(vehicle.thruster_directions), limits),
         limited=limited,
@@ -160,7 +162,8 @@ def _energy(run: xr.Dataset) -> np.ndarray:
     """Electrical energy since the start, J, as the metric `energy` has it: of the ledger, or by the trapezium rule."""
     if "energy_source" in run:
         return run["energy_source"].values
-    time, power = run["time"].values, run["power"].values.sum(-1)
+    time = run["time"].values
+    power = run["power"].values.sum(-1)
     return np.concatenate([[0.0], np.cumsum(np.diff(time) * (power[1:] + power[:-1]) / 2)])
 
 
@@ -194,9 +197,9 @@ _quaternions = jax.jit(jax.vmap(quaternion_from_euler))
 
 def _attitude(angles: np.ndarray) -> np.ndarray:
     """Quaternions of (roll, pitch, yaw), each on the side of the one before, so that between them is the short way."""
-    found = np.asarray(_quaternions(jnp.asarray(angles)))
-    turned = np.where((found[1:] * found[:-1]).sum(-1) < 0, -1.0, 1.0)
-    return found * np.concatenate([[1.0], np.cumprod(turned)])[:, None]
+    quaternions = np.asarray(_quaternions(jnp.asarray(angles)))
+    flips = np.where((quaternions[1:] * quaternions[:-1]).sum(-1) < 0, -1.0, 1.0)
+    return quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
 
 
 def rotations(attitude: np.ndarray) -> np.ndarray:
@@ -214,13 +217,13 @@ def _limits(plant: HybridVehicle, thrust: np.ndarray) -> tuple[np.ndarray, bool]
     return np.tile([-most, most], (plant.inputs(), 1)), False
 
 
-def hull_size(vehicle: VehicleModel, known: Sequence[float] | None) -> np.ndarray:
+def hull_size(vehicle: VehicleModel, dimensions: Sequence[float] | None) -> np.ndarray:
     """Length, width and height, m: the known ones, or those of the even box of the same mass and inertia."""
-    if known is not None:
-        return np.asarray(known, dtype=float)
+    if dimensions is not None:
+        return np.asarray(dimensions, dtype=float)
     facts = facts_of(vehicle)
-    about = np.diag(facts.inertia)
-    sides = np.sqrt(np.maximum(6 * (about.sum() - 2 * about) / facts.mass, 0.0))
+    moments_of_inertia = np.diag(facts.inertia)
+    sides = np.sqrt(np.maximum(6 * (moments_of_inertia.sum() - 2 * moments_of_inertia) / facts.mass, 0.0))
     return np.maximum(sides, _THINNEST * max(float(sides.max()), facts.scale))
 
 
@@ -267,11 +270,11 @@ def packed(values: np.ndarray, size: int) -> dict[str, Any]:
     low, high = values.min(axis=0).astype(float), values.max(axis=0).astype(float)
     levels = 256**size - 1
     width = np.where(high > low, high - low, 1.0)
-    whole = np.round((values - low) / width * levels).astype(f"<u{size}")
+    integers = np.round((values - low) / width * levels).astype(f"<u{size}")
     rounded = lambda limits: [float(f"{limit:.9g}") for limit in limits]
     return {
         "bytes": size,
         "low": rounded(low),
         "high": rounded(high),
-        "data": base64.b64encode(whole.tobytes()).decode(),
+        "data": base64.b64encode(integers.tobytes()).decode(),
     }

@@ -23,32 +23,32 @@ def replays_of_trials(trials: Mapping[str, Built]) -> tuple[list[ReplayData], li
     Args:
         trials: label -> trial of a vehicle with thrusters.
     """
-    alike: dict[tuple[tuple[str, ...], float], dict[str, Built]] = {}
+    groups: dict[tuple[tuple[str, ...], float], dict[str, Built]] = {}
     for label, built in trials.items():
         kind = (tuple(built.closed_loop.signals()), _time_between_records(built))
-        alike.setdefault(kind, {})[label] = built
-    found: dict[str, ReplayData] = {}
+        groups.setdefault(kind, {})[label] = built
+    replays: dict[str, ReplayData] = {}
     failures: list[str] = []
-    for (signals, every), several in alike.items():
+    for (signals, every), trials_of_group in groups.items():
         try:
-            found |= _together(several, signals, every)
+            replays |= _together(trials_of_group, signals, every)
         except Exception as error:  # a user's part may run and yet not be differentiable
-            failures.append(not_made(error, f" of {', '.join(several)}"))
-    return [found[label] for label in trials if label in found], failures
+            failures.append(not_made(error, f" of {', '.join(trials_of_group)}"))
+    return [replays[label] for label in trials if label in replays], failures
 
 
 def _together(trials: Mapping[str, Built], signals: Sequence[str], every: float) -> dict[str, ReplayData]:
-    found: dict[str, ReplayData] = {}
+    replays: dict[str, ReplayData] = {}
     labels = list(trials)
-    for several in run_many(prepare(built, signals, every) for built in trials.values()):
-        for place, outcome in several.each():
-            label = labels[place]
+    for batch in run_many(prepare(built, signals, every) for built in trials.values()):
+        for index, outcome in batch.each():
+            label = labels[index]
             built = trials[label]
             dataset = to_dataset(outcome, built.closed_loop)
             replay = replay_of(dataset, built.closed_loop, built.scenario.seed, hull_of(built.resolved), label)
             if replay is not None:
-                found[label] = replay
-    return found
+                replays[label] = replay
+    return replays
 
 
 def _time_between_records(built: Built) -> float:

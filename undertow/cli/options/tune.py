@@ -1,4 +1,4 @@
-"""Commands that fit gains to a vehicle."""
+"""Options of `undertow tune`."""
 
 import dataclasses
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from undertow.cli.commands.command import Command
-from undertow.cli.commands.options import AllowCode, Overwrite, Pdf, Resume, ScenarioFile, results
+from undertow.cli.options.command import Command
+from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, Resume, ScenarioFile, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +39,3 @@ class TuneCommand(Command):
     overwrite: Overwrite = False
     allow_code: AllowCode = False
     pdf: Pdf = None
-
-
-COMMANDS = (TuneCommand,)

@@ -1,4 +1,4 @@
-"""Commands that reproduce the paper."""
+"""Options of `undertow reproduce`."""
 
 import dataclasses
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from undertow.cli.commands.command import Command
-from undertow.cli.commands.options import Pdf
+from undertow.cli.options.command import Command
+from undertow.cli.options.shared import Pdf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +29,3 @@ class ReproduceCommand(Command):
         bool, typer.Option("--quick", help="Skip the parameter sweeps. The other results stay the same.")
     ] = False
     pdf: Pdf = None
-
-
-COMMANDS = (ReproduceCommand,)

@@ -1,0 +1,25 @@
+"""Options of `undertow analyze`."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from undertow.cli.options.command import Command
+from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, ScenarioFile, results
+
+
+@dataclasses.dataclass(frozen=True)
+class AnalyzeCommand(Command):
+    """Predict closed-loop performance and stability margins without simulating.
+
+    The command linearises the whole closed loop at its equilibrium and reports the poles over the operating range, the
+    sampling limit, the delay and lag margins, the response to noise and disturbances, and the actuator authority. It
+    writes prediction.html, prediction.json and figures/.
+    """
+
+    runs: ClassVar = "undertow.cli.analyze:analyze"
+    scenario: ScenarioFile
+    out: Annotated[Path | None, results("runs/NAME-prediction")] = None
+    overwrite: Overwrite = False
+    allow_code: AllowCode = False
+    pdf: Pdf = None
