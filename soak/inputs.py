@@ -157,12 +157,12 @@ def _store(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[s
     }
     for _ in range(chance.choice((1, 1, 2, 5))):
         name = chance.choice(sorted(store))
-        draw = chance.random()
-        if draw < 0.5:
+        sample = chance.random()
+        if sample < 0.5:
             store[name] = spoilt_bytes(store[name] or b"", chance)
-        elif draw < 0.75 and len(store) > 1:
+        elif sample < 0.75 and len(store) > 1:
             del store[name]
-        elif draw < 0.9:
+        elif sample < 0.9:
             store[chance.choice(sorted(store))] = store[name]
         else:
             store[name + chance.choice((".partial", ".x", "2"))] = chance.randbytes(40)

@@ -164,11 +164,11 @@ class _Sabotage:
         self.damaged += 1
         chunk = self._chance.choice(chunks)
         data = bytearray(chunk.read_bytes())
-        draw = self._chance.random()
-        if draw < 0.4 and data:
+        sample = self._chance.random()
+        if sample < 0.4 and data:
             data[self._chance.randrange(len(data))] ^= 1 << self._chance.randrange(8)
             chunk.write_bytes(bytes(data))
-        elif draw < 0.8:
+        elif sample < 0.8:
             chunk.write_bytes(bytes(data[: self._chance.randrange(len(data) + 1)]))
         else:
             chunk.with_name(f"{chunk.name}.0123.partial").write_bytes(bytes(data[: len(data) // 2]))

@@ -128,18 +128,18 @@ def change(data: Any, chance: random.Random) -> None:
     node = data
     for key in above:
         node = node[key]
-    draw = chance.random()
-    if draw < 0.5:
+    sample = chance.random()
+    if sample < 0.5:
         node[last] = _value(chance, node[last])
-    elif draw < 0.6:
+    elif sample < 0.6:
         del node[last]
     elif isinstance(node, list):
-        node.insert(last, copy.deepcopy(node[last]) if draw < 0.8 else _value(chance, None))
-    elif draw < 0.72:
+        node.insert(last, copy.deepcopy(node[last]) if sample < 0.8 else _value(chance, None))
+    elif sample < 0.72:
         node[_misspelt(str(last), chance)] = node.pop(last)
-    elif draw < 0.78:
+    elif sample < 0.78:
         node[chance.choice(_KEYS)] = node.pop(last)
-    elif draw < 0.88:
+    elif sample < 0.88:
         node[chance.choice(_KEYS)] = _value(chance, None)
     else:  # the value of another place
         *path, key = chance.choice(places)
@@ -167,22 +167,22 @@ def _misspelt(word: str, chance: random.Random) -> str:
 
 
 def _value(chance: random.Random, before: Any) -> Any:
-    draw = chance.random()
-    if draw < 0.3:
+    sample = chance.random()
+    if sample < 0.3:
         return chance.choice(_NUMBERS)
-    if draw < 0.42:
+    if sample < 0.42:
         return chance.choice(_ODD)
-    if draw < 0.5:
+    if sample < 0.5:
         return chance.choice(_UNITS)
-    if draw < 0.62:
+    if sample < 0.62:
         return chance.choice(_WORDS)
-    if draw < 0.75 and isinstance(before, int | float):
+    if sample < 0.75 and isinstance(before, int | float):
         return before * chance.choice((-1, 1e-6, 1e6, 1e30, 2, 0.5))
-    if draw < 0.85:
+    if sample < 0.85:
         return [chance.choice(_NUMBERS)] * chance.choice((0, 1, 2, 3, 6, 7, 40))
-    if draw < 0.9:
+    if sample < 0.9:
         return [[chance.choice((*_NUMBERS, *_ODD))] * chance.choice((1, 3, 7))] * chance.choice((1, 2, 6))
-    if draw < 0.95:
+    if sample < 0.95:
         return {chance.choice(_KEYS): chance.choice((*_NUMBERS, *_ODD, *_WORDS))}
     nested = chance.choice(_NUMBERS)
     for _ in range(chance.choice((1, 3, 30))):
@@ -194,28 +194,28 @@ def spoilt_text(text: str, chance: random.Random) -> str:
     """Text with a slip of the keyboard or of an editor: of a few characters, of a line, of all."""
     lines = text.splitlines(keepends=True)
     position, line = chance.randrange(len(text) + 1), chance.randrange(len(lines))
-    draw = chance.random()
-    if draw < 0.3:
+    sample = chance.random()
+    if sample < 0.3:
         return text[:position] + chance.choice(_JUNK) + text[position:]
-    if draw < 0.4:
+    if sample < 0.4:
         return text[:position] + text[position + chance.choice((1, 1, 2, 5, 40)) :]
-    if draw < 0.48:
+    if sample < 0.48:
         return text[:position]
-    if draw < 0.56:
+    if sample < 0.56:
         lines.insert(chance.randrange(len(lines) + 1), lines[line])
-    elif draw < 0.62:
+    elif sample < 0.62:
         del lines[line]
-    elif draw < 0.72:
+    elif sample < 0.72:
         lines[line] = chance.choice((" ", "    ", "\t")) + lines[line]
-    elif draw < 0.78:
+    elif sample < 0.78:
         lines[line] = lines[line].lstrip()
-    elif draw < 0.84:
+    elif sample < 0.84:
         return text[:position] + chance.choice((*map(str, _NUMBERS), *_UNITS, *_WORDS)) + text[position:]
-    elif draw < 0.88:
+    elif sample < 0.88:
         return chance.choice(_BOMBS) if chance.random() < 0.5 else text + chance.choice(_BOMBS)
-    elif draw < 0.92:
+    elif sample < 0.92:
         return "\ufeff" + text if chance.random() < 0.5 else text.replace("\n", "\r\n")
-    elif draw < 0.95:
+    elif sample < 0.95:
         return chance.choice(("", "\n", "~", "[]", "{}", "3", "a", "- a", "#", "---", "a: b: c", "null", "\0"))
     else:
         return text[:position] + "".join(chance.choice(_JUNK) for _ in range(chance.choice((3, 30)))) + text[position:]
@@ -227,21 +227,21 @@ def spoilt_bytes(data: bytes, chance: random.Random) -> bytes:
     if not data:
         return data
     spoilt = bytearray(data)
-    draw = chance.random()
+    sample = chance.random()
     position = chance.randrange(len(data))
-    if draw < 0.4:
+    if sample < 0.4:
         for _ in range(chance.choice((1, 1, 2, 8, 60))):
             spoilt[chance.randrange(len(spoilt))] ^= 1 << chance.randrange(8)
-    elif draw < 0.6:
+    elif sample < 0.6:
         del spoilt[position:]
-    elif draw < 0.7:
+    elif sample < 0.7:
         del spoilt[position : position + chance.choice((1, 4, 100, 4096))]
-    elif draw < 0.8:
+    elif sample < 0.8:
         spoilt[position:position] = chance.randbytes(chance.choice((1, 4, 100)))
-    elif draw < 0.9:
+    elif sample < 0.9:
         long = chance.choice((1, 4, 8, 512))
         spoilt[position : position + long] = chance.choice((bytes(long), b"\xff" * long, chance.randbytes(long)))
-    elif draw < 0.95:
+    elif sample < 0.95:
         spoilt[position:position] = spoilt[position : position + 512]
     else:
         return chance.choice(
@@ -255,15 +255,15 @@ def spoilt_words(words: list[str], chance: random.Random) -> list[str]:
     spoilt = list(words)
     for _ in range(chance.choice((1, 1, 2))):
         position = chance.randrange(len(spoilt) + 1)
-        draw = chance.random()
+        sample = chance.random()
         inside = min(position, len(spoilt) - 1)
-        if draw < 0.3 and spoilt:
+        if sample < 0.3 and spoilt:
             spoilt[inside] = _misspelt(spoilt[inside], chance)
-        elif draw < 0.45 and spoilt:
+        elif sample < 0.45 and spoilt:
             del spoilt[inside]
-        elif draw < 0.55 and spoilt:
+        elif sample < 0.55 and spoilt:
             spoilt.insert(position, spoilt[inside])
-        elif draw < 0.8 and spoilt:
+        elif sample < 0.8 and spoilt:
             spoilt[inside] = str(chance.choice((*_NUMBERS, *_UNITS, *_WORDS)))
         else:
             spoilt.insert(

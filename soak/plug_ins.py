@@ -111,14 +111,14 @@ def law(model, frequency=1.0):
 
 def plug_in(chance: random.Random) -> str:
     """A Python file that is wrong."""
-    draw = chance.random()
-    if draw < 0.2:
+    sample = chance.random()
+    if sample < 0.2:
         return spoilt_text(PLUG_IN, chance)
-    if draw < 0.4:
+    if sample < 0.4:
         return chance.choice((PLUG_IN + "\n" + chance.choice(_AT_IMPORT), chance.choice(_AT_IMPORT) + PLUG_IN))
-    if draw < 0.6:
+    if sample < 0.6:
         return PLUG_IN.replace("return pid(model, frequency=frequency)", chance.choice(_BODIES))
-    if draw < 0.65:
+    if sample < 0.65:
         return PLUG_IN.replace(
             "(model, frequency=1.0)", chance.choice(("()", "(x)", "(*a, **b)", "(model, /)", "(a, b)"))
         )

@@ -41,9 +41,9 @@ def audit(runs: Mapping[str, ScenarioResult], long: Mapping[str, BatchedRun]) ->
     rows = []
     for claim in CLAIMS:
         finding = claim.judge(runs, long)
-        judgement = {"verdict": finding.verdict, "evidence": finding.evidence, "simulated": finding.simulated}
+        verdict = {"verdict": finding.verdict, "evidence": finding.evidence, "simulated": finding.simulated}
         scenario_file = f"scenarios/{finding.shown_by}.yaml" if finding.shown_by else None
         about = {"id": claim.id, "claim": claim.text}
         numbers = dict(finding.numbers)
-        rows.append({**about, **judgement, "scenario": scenario_file, "numbers": numbers})
+        rows.append({**about, **verdict, "scenario": scenario_file, "numbers": numbers})
     return rows

@@ -89,8 +89,8 @@ def robustness(
         needed = temporal.needed_signals(requirements)
         signals = temporal.contiguous({name: series[name][row] for name in needed}, needed)
         ending = (int(status[row]), float(ended[row]), loop.duration)
-        for name, judgement in temporal.judged(requirements, signals, record_period(loop), {}, *ending).items():
-            by_name[name][row] = judgement.robustness
+        for name, verdict in temporal.judged(requirements, signals, record_period(loop), {}, *ending).items():
+            by_name[name][row] = verdict.robustness
     return by_name
 
 

@@ -92,6 +92,6 @@ class Evaluator:
             signals = contiguous({name: result.series[name][row] for name in self._names}, self._names)
             metrics = {name: float(values[row]) for name, values in result.metrics.items()}
             status, ended, duration = int(result.status[row]), float(result.ended[row]), built.scenario.loop.duration
-            judgements = judged(self.requirements, signals, self.period, metrics, status, ended, duration)
-            robustness[i] = [judgements[requirement.name].robustness for requirement in self.requirements]
+            verdicts = judged(self.requirements, signals, self.period, metrics, status, ended, duration)
+            robustness[i] = [verdicts[requirement.name].robustness for requirement in self.requirements]
         return robustness

@@ -145,7 +145,7 @@ def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) ->
     """Robustness of every requirement in one run of a scenario, by name."""
     loop = result.built.scenario.loop
     names = needed_signals(requirements)
-    judgements = judged(
+    verdicts = judged(
         requirements,
         contiguous(result.outcome.signals, names),
         record_period(loop),
@@ -154,7 +154,7 @@ def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) ->
         float(result.outcome.ended),
         loop.duration,
     )
-    return {name: judgement.robustness for name, judgement in judgements.items()}
+    return {name: verdict.robustness for name, verdict in verdicts.items()}
 
 
 def _kept(evaluator: Evaluator, path: Path, resume: bool, search_options: tuple[str, int]) -> Robustness:
