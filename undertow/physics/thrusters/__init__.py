@@ -1,4 +1,7 @@
-"""Thrusters: volts in, thrust out. One file per thruster; `motor_dynamics.py` and `motor_thruster.py` have the fidelity levels of a DC motor."""
+"""Thrusters: volts in, thrust out. One file per thruster.
+
+The fidelity levels of a DC motor are in `motor_thruster.py` (without dynamics) and `motor_dynamics.py`.
+"""
 
 from undertow.core.catalogue import publish
 from undertow.physics.thrusters.motor import DCMotor as DCMotor
