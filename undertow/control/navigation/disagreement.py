@@ -16,6 +16,7 @@ _DOUBLING = 0.2  # s of rejections in which the tolerated square doubles; a slow
 _VOTING = 3.0  # periods, at least as many s, after which the last reading of a sensor counts no more
 _FOREVER = 1e6  # s
 _FEWEST = 2  # aids that outvote the filter
+_LEAST_VARIANCE = 1e-30  # in the square of any of the units below
 _UNKNOWN = (
     (ATTITUDE, 1.0),
     (VELOCITY, 10.0),
@@ -53,7 +54,9 @@ class Disagreement(NamedTuple):
         lowered, raised = jnp.maximum(tolerance / step, 1.0), jnp.minimum(tolerance * step, _MOST_TOLERATED)
         adjusted = jnp.where(accepted, lowered, raised)
         new_tolerance = jnp.where(delivered, adjusted, tolerance)
-        new_excess = jnp.where(delivered, jnp.where(accepted, 0.0, jnp.minimum(square, _MOST_TOLERATED)), excess)
+        # A square that is no number any more counts as the largest.
+        limited = jnp.where(square < _MOST_TOLERATED, square, _MOST_TOLERATED)
+        new_excess = jnp.where(delivered, jnp.where(accepted, 0.0, limited), excess)
         return self._replace(
             tolerance=self.tolerance.at[sensor].set(new_tolerance),
             excess=self.excess.at[sensor].set(new_excess),
@@ -78,7 +81,8 @@ class Disagreement(NamedTuple):
         objections = jnp.where(against, 1.0, 0.0).sum()
         outvoted = (objections >= _FEWEST) & (2 * objections > jnp.where(voting, 1.0, 0.0).sum())
         growth = jnp.sqrt(jnp.maximum(jnp.where(against, self.excess, 0.0).max(), 1.0))
-        deviation = jnp.sqrt(jnp.diagonal(covariance))
+        # No variance is negative, but the rounding errors of enormous ones may be.
+        deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), _LEAST_VARIANCE))
         factor = jnp.ones(len(covariance))
         for part, largest_deviation in _UNKNOWN:
             factor = factor.at[part].set(jnp.clip(largest_deviation / deviation[part], 1.0, growth))

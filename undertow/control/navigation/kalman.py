@@ -56,6 +56,9 @@ from undertow.physics.sensors.sensor import AbstractSensor
 
 _USUAL_DELAY = 0.5  # s
 _LEAST_VARIANCE = 1e-12  # of a reading; one without noise would leave a covariance that is singular
+# In SI units; ten times the circumference of the earth in metres. A larger number is no reading: variances that grow
+# until it fits would drown the others in rounding errors.
+_LARGEST_READING = 4e8
 
 
 class Kalman(AbstractCovarianceFilter):
@@ -68,7 +71,7 @@ class Kalman(AbstractCovarianceFilter):
     is rejected; rejections in a row double the square that is tolerated, at most every 0.1 s and up to a thousand times
     the gate. A reading that is tolerated raises the variance of what it measures, so that the next one is taken. Where
     most sensors are rejected, it is the filter that errs: all its variances grow until they are taken. Gyroscopes and
-    accelerometers pass a gate of their own, `InertialGate`. Entries that are not finite are left out.
+    accelerometers pass a gate of their own, `InertialGate`. Entries that are not finite, or beyond any reading, are left out.
 
     Raises:
         BadInput: no IMU, or a deviation that is not positive.
@@ -291,7 +294,7 @@ class Kalman(AbstractCovarianceFilter):
         error = reading - expected
         for entry in sensor.angles:
             error = error.at[entry].add(-2 * jnp.pi * jnp.round(error[entry] / (2 * jnp.pi)))
-        readable = jnp.isfinite(reading)
+        readable = jnp.abs(reading) <= _LARGEST_READING  # nor is one that is no number
         error, posterior = jnp.where(readable, error, 0.0), covariance
         correction, square, normalised = jnp.zeros(len(covariance)), jnp.zeros(()), []
         diagonal = np.eye(len(covariance), dtype=bool)
@@ -299,7 +302,8 @@ class Kalman(AbstractCovarianceFilter):
         # them, without the inverse of a matrix. Each subtracts the square of a vector: the covariance stays symmetric.
         for k, variance in enumerate(self.variance(sensor, len(reading))):
             shared = product(posterior, slopes[k])
-            total = (slopes[k] * shared).sum() + variance
+            # No variance is negative, but the rounding errors of enormous ones may be.
+            total = jnp.maximum((slopes[k] * shared).sum(), 0.0) + variance
             residual = error[k] - (slopes[k] * correction).sum()
             gain, share = shared / jnp.sqrt(total), jnp.where(readable[k], 1.0, 0.0)
             square = square + share * residual**2 / total
