@@ -39,7 +39,7 @@ from undertow.scenario.consistency import check_fit, check_start, check_times, r
 from undertow.scenario.faulted import faulted
 from undertow.scenario.plausibility import angles_meant
 from undertow.scenario.reading import from_data, read
-from undertow.scenario.results.result_files import save
+from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.run_result import MetricsSettings, Origin, RunResult, make_result
 from undertow.scenario.results.run_scenario import run_loop, run_scenario
 from undertow.scenario.schema import ClosedLoopSettings, Fault, Initial, Window, complaint

@@ -5,8 +5,8 @@ from good_scenario import SMALL
 
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
+from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.repetition import compare
-from undertow.scenario.results.result_files import save
 from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full

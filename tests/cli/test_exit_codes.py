@@ -10,7 +10,7 @@ import pytest
 from good_scenario import SCENARIO, SMALL
 
 from undertow.cli import simulate
-from undertow.scenario.results import result_files
+from undertow.scenario.results import netcdf
 
 
 def write(tmp_path, text=SCENARIO):
@@ -89,7 +89,7 @@ def test_traceback_on_request(undertow, tmp_path, monkeypatch, way):
 
 @pytest.mark.full
 def test_full_disk_is_4(undertow, tmp_path, monkeypatch):
-    monkeypatch.setattr(result_files, "save", raising(OSError(28, "No space left on device", "run.nc")))
+    monkeypatch.setattr(netcdf, "save", raising(OSError(28, "No space left on device", "run.nc")))
     write(tmp_path, SMALL)
     said = undertow("simulate", "s.yaml", "--out", "out")
     line = "Error: files could not be read or written: No space left on device (run.nc)"

@@ -13,8 +13,8 @@ from undertow.scenario.build import build
 from undertow.scenario.foreign_code import changed
 from undertow.scenario.provenance import checksum
 from undertow.scenario.reading import parse, read
+from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.repetition import compare
-from undertow.scenario.results.result_files import save
 from undertow.scenario.results.run_scenario import run_scenario
 
 pytestmark = pytest.mark.full

@@ -76,7 +76,7 @@ IN_PLACE = {
     "undertow/cli/log_score.py": "a draft of the results folder",
     "undertow/cli/campaign.py": "a folder that takes another's place",
     "undertow/cli/compare.py": "a folder that takes another's place",
-    "undertow/scenario/results/result_files.py": "a draft of the results folder",
+    "undertow/scenario/results/netcdf.py": "a draft of the results folder",
     "undertow/logs/unpacking.py": "a temporary folder",
     "undertow/report/plotted.py": "a draft of the results folder",
     "undertow/report/prediction_page.py": "a draft of the results folder",

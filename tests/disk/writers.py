@@ -33,7 +33,7 @@ from undertow.logs.read import read_log
 from undertow.outside.export.c_program import Exported
 from undertow.outside.rerun_file import write_rerun
 from undertow.outside.ros2.write_bag import write_rosbag2
-from undertow.scenario.results.result_files import save
+from undertow.scenario.results.netcdf import save
 from undertow.simulation.checkpoint import Checkpoint
 
 _RESCUED = "out/out-rescued-1/"

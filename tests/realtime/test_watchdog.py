@@ -11,7 +11,7 @@ import pytest
 
 CONTROLLER = """
 import socket, sys, time
-from undertow.outside.realtime.controller_watchdog import Watchdog
+from undertow.outside.realtime.process_watchdog import Watchdog
 
 own = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 watchdog = Watchdog(own, 0.2)

@@ -25,7 +25,7 @@ from undertow.report.replay.replay_data import ReplayData, hull_size
 from undertow.report.run_page import RunPageContents, shown, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
-from undertow.scenario.results.result_files import write_metrics
+from undertow.scenario.results.netcdf import write_metrics
 from undertow.scenario.results.run_result import ScenarioResult
 from undertow.studies.prediction.foregone import reason_without_prediction
 from undertow.studies.prediction.operating_point import operating_point, predicted

@@ -23,8 +23,8 @@ from undertow.scenario.build import build, own_parts
 from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.checks.vehicle_lint import vehicle_advice
 from undertow.scenario.reading import read
+from undertow.scenario.results.netcdf import write
 from undertow.scenario.results.repetition import Repetition, compare
-from undertow.scenario.results.result_files import write
 from undertow.scenario.results.run_result import ScenarioResult, lost_thrusters
 from undertow.scenario.results.run_scenario import run_scenario
 

@@ -17,8 +17,8 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import prepare
 from undertow.scenario.reading import dump
+from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.repetition import shortened
-from undertow.scenario.results.result_files import save
 from undertow.scenario.results.run_result import ScenarioResult
 from undertow.scenario.results.run_scenario import finished, gathered_of, run_scenario
 from undertow.simulation.loop import continuous

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from undertow.report import figures
 from undertow.report.plotted import Plotted
-from undertow.scenario.results.result_files import read_record
+from undertow.scenario.results.netcdf import read_record
 
 
 class PlottingProcess:

@@ -71,7 +71,8 @@ class Kalman(AbstractCovarianceFilter):
     is rejected; rejections in a row double the square that is tolerated, at most every 0.1 s and up to a thousand times
     the gate. A reading that is tolerated raises the variance of what it measures, so that the next one is taken. Where
     most sensors are rejected, it is the filter that errs: all its variances grow until they are taken. Gyroscopes and
-    accelerometers pass a gate of their own, `InertialGate`. Entries that are not finite, or beyond any reading, are left out.
+    accelerometers pass a gate of their own, `InertialGate`. Entries that are not finite, or beyond any reading, are
+    left out.
 
     Raises:
         BadInput: no IMU, or a deviation that is not positive.

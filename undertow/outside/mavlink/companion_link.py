@@ -9,9 +9,9 @@ from undertow.outside.mavlink.companion import Companion
 from undertow.outside.mavlink.link import UdpLink
 from undertow.outside.mavlink.odometry import ODOMETRIES
 from undertow.outside.mavlink.permission import HEARTBEAT_TIMEOUT
-from undertow.outside.realtime.controller_watchdog import Watchdog
 from undertow.outside.realtime.link import AbstractPacingLink, LinkMeasurement
 from undertow.outside.realtime.loop_clock import AbstractLoopClock, MonotonicClock
+from undertow.outside.realtime.process_watchdog import Watchdog
 
 _LAST = 3  # times that neutral commands are sent at the end: any of them may be lost
 _HELD = 0.5  # s between two times that the watchdog gets what to send

@@ -10,9 +10,9 @@ import numpy as np
 
 from undertow.core.errors import BadInput, within
 from undertow.outside.autopilot.measured_motion import Format
-from undertow.outside.realtime.controller_watchdog import Watchdog
 from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, MOTION, DatagramFilter, Sender, address_of
 from undertow.outside.realtime.link import AbstractLink, LinkMeasurement
+from undertow.outside.realtime.process_watchdog import Watchdog
 from undertow.outside.realtime.vehicle_link import VehicleLink
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
