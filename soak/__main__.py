@@ -1,30 +1,21 @@
 """`python -m soak`, from the folder of the repository."""
 
-import os
-import sys
-import warnings
-
-from undertow.core.process_setup import prepare
-
-prepare()
+from collections.abc import Sequence
 
 import typer
 
-from soak.command import SoakCommand
+from soak.options import SoakCommand
 from undertow.cli.exit_codes import run_guarded
-from undertow.cli.interruptible import remember_interrupts
+from undertow.cli.main import main
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-app.command("soak")(SoakCommand.callback())
+app.command(SoakCommand.word())(SoakCommand.callback())
 
 
-def run(arguments: list[str]) -> int:
+def run(arguments: Sequence[str]) -> int:
     """Attack undertow with these arguments and return the exit code."""
-    return run_guarded(typer.main.get_command(app), arguments)
+    return run_guarded(typer.main.get_command(app), arguments, "python -m soak")
 
 
 if __name__ == "__main__":
-    if not os.environ.get("UNDERTOW_TRACEBACK"):
-        warnings.simplefilter("ignore")
-    remember_interrupts()
-    sys.exit(run(sys.argv[1:]))
+    main(run)

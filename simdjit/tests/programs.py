@@ -13,7 +13,7 @@ FLOATS, WHOLES = ("float64", "float32"), ("int32", "int64", "uint32")
 SIZE = 3  # entries of every value
 
 
-class Step(NamedTuple):
+class Operation(NamedTuple):
     """What a step does to values of SIZE entries.
 
     Attributes:
@@ -69,84 +69,87 @@ _NUMPY = {
 _ONE = "negative abs sign floor ceil trunc rint square isnan isfinite signbit reciprocal nan_to_num".split()
 _TWO = "add subtract multiply divide maximum minimum less less_equal greater equal not_equal copysign fmax fmin".split()
 
-STEPS: dict[str, Step] = {
-    **{name: Step(getattr(jnp, name), "f", getattr(np, name), units) for name, units in _NUMPY.items()},
-    **{name: Step(getattr(jnp, name), "f") for name in _ONE},
-    **{name: Step(getattr(jnp, name), "ff") for name in _TWO},
-    "power": Step(jnp.power, "ff", np.power, 2),
-    "power_of_whole": Step(lax.pow, "fi", np.power, 2),
-    "arctan2": Step(jnp.arctan2, "ff", np.arctan2, 3),
-    "erf_inv": Step(jax.scipy.special.erfinv, "f", lambda x: scipy.special.erfinv(x.astype(float)), 14),
-    "sigmoid": Step(jax.nn.sigmoid, "f", lambda x: scipy.special.expit(x.astype(float)), 6),
-    "rsqrt": Step(lax.rsqrt, "f", units=2),
-    "round_away": Step(lax.round, "f"),
-    "fmod": Step(jnp.fmod, "ff"),
-    "remainder": Step(jnp.remainder, "ff"),
-    "hypot": Step(jnp.hypot, "ff", units=6),
-    "clip": Step(lambda x, a, b: lax.clamp(a, x, b), "fff"),
-    "where": Step(jnp.where, "bff"),
-    "where_whole": Step(jnp.where, "bii"),
-    **{f"cube_{n}": Step(lambda x, n=n: x**n, "f", units=4) for n in (0, 3, -1, -3)},
-    **{f"to_{name}": Step(lambda x, name=name: x.astype(name), "f") for name in (*FLOATS, *WHOLES, "bool")},
-    **{f"whole_to_{name}": Step(lambda x, name=name: x.astype(name), "i") for name in (*FLOATS, *WHOLES, "bool")},
-    **{f"truth_to_{name}": Step(lambda x, name=name: x.astype(name), "b") for name in ("float32", "int64")},
+STEPS: dict[str, Operation] = {
+    **{name: Operation(getattr(jnp, name), "f", getattr(np, name), units) for name, units in _NUMPY.items()},
+    **{name: Operation(getattr(jnp, name), "f") for name in _ONE},
+    **{name: Operation(getattr(jnp, name), "ff") for name in _TWO},
+    "power": Operation(jnp.power, "ff", np.power, 2),
+    "power_of_whole": Operation(lax.pow, "fi", np.power, 2),
+    "arctan2": Operation(jnp.arctan2, "ff", np.arctan2, 3),
+    "erf_inv": Operation(jax.scipy.special.erfinv, "f", lambda x: scipy.special.erfinv(x.astype(float)), 14),
+    "sigmoid": Operation(jax.nn.sigmoid, "f", lambda x: scipy.special.expit(x.astype(float)), 6),
+    "rsqrt": Operation(lax.rsqrt, "f", units=2),
+    "round_away": Operation(lax.round, "f"),
+    "fmod": Operation(jnp.fmod, "ff"),
+    "remainder": Operation(jnp.remainder, "ff"),
+    "hypot": Operation(jnp.hypot, "ff", units=6),
+    "clip": Operation(lambda x, a, b: lax.clamp(a, x, b), "fff"),
+    "where": Operation(jnp.where, "bff"),
+    "where_whole": Operation(jnp.where, "bii"),
+    **{f"cube_{n}": Operation(lambda x, n=n: x**n, "f", units=4) for n in (0, 3, -1, -3)},
+    **{f"to_{name}": Operation(lambda x, name=name: x.astype(name), "f") for name in (*FLOATS, *WHOLES, "bool")},
+    **{f"whole_to_{name}": Operation(lambda x, name=name: x.astype(name), "i") for name in (*FLOATS, *WHOLES, "bool")},
+    **{f"truth_to_{name}": Operation(lambda x, name=name: x.astype(name), "b") for name in ("float32", "int64")},
     **{
-        f"whole_{name}": Step(getattr(jnp, name), "ii") for name in "add subtract multiply maximum minimum less".split()
+        f"whole_{name}": Operation(getattr(jnp, name), "ii")
+        for name in "add subtract multiply maximum minimum less".split()
     },
-    **{f"bits_{name}": Step(getattr(jnp, f"bitwise_{name}"), "ii") for name in ("and", "or", "xor")},
-    **{f"truth_{name}": Step(getattr(jnp, f"logical_{name}"), "bb") for name in ("and", "or", "xor")},
-    "not": Step(jnp.logical_not, "b"),
-    "bits_not": Step(jnp.bitwise_not, "i"),
-    "whole_negative": Step(jnp.negative, "i"),
-    "whole_abs": Step(jnp.abs, "i"),
-    "whole_sign": Step(jnp.sign, "i"),
-    "quotient": Step(lax.div, "ii"),
-    "rest": Step(lax.rem, "ii"),
-    "floor_quotient": Step(jnp.floor_divide, "ii"),
-    "floor_rest": Step(jnp.remainder, "ii"),
-    "guarded": Step(lambda a, b: jnp.where(b == 0, 0, a // b), "ii"),
-    "gcd": Step(lambda a, b: jnp.gcd(a % 97, b % 12), "ii"),  # of the least number JAX does not end
-    "whole_power": Step(lambda x: x**3, "i"),
-    "left": Step(lax.shift_left, "ii"),
-    "right": Step(lax.shift_right_logical, "ii"),
-    "right_signed": Step(lax.shift_right_arithmetic, "ii"),
-    "sum": Step(lambda x: jnp.full(SIZE, x.sum()), "f", units=4, scale=_total),
-    "running": Step(jnp.cumsum, "f", units=4, scale=_total),
-    "product": Step(lambda x: jnp.full(SIZE, jnp.prod(jnp.clip(x, -1e3, 1e3))), "f", units=4),
-    "extremes": Step(lambda x: jnp.stack([x.max(), x.min(), lax.cummax(x)[1]]), "f", _extremes),
-    "where_extreme": Step(lambda x: jnp.stack([jnp.argmax(x), jnp.argmin(x), jnp.argmax(x[1:])]), "f"),
-    "whole_sum": Step(lambda x: jnp.full(SIZE, x.sum()), "i"),
-    "any": Step(lambda x: jnp.stack([x.any(), x.all(), x[0]]), "b"),
-    "dot": Step(lambda x, y: jnp.full(SIZE, x @ y), "ff", units=4, scale=lambda x, y: _total(x * y)),
-    "sort": Step(jnp.sort, "f"),
-    "whole_sort": Step(jnp.sort, "i"),
-    "argsort": Step(jnp.argsort, "f"),
-    "sorted_by": Step(lambda k, x: lax.sort_key_val(k, x)[1], "if"),
-    "median": Step(lambda x: jnp.full(SIZE, jnp.median(x)), "f", units=1),
-    "take": Step(lambda x, k: x[_places(k)], "fi"),
-    "take_beyond": Step(lambda x, k: x.at[k].get(mode="fill", fill_value=7.0), "fi"),
-    "take_of_many": Step(lambda x, k: jnp.concatenate([x] * 20)[_places(k) * 19], "fi"),
-    "put": Step(lambda x, k: x.at[_places(k)[0]].set(x[1] * 2), "fi"),
-    "add_at": Step(lambda x, k: x.at[_places(k)].add(x), "fi", units=2, scale=_total),
-    "multiply_at": Step(lambda x, k: x.at[_places(k)[:2]].multiply(x[1:]), "fi", units=4),
-    "largest_at": Step(lambda x, k: x.at[_places(k)].max(x[::-1]).at[_places(k)].min(x), "fi"),
-    "window": Step(lambda x, k: lax.dynamic_slice(jnp.concatenate([x, x]), (_places(k)[0],), (SIZE,)), "fi"),
-    "pad": Step(lambda x: lax.pad(x, x[0], [(-1, 2, 1)])[:SIZE], "f"),
-    "sought": Step(lambda x, y: jnp.searchsorted(jnp.sort(x), y), "ff"),
-    "interpolated": Step(
+    **{f"bits_{name}": Operation(getattr(jnp, f"bitwise_{name}"), "ii") for name in ("and", "or", "xor")},
+    **{f"truth_{name}": Operation(getattr(jnp, f"logical_{name}"), "bb") for name in ("and", "or", "xor")},
+    "not": Operation(jnp.logical_not, "b"),
+    "bits_not": Operation(jnp.bitwise_not, "i"),
+    "whole_negative": Operation(jnp.negative, "i"),
+    "whole_abs": Operation(jnp.abs, "i"),
+    "whole_sign": Operation(jnp.sign, "i"),
+    "quotient": Operation(lax.div, "ii"),
+    "rest": Operation(lax.rem, "ii"),
+    "floor_quotient": Operation(jnp.floor_divide, "ii"),
+    "floor_rest": Operation(jnp.remainder, "ii"),
+    "guarded": Operation(lambda a, b: jnp.where(b == 0, 0, a // b), "ii"),
+    "gcd": Operation(lambda a, b: jnp.gcd(a % 97, b % 12), "ii"),  # of the least number JAX does not end
+    "whole_power": Operation(lambda x: x**3, "i"),
+    "left": Operation(lax.shift_left, "ii"),
+    "right": Operation(lax.shift_right_logical, "ii"),
+    "right_signed": Operation(lax.shift_right_arithmetic, "ii"),
+    "sum": Operation(lambda x: jnp.full(SIZE, x.sum()), "f", units=4, scale=_total),
+    "running": Operation(jnp.cumsum, "f", units=4, scale=_total),
+    "product": Operation(lambda x: jnp.full(SIZE, jnp.prod(jnp.clip(x, -1e3, 1e3))), "f", units=4),
+    "extremes": Operation(lambda x: jnp.stack([x.max(), x.min(), lax.cummax(x)[1]]), "f", _extremes),
+    "where_extreme": Operation(lambda x: jnp.stack([jnp.argmax(x), jnp.argmin(x), jnp.argmax(x[1:])]), "f"),
+    "whole_sum": Operation(lambda x: jnp.full(SIZE, x.sum()), "i"),
+    "any": Operation(lambda x: jnp.stack([x.any(), x.all(), x[0]]), "b"),
+    "dot": Operation(lambda x, y: jnp.full(SIZE, x @ y), "ff", units=4, scale=lambda x, y: _total(x * y)),
+    "sort": Operation(jnp.sort, "f"),
+    "whole_sort": Operation(jnp.sort, "i"),
+    "argsort": Operation(jnp.argsort, "f"),
+    "sorted_by": Operation(lambda k, x: lax.sort_key_val(k, x)[1], "if"),
+    "median": Operation(lambda x: jnp.full(SIZE, jnp.median(x)), "f", units=1),
+    "take": Operation(lambda x, k: x[_places(k)], "fi"),
+    "take_beyond": Operation(lambda x, k: x.at[k].get(mode="fill", fill_value=7.0), "fi"),
+    "take_of_many": Operation(lambda x, k: jnp.concatenate([x] * 20)[_places(k) * 19], "fi"),
+    "put": Operation(lambda x, k: x.at[_places(k)[0]].set(x[1] * 2), "fi"),
+    "add_at": Operation(lambda x, k: x.at[_places(k)].add(x), "fi", units=2, scale=_total),
+    "multiply_at": Operation(lambda x, k: x.at[_places(k)[:2]].multiply(x[1:]), "fi", units=4),
+    "largest_at": Operation(lambda x, k: x.at[_places(k)].max(x[::-1]).at[_places(k)].min(x), "fi"),
+    "window": Operation(lambda x, k: lax.dynamic_slice(jnp.concatenate([x, x]), (_places(k)[0],), (SIZE,)), "fi"),
+    "pad": Operation(lambda x: lax.pad(x, x[0], [(-1, 2, 1)])[:SIZE], "f"),
+    "sought": Operation(lambda x, y: jnp.searchsorted(jnp.sort(x), y), "ff"),
+    "interpolated": Operation(
         lambda x: jnp.interp(x, jnp.linspace(-2, 2, 50, dtype=x.dtype), jnp.linspace(0, 9, 50, dtype=x.dtype) ** 2),
         "f",
         units=200,
         scale=lambda x: 81.0,
     ),
-    "branch": Step(lambda b, x: lax.cond(b[0], lambda: x[::-1], lambda: jnp.sin(x) * 0.5), "bf", units=4),
-    "switch": Step(lambda k, x: lax.switch(_places(k)[0], [lambda: x, lambda: -x, lambda: x[::-1]]), "if"),
-    "scan": Step(lambda x: lax.scan(lambda c, e: (jnp.maximum(c, e), c - e), x[0], x)[1], "f"),
-    "loop": Step(_turned, "fi"),
-    "solve": Step(lambda x, y: jnp.linalg.solve(_matrix(x), jnp.tanh(y)), "ff", units=200, scale=lambda x, y: 1.0),
-    "inverse": Step(lambda x: jnp.linalg.inv(_matrix(x))[0], "f", units=200, scale=lambda x: 1.0),
-    "determinant": Step(lambda x: jnp.full(SIZE, jnp.linalg.det(_matrix(x))), "f", units=200, scale=lambda x: 30.0),
-    "cholesky": Step(lambda x: jnp.linalg.cholesky(_positive(x))[2], "f", units=200, scale=lambda x: 1.0),
+    "branch": Operation(lambda b, x: lax.cond(b[0], lambda: x[::-1], lambda: jnp.sin(x) * 0.5), "bf", units=4),
+    "switch": Operation(lambda k, x: lax.switch(_places(k)[0], [lambda: x, lambda: -x, lambda: x[::-1]]), "if"),
+    "scan": Operation(lambda x: lax.scan(lambda c, e: (jnp.maximum(c, e), c - e), x[0], x)[1], "f"),
+    "loop": Operation(_turned, "fi"),
+    "solve": Operation(lambda x, y: jnp.linalg.solve(_matrix(x), jnp.tanh(y)), "ff", units=200, scale=lambda x, y: 1.0),
+    "inverse": Operation(lambda x: jnp.linalg.inv(_matrix(x))[0], "f", units=200, scale=lambda x: 1.0),
+    "determinant": Operation(
+        lambda x: jnp.full(SIZE, jnp.linalg.det(_matrix(x))), "f", units=200, scale=lambda x: 30.0
+    ),
+    "cholesky": Operation(lambda x: jnp.linalg.cholesky(_positive(x))[2], "f", units=200, scale=lambda x: 1.0),
 }
 
 # What overflows in one order of additions and not in another is not compared.
@@ -170,7 +173,7 @@ def number(rng: np.random.Generator, dtype: str, size: tuple[int, ...]) -> np.nd
         return np.where(special, rng.choice(_WHOLE, size), ordinary).astype(np.int64).astype(dtype)
 
 
-class Program(NamedTuple):
+class RandomProgram(NamedTuple):
     """Steps one after another.
 
     Attributes:
@@ -191,7 +194,7 @@ class Program(NamedTuple):
         return values[len(arguments) + len(self.constants) :]
 
 
-def program(rng: np.random.Generator, length: int) -> Program:
+def program(rng: np.random.Generator, length: int) -> RandomProgram:
     """A random one."""
     inputs = [str(dtype) for dtype in rng.choice([*FLOATS, "float64", *WHOLES, "bool"], 5)] + [
         "float64",
@@ -214,4 +217,4 @@ def program(rng: np.random.Generator, length: int) -> Program:
         shapes = [jax.ShapeDtypeStruct((SIZE,), types[place]) for place in places]
         types.append(str(jax.eval_shape(STEPS[name].function, *shapes).dtype))
         steps.append((name, places))
-    return Program(inputs, constants, steps)
+    return RandomProgram(inputs, constants, steps)

@@ -42,10 +42,10 @@ MEANINGS = {
 }
 
 
-def run_guarded(command: Any, arguments: Sequence[str]) -> int:
-    """Run a command and return its exit code; any exception becomes one line on stderr."""
+def run_guarded(command: Any, arguments: Sequence[str], program: str = "undertow") -> int:
+    """Run a command of a program and return its exit code; any exception becomes one line on stderr."""
     try:
-        code = command.main(args=list(arguments), prog_name="undertow", standalone_mode=False) or DONE
+        code = command.main(args=list(arguments), prog_name=program, standalone_mode=False) or DONE
         raise_if_interrupted()
         return BY_SIGNAL + interrupted_by() if code == INTERRUPTED else code  # as typer makes of KeyboardInterrupt
     except KeyboardInterrupt:

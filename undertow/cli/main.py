@@ -6,7 +6,7 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
@@ -64,8 +64,8 @@ def run(arguments: Sequence[str]) -> int:
     return run_guarded(typer.main.get_command(app), arguments)
 
 
-def main() -> None:
-    """Entry point of the `undertow` command."""
+def main(run: Callable[[Sequence[str]], int] = run) -> None:
+    """Entry point of the `undertow` command, or of another program that runs as it does."""
     if not os.environ.get("UNDERTOW_TRACEBACK"):
         warnings.simplefilter("ignore")
     remember_interrupts()

@@ -12,7 +12,7 @@ from undertow.logs.mcap_writer import write_mcap
 _WRITERS = {".mcap": write_mcap, ".csv": write_csv}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Log(LogSignals):
     """Signals of a run or of a vehicle, as readers give them."""
 
@@ -30,5 +30,3 @@ class Log(LogSignals):
             raise BadInput("path", f"be a file whose name ends in {' or '.join(_WRITERS)}", str(path))
         with replacing(path) as file:
             _WRITERS[path.suffix](self, file)
-
-    __repr__ = LogSignals.__repr__  # not that of a dataclass

@@ -54,7 +54,7 @@ class _Writer:
 
     def end_chunk(self) -> None:
         """Write the messages of the chunk that is not full, which `mcap` does at the end only."""
-        self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
+        self._writer._Writer__finalize_chunk()  # type: ignore[attr-defined] - `mcap` has no public name for it
         self._stream.flush()
 
     def note(self, text: str) -> None:

@@ -14,13 +14,18 @@ from undertow.simulation.prepared_run import PreparedRun
 _STARTS = ("position", "velocity")
 
 
+def steady_accumulators(built: Built) -> tuple[AbstractAccumulator, ...]:
+    """What gathers the steady metrics of a scenario along a run."""
+    return metric_accumulators(built.closed_loop.plant, built.metrics, *built.window())
+
+
 @in_its_precision
 def loop_run(built: Built, accumulators: tuple[AbstractAccumulator, ...] | None = None) -> LoopRun:
     """Loop, accumulators, start and key of a scenario; its metrics are accumulated unless others are given."""
     scenario, loop = built.scenario, built.closed_loop
     start = loop.outputs_at_start(*(getattr(scenario.initial, name) for name in _STARTS))
     if accumulators is None:
-        accumulators = metric_accumulators(loop.plant, built.metrics, *built.window())
+        accumulators = steady_accumulators(built)
     return LoopRun(loop, accumulators, start, key_of_seed(scenario.seed))
 
 

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, PyTree
 from undertow.core.contracts import AbstractController, Load, Measurement, Pose, Target
 from undertow.core.errors import BadInput
 from undertow.core.numerics.number import Number
+from undertow.core.option_groups import set_signature
 from undertow.core.returned import difference, form, not_two
 from undertow.core.user_code import place_of
 
@@ -139,8 +140,8 @@ def signal_mode(
 
 def _without_options(function: Callable[..., Any], make: Callable[[], Any]) -> Callable[[], Any]:
     """`make` with name and description of the function that the part computes, and without options."""
-    part: Any = functools.wraps(function)(make)
-    part.__signature__ = inspect.Signature()  # without this, the arguments of `function` would be taken for options
+    part = functools.wraps(function)(make)
+    set_signature(part, inspect.Signature())  # without this, the arguments of `function` would be taken for options
     return part
 
 

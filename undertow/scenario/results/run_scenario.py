@@ -6,11 +6,12 @@ from typing import Any
 import jax
 import numpy as np
 
-from undertow.analysis.metrics import Gathered, accumulators
+from undertow.analysis.metrics import Gathered
 from undertow.core import runtime
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.consistency import record_period
+from undertow.scenario.prepare import steady_accumulators
 from undertow.scenario.reading import Text
 from undertow.scenario.results.run_result import MetricsSettings, Origin, ScenarioResult, make_result
 from undertow.scenario.schema import ClosedLoopSettings, Initial
@@ -44,7 +45,7 @@ def gathered_of(built: Built) -> Gathered:
     """What gathers the steady metrics along a run; () where the record is what counts."""
     if not built.scenario.steady.every_step:
         return ()
-    return accumulators(built.closed_loop.plant, built.metrics, *built.window())
+    return steady_accumulators(built)
 
 
 @in_its_precision
