@@ -437,6 +437,10 @@ class AbstractFaults(eqx.Module):
     def jumps(self, duration: float) -> tuple[float, ...]:
         """Times in (0, duration), s, at which faults begin and end."""
 
+    def sampled(self, realization: PyTree) -> dict[int, dict[str, Array]]:
+        """What may be random in a run, by place of the fault in the scenario and name; {} unless a part says so."""
+        return {}
+
 
 class AbstractReference(eqx.Module):
     """Desired motion as a function of time."""

@@ -102,8 +102,8 @@ class Faults(AbstractFaults):
         first, second = len(self.of_measurement), len(self.of_measurement) + len(self.of_input)
         return tuple(found[:first]), tuple(found[first:second]), tuple(found[second:])
 
-    def sampled(self, realization) -> dict[int, dict[str, Array]]:
-        """What may be random in a run, by the place of the fault in the scenario: onset, severity, which thrusters."""
+    def sampled(self, realization):
+        """Onset, severity and affected thrusters."""
         realized = [fault for group in realization for fault in group]
         return {
             entry: {"onset": fault.timing.onset, "severity": fault.timing.severity, "affected": fault.chosen}

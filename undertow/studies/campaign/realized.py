@@ -15,7 +15,6 @@ from jaxtyping import PRNGKeyArray, PyTree
 
 from undertow.core import runtime
 from undertow.core.errors import BadInput
-from undertow.physics.faults.injected import Faults
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import loop_run
@@ -103,7 +102,7 @@ def _start(loop: ClosedLoop, start: tuple[Any, Any], key: PRNGKeyArray) -> dict[
     realization = loop.realize(key)
     truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state(*start))
     navigation = loop.navigation.init(realization.navigation_realization, truth)
-    faults = loop.faults.sampled(realization.faults_realization) if isinstance(loop.faults, Faults) else {}
+    faults = {} if loop.faults is None else loop.faults.sampled(realization.faults_realization)
     return {"disturbance": realization.disturbance_realization, "navigation": navigation, "faults": faults}
 
 
