@@ -92,7 +92,7 @@ def pieces(trials: int) -> dict:
     with tempfile.TemporaryDirectory() as name:
         for what, vary in (("build_start_and_gain_ms", VARY), ("build_mass_ms", HEAVIER)):
             campaign = prepared(Path(name), _LARGE, 1.0, 256, vary)
-            here = task.site(campaign.text, str(campaign.folder))
+            here = task.task_context(campaign.text, str(campaign.folder))
 
             def build(i, here=here):
                 rows = np.arange(i * trials, (i + 1) * trials)

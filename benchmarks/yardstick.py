@@ -196,7 +196,7 @@ def trajectory_difference(program: Path) -> float:
 
 def metrics_of_undertow(one: workload.Workload) -> dict[str, float]:
     """Metrics of one run of W1, and `tracking_rms`, as `undertow bench` prints it."""
-    accumulated = workload.batch(one, width=1).run(workload.alone(one.run)).accumulated
+    accumulated = workload.batch(one, width=1).run(workload.batch_of_one(one.run)).accumulated
     found = {name: float(value[0]) for name, value in results_of_batch(one.run.accumulators, accumulated).items()}
     return found | {"tracking_rms": float(workload.tracking(accumulated)[0])}
 
@@ -241,7 +241,7 @@ def times(program: Path, one: workload.Workload, rounds: int) -> dict[str, float
     """Nanoseconds per step and run, the shortest of all rounds; each round measures everything."""
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     single, batch = workload.batch(one, width=1), workload.batch(one)
-    alone, several = workload.alone(one.run), workload.several(one.run, TOGETHER)
+    alone, several = workload.batch_of_one(one.run), workload.several(one.run, TOGETHER)
     found: dict[str, float] = {}
 
     def keep(name: str, value: float) -> None:

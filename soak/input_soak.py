@@ -9,9 +9,9 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from soak.input_runner import Run, work
 from soak.inputs import Attack, attack, planned
-from soak.trying import Run, work
-from soak.verdict import REFUSED, Done, Failure, judged
+from soak.verdict import REFUSED, Done, Failure, failure_of
 
 _LATEST = 300.0  # s without an answer, after which a process is ended
 _FRESH = 1500  # inputs after which a process is replaced: compiled code of every shape stays in memory
@@ -116,7 +116,7 @@ def try_inputs(
     processes = [_Worker(run, seed, material, folder / f"w{i}") for i in range(workers)]
     try:
         for hostile_input, outcome in _answers(processes, tasks, seed, material, until):
-            failure = judged(hostile_input.identity, hostile_input.arguments, hostile_input.files, outcome)
+            failure = failure_of(hostile_input.identity, hostile_input.arguments, hostile_input.files, outcome)
             ending = "failed" if failure else "refused" if outcome.code in REFUSED else "accepted"
             counts.setdefault(hostile_input.identity.split("/")[1], Counter())[ending] += 1
             total += 1

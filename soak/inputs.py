@@ -32,7 +32,7 @@ Make = Callable[[random.Random, Mapping[str, bytes]], tuple[dict[str, bytes | No
 
 
 class InputKind(NamedTuple):
-    """A kind of hostile input: its share, and what makes one from chance and the valid files of `material.py`."""
+    """A kind of hostile input: its share, and what makes one from chance and the valid files of `sample_files.py`."""
 
     share: float
     make: Make

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from soak.watching import Counts, Watch
+from soak.counters import Counts, Watch
 from undertow.control.supervision.conditions import state_of
 from undertow.control.supervision.supervised_controller import state_in
 from undertow.control.supervision.transition_log import SupervisorTransition, transitions

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from soak.input_runner import Run
 from soak.links.ardupilot_run import ArdupilotRunner
 from soak.links.command_process import CommandProcess, end_with_parent
 from soak.links.driven_vehicle import DrivenVehicle
@@ -22,7 +23,6 @@ from soak.links.plan import LINKS, Plan, plan
 from soak.links.ros2_peer import Ros2Peer
 from soak.links.scenario import SCENARIO
 from soak.links.udp_peer import UdpPeer
-from soak.trying import Run
 from soak.verdict import Failure
 from undertow.core.errors import BadInput
 

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from soak import controls, faults_soak, hours_soak, kills, links_soak
+from soak.input_runner import Run, try_in_process
 from soak.input_soak import try_inputs
 from soak.inputs import KINDS, Attack, attack
-from soak.material import material
-from soak.trying import Run, try_in_process
-from soak.verdict import EVENTS, Failure, judged
+from soak.sample_files import material
+from soak.verdict import EVENTS, Failure, failure_of
 from undertow.core.errors import BadInput, did_you_mean
 
 PARTS = ("inputs", "kills", "hours", "faults", "controls", "links")
@@ -148,7 +148,7 @@ def _replayed_input(run: Run, kind: str, seed: str, number: str) -> tuple[Failur
     hostile_input = attack(kind, int(seed), int(number), valid_files(run))
     with tempfile.TemporaryDirectory(prefix="undertow-soak-") as name:
         result = try_in_process(run, hostile_input, Path(name))
-    failure = judged(hostile_input.identity, hostile_input.arguments, hostile_input.files, result)
+    failure = failure_of(hostile_input.identity, hostile_input.arguments, hostile_input.files, result)
     return failure, f"undertow {' '.join(hostile_input.arguments)}: exit code {result.code}. {result.err.strip()}"
 
 

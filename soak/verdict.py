@@ -65,7 +65,9 @@ class Failure(NamedTuple):
     files: Sequence[str] = ()
 
 
-def judged(identity: str, arguments: Sequence[str], files: Mapping[str, bytes | None], done: Done) -> Failure | None:
+def failure_of(
+    identity: str, arguments: Sequence[str], files: Mapping[str, bytes | None], done: Done
+) -> Failure | None:
     """The never-event of a hostile input; None where it was accepted or refused as it must be.
 
     Args:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.metrics import for_people, infinite, meanings
+from undertow.analysis.metrics import display_units, infinite, meanings
 from undertow.analysis.success import Success, criterion_of
 from undertow.control.navigation.perfect import perfect
 from undertow.core import checks, runtime
@@ -24,19 +24,19 @@ from undertow.core.contracts import (
     AbstractPlant,
     AbstractReference,
 )
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.core.status import Status
 from undertow.logs.log import Log
 from undertow.logs.run_log import log_of_run
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
-from undertow.report.run_page import shown, write_run_page
+from undertow.report.run_page import page_contents, write_run_page
 from undertow.scenario import factory
 from undertow.scenario.build import velocity_noise_of
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
-from undertow.scenario.faulted import faulted
+from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.plausibility import angles_meant
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.results.netcdf import save
@@ -110,7 +110,7 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        parts = shown(self.result, lambda: figures.plot_run(self.result))
+        parts = page_contents(self.result, lambda: figures.plot_run(self.result))
         write_run_page(Path(path), self.result, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)
@@ -137,7 +137,9 @@ class Run:
             steady_value, whole_value = (
                 _shown(metrics.get(name), metric.unit) for metrics in (facts.steady or {}, facts.whole)
             )
-            lines.append(f"  {name:<20}{steady_value:>12}{whole_value:>12}  {for_people(0.0, metric.unit)[1]}".rstrip())
+            lines.append(
+                f"  {name:<20}{steady_value:>12}{whole_value:>12}  {display_units(0.0, metric.unit)[1]}".rstrip()
+            )
         if facts.success is not None:
             lines.append(f"  {facts.success.sentence(facts.meanings)}")
         return "\n".join(lines)
@@ -147,7 +149,7 @@ def _shown(value: float | None, unit: str) -> str:
     """A metric in four digits as people read it; a dash for one that is not defined."""
     if value is None:
         return "-"
-    return infinite(unit) if math.isinf(value) else f"{for_people(value, unit)[0]:.4g}"
+    return infinite(unit) if math.isinf(value) else f"{display_units(value, unit)[0]:.4g}"
 
 
 def simulate(
@@ -216,7 +218,7 @@ def _named_law(
 ) -> AbstractController:
     """The law that a scenario with this `controller` has."""
     noise = np.asarray(velocity_noise_of(navigation, dt), dtype=float).tolist()
-    with within("controller"):
+    with error_location("controller"):
         context = {"sampling_time": dt, "velocity_noise": noise}
         return factory.make("controllers", controller, Path(), (plant.model(),), context)[0]
 
@@ -235,13 +237,13 @@ def _with_faults(
     mode_names = {index: {"mode": name_of(mode)} for index, mode in mode_objects.items()}
     entries = []
     for index, entry in enumerate(faults):
-        with within(f"faults[{index}]"):
+        with error_location(f"faults[{index}]"):
             try:
                 entries.append(Fault.model_validate({**entry, **mode_names.get(index, {})}))
             except ValidationError as errors:
                 raise complaint(errors, from_data({}), Fault) from None
-    with within("faults"):
-        return faulted(loop, entries, sampling_time=dt, made=mode_objects)[0]
+    with error_location("faults"):
+        return with_faults(loop, entries, sampling_time=dt, made=mode_objects)[0]
 
 
 def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:

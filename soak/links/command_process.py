@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from soak.trying import Run
+from soak.input_runner import Run
 
 _CONTINUES = 10.0  # s, longest wait for the end of a command after its last signal
 

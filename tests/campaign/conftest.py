@@ -7,7 +7,7 @@ import pytest
 from undertow.report import campaign_page, run_page
 from undertow.report.figures import writing
 from undertow.simulation.loop import vmap_batch
-from undertow.studies.campaign.task import site
+from undertow.studies.campaign.task import task_context
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
@@ -74,6 +74,6 @@ def backend(request, monkeypatch):
     """Programs of lanes, and what is used where there is no such program."""
     monkeypatch.setattr(vmap_batch, "_WIDTH", 8)
     monkeypatch.setitem(SCENARIO["loop"], "backend", request.param)
-    site.cache_clear()
+    task_context.cache_clear()
     yield request.param
-    site.cache_clear()
+    task_context.cache_clear()

@@ -13,7 +13,7 @@ from undertow.simulation.loop import simd_batch, vmap_batch
 from undertow.simulation.loop.sampled import simulate
 from undertow.simulation.programs import ProgramCache
 from undertow.studies.campaign.campaign_schema import validate, whole
-from undertow.studies.campaign.task import INVALID, run_trials, site
+from undertow.studies.campaign.task import INVALID, run_trials, task_context
 from undertow.studies.campaign.trials import Trials, trials
 
 
@@ -76,10 +76,10 @@ def test_a_gpu_changes_no_bit(campaign, monkeypatch):
     emulated = EmulatedGpu()
     monkeypatch.setattr(nvidia, "ptx", lambda assembly, *rest: assembly)
     monkeypatch.setattr(simd_batch, "gpu", lambda: Driver(emulated))
-    site.cache_clear()
+    task_context.cache_clear()
     for rows, expected in zip(tasks, found, strict=True):
         jax.tree.map(np.testing.assert_array_equal, columns(two, rows), expected)
-    site.cache_clear()
+    task_context.cache_clear()
     assert len(emulated.launches) == 4 and not emulated.buffers
 
 
@@ -88,9 +88,9 @@ def test_numbers_built_into_a_program_change_no_bit(campaign, monkeypatch):
     """The same trials with everything that probes share built in, and with nothing built in."""
     found = columns(campaign(), range(9))
     monkeypatch.setattr(ProgramCache, "_shared_by_probes", lambda self: {})
-    site.cache_clear()
+    task_context.cache_clear()
     general = columns(campaign(), range(9))
-    site.cache_clear()
+    task_context.cache_clear()
     for name, expected in found.items():
         np.testing.assert_array_equal(general[name], expected, err_msg=name)
 

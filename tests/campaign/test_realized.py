@@ -10,7 +10,7 @@ from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.part_cache import PartCache
 from undertow.studies.campaign.build_trials import build_trial
 from undertow.studies.campaign.prepare import prepare
-from undertow.studies.campaign.realized import realized_scalars
+from undertow.studies.campaign.random_scalars import realized_scalars
 
 pytestmark = pytest.mark.full
 

@@ -11,7 +11,7 @@ from command import contents
 from undertow.cli.main import run
 from undertow.studies.campaign.prepare import prepare
 from undertow.studies.campaign.run_campaign import STORE
-from undertow.studies.campaign.task import site
+from undertow.studies.campaign.task import task_context
 
 pytestmark = pytest.mark.full
 
@@ -184,7 +184,7 @@ def test_a_file_that_the_scenario_names_belongs_to_the_campaign(campaign, campai
     found = json.loads((tmp_path / "again" / "metrics.json").read_text())["steady"]["position_rms"]
     assert found == float(xr.open_zarr(out / STORE, consolidated=False)["position_rms"][trial])
     (tmp_path / "d.csv").write_text(rows.format(2.0))
-    site.cache_clear()  # as in a process that begins
+    task_context.cache_clear()  # as in a process that begins
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
     assert "a file that the scenario names had other contents" in capsys.readouterr().err
 
@@ -205,11 +205,11 @@ def test_every_file_that_trials_name_belongs_to_the_campaign(campaign_file, tmp_
     assert run(["campaign", str(path), "--out", str(out)]) == 0
     for name in tables:
         (tmp_path / name).write_text(rows.format(2.0))
-        site.cache_clear()  # as in a process that begins
+        task_context.cache_clear()  # as in a process that begins
         assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 2
         assert "a file that the scenario names had other contents" in capsys.readouterr().err
         (tmp_path / name).write_text(rows.format(1.0))
-    site.cache_clear()
+    task_context.cache_clear()
     assert run(["campaign", str(path), "--out", str(out), "--resume"]) == 0
 
 

@@ -4,14 +4,14 @@ import pickle
 
 import pytest
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.scenario.reading import parse
 
 
 def error_within(*places, name="mass", **said):
     """The error of code that stands in these places, outermost first."""
     if places:
-        with within(*places[0]):
+        with error_location(*places[0]):
             return error_within(*places[1:], name=name, **said)
     return BadInput(name, "be positive", -1, **said)
 
@@ -45,14 +45,14 @@ def test_a_location_that_is_given_stays():
 
 
 def test_a_place_ends_with_its_block_also_after_an_error():
-    with pytest.raises(BadInput), within("plant"):
+    with pytest.raises(BadInput), error_location("plant"):
         raise BadInput("mass", "be positive")
     assert BadInput("mass", "be positive").name == "mass"
 
 
 def test_an_error_that_comes_from_another_process_keeps_its_place():
     sent = pickle.dumps(error_within(("plant", "s.yaml: {}".format)))
-    with within("controller"):
+    with error_location("controller"):
         received = pickle.loads(sent)
     assert str(received) == "`plant.mass` must be positive, but is -1 (s.yaml: mass)"
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from undertow.core.errors import BadInput
-from undertow.core.returned import check_command, check_state, difference, form, not_two
+from undertow.core.return_checks import check_command, check_state, difference, form, not_two
 from undertow.core.signals import Signal, check_declared
-from undertow.physics.faults.mode import NO_SEVERITY, AbstractMode, Altered, Moment, altered_by
+from undertow.physics.faults.mode import NO_SEVERITY, AbstractMode, Altered, Moment, apply_mode
 
 
 class Law:
@@ -115,9 +115,9 @@ def test_answers_that_are_no_altered_signal(answer, says):
     value, zero = jnp.zeros(3), jnp.zeros(())
     moment = Moment(zero > 0, 0.0, 0.0, 1.0, jax.random.PRNGKey(0), jnp.asarray(0), value, holds=True)
     right = (Altered(value, True), jnp.zeros(2))
-    assert altered_by(Mode(right), jnp.zeros(2), moment, value) is right
+    assert apply_mode(Mode(right), jnp.zeros(2), moment, value) is right
     with pytest.raises(BadInput, match=f"^Mode: `apply`.*{says}"):
-        altered_by(Mode(answer), jnp.zeros(2), moment, value)
+        apply_mode(Mode(answer), jnp.zeros(2), moment, value)
 
 
 class Declaring:

@@ -191,7 +191,7 @@ def test_random_calls_of_an_fmu_under_sanitizers(units, tmp_path, compiler, name
 
 SORTED = """
 import jax.numpy as jnp
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance
 
 
 class Sorted(AbstractSmoothDisturbance):

@@ -7,7 +7,7 @@ import pytest
 
 from undertow.analysis.temporal.formula import NUMPY, smooth
 from undertow.analysis.temporal.parsing import Entries, FormulaNames, parse_formula
-from undertow.analysis.temporal.requirements import Requirement, judged
+from undertow.analysis.temporal.requirements import Requirement, evaluate_requirements
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
 
@@ -161,7 +161,7 @@ def test_verdicts_of_runs():
     """A bound of a metric, a run that failed, and what is not defined."""
     formula = Requirement("settles", parse_formula("always[10, 20] position_error < 0.1", KNOWN))
     bound = Requirement("energy", below=-2.0)
-    judge = lambda metrics, status, ended, signals=SIGNALS: judged(
+    judge = lambda metrics, status, ended, signals=SIGNALS: evaluate_requirements(
         (formula, bound), signals, PERIOD, metrics, int(status), ended, 20.0
     )
     kept = judge({"energy": -3.0}, Status.OK, 20.0)

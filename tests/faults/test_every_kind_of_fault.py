@@ -20,7 +20,7 @@ from undertow.physics.faults.quantities import quantities_of
 from undertow.physics.sensors.received import Received
 from undertow.physics.thrusters.thruster import PropellerReport
 from undertow.scenario.build import build
-from undertow.scenario.faulted import faulted
+from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.schema import Fault
 
 DT, FIRST, STOP, STEPS = 0.01, 3, 8, 11
@@ -58,7 +58,7 @@ def with_fault(kind, healthy=loop):
     entry = {"target": target, "mode": kind.mode, "onset": FIRST * DT, "duration": (STOP - FIRST) * DT}
     if kind.mode in SHOWN:
         entry["severity"] = SHOWN[kind.mode]
-    return faulted(healthy(), [Fault.model_validate(entry)], sampling_time=DT)[0]
+    return with_faults(healthy(), [Fault.model_validate(entry)], sampling_time=DT)[0]
 
 
 def kinds_of(*targets):

@@ -14,7 +14,7 @@ from undertow.core.errors import BadInput
 from undertow.physics.faults.kinds import list_kinds
 from undertow.physics.faults.sampling import random_faults
 from undertow.scenario.build import build
-from undertow.scenario.faulted import faulted
+from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.schema import Fault
 
@@ -271,7 +271,7 @@ def test_random_faults_follow_from_their_generator():
 def test_random_faults_are_those_of_the_loop():
     loop = built(**KALMAN).closed_loop
     for entry in random_faults(np.random.default_rng(3), loop.plant, loop.navigation, 10.0, 60):
-        _, (resolved,) = faulted(loop, [Fault.model_validate(entry)], sampling_time=0.01)
+        _, (resolved,) = with_faults(loop, [Fault.model_validate(entry)], sampling_time=0.01)
         assert resolved["mode"] == entry["mode"] and resolved["onset"] == entry["onset"] < 8
 
 

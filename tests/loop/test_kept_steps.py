@@ -38,7 +38,7 @@ def test_one_run(monkeypatch, backend):
     assert step.backend == backend
     state, numbers = STATE, NUMBERS
     for force in ([1.0, 0.0], [0.0, -2.0], [0.5, 0.5]):
-        stepped.put(step.inputs, np.array(force))
+        stepped.copy_into(step.inputs, np.array(force))
         step()
         state, energy, moves = expected(numbers, state, np.array(force))
         np.testing.assert_allclose(step.outputs["energy"], energy, rtol=1e-14)
@@ -46,7 +46,7 @@ def test_one_run(monkeypatch, backend):
         np.testing.assert_allclose(step.state, state, rtol=1e-14)
         # Numbers that are written hold from the next step on.
         numbers = numbers | {"damping": np.array(0.5 * numbers["damping"])}
-        stepped.put(step.numbers, numbers)
+        stepped.copy_into(step.numbers, numbers)
     np.testing.assert_array_equal(NUMBERS["damping"], 0.5)
     np.testing.assert_array_equal(STATE[0], [0.3, -0.2])
 

@@ -12,7 +12,7 @@ from undertow.core.measurement import measurement_of_outputs
 from undertow.outside.autopilot.navigation_filter import NavigationFilter
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.simulation.loop.stepped import put, step_of
+from undertow.simulation.loop.stepped import compile_step, copy_into
 
 pytestmark = pytest.mark.full
 
@@ -60,10 +60,10 @@ def simulated(scenario, steps):
             y, state = part.measure(realization, state, t, truth)
             return state, (received, y.position, y.body.nu)
 
-        step = step_of(advance, navigation, jax.tree.map(np.asarray, begin), np.zeros(()))
+        step = compile_step(advance, navigation, jax.tree.map(np.asarray, begin), np.zeros(()))
         assert step.backend == "simd"
         for k in range(steps):
-            put(step.inputs, np.asarray(k * PERIOD))
+            copy_into(step.inputs, np.asarray(k * PERIOD))
             step()
             yield jax.tree.map(lambda leaf: leaf.copy(), step.outputs)
 

@@ -13,7 +13,7 @@ import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.scenario.reading import dump
 from undertow.scenario.results.run_scenario import run_scenario
-from undertow.studies.campaign.task import run_trials, site
+from undertow.studies.campaign.task import run_trials, task_context
 
 # What other packages do to a process when they are imported is theirs; they are imported before.
 PROCESS = """
@@ -126,7 +126,7 @@ def alone():
     found = {}
     for way, run in WAYS.items():
         for precision in PRECISIONS:
-            site.cache_clear()
+            task_context.cache_clear()
             found[way, precision] = run(precision)
     return found
 
@@ -141,7 +141,7 @@ def alone():
 )
 def test_precisions_interleaved_in_threads(alone, double, ways):
     """Two callers in two threads go through the ways against one another; both have their setting before and after."""
-    site.cache_clear()
+    task_context.cache_clear()
 
     def caller(order):
         with jax.enable_x64(double):

@@ -17,7 +17,7 @@ from undertow.scenario.reading import dump
 from undertow.scenario.results.run_scenario import run_scenario
 from undertow.studies.campaign.campaign_schema import read_text
 from undertow.studies.campaign.store_layout import layout
-from undertow.studies.campaign.task import run_trials, site
+from undertow.studies.campaign.task import run_trials, task_context
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "limit": 20.0},
@@ -103,7 +103,7 @@ def test_a_campaign_across_precisions():
             trial, combination = divmod(row, 2)
             for name in ("position_rms", "input_variation", "input_rms"):
                 assert found[name][place] == alone[list(alone)[combination]][name][trial], name
-    site.cache_clear()
+    task_context.cache_clear()
 
 
 def test_constants_of_parts_follow():

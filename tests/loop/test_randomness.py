@@ -16,7 +16,7 @@ from undertow.core import catalogue, runtime
 from undertow.core.contracts import AbstractDisturbance, AbstractNavigation, Measurement
 from undertow.core.measurement import measurement_of_outputs
 from undertow.core.numerics.random_keys import keys_for, numbered
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.sensors import compass, depth, dvl, imu, position_fix, propeller_speed

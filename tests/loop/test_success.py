@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from undertow.analysis.metrics import Metrics, accumulators, for_people, meanings, output_groups, results
-from undertow.analysis.success import criterion_of, judged
+from undertow.analysis.metrics import Metrics, accumulators, display_units, meanings, output_groups, results
+from undertow.analysis.success import criterion_of, evaluate_success
 from undertow.control.controllers.pid import pid
 from undertow.control.navigation.perfect import perfect
 from undertow.control.references.setpoint import setpoint
@@ -78,31 +78,33 @@ def test_outputs_are_grouped_by_unit(units, groups):
 
 
 def test_tables_show_degrees():
-    assert for_people(np.pi / 2, "rad") == (90.0, "deg") and for_people(2.0, "m") == (2.0, "m")
+    assert display_units(np.pi / 2, "rad") == (90.0, "deg") and display_units(2.0, "m") == (2.0, "m")
 
 
 def test_a_bang_bang_run_is_no_success_by_default():
     known = KNOWN | {"saturated_fraction": Metric("", "")}
     criterion = criterion_of(None, known)
     steady = {"position_rms": 0.01, "attitude_rms": 0.01, "saturated_fraction": 0.78}
-    verdict = judged(criterion, steady)
+    verdict = evaluate_success(criterion, steady)
     assert verdict.sentence(known) == "tracking: not within saturated_fraction 0.25 (is 0.78)"
-    assert judged(criterion, steady | {"saturated_fraction": 0.125}).within  # one of eight thrusters at its limit
-    assert judged(criterion_of({"position_rms": 0.05}, known), steady).within
+    assert evaluate_success(
+        criterion, steady | {"saturated_fraction": 0.125}
+    ).within  # one of eight thrusters at its limit
+    assert evaluate_success(criterion_of({"position_rms": 0.05}, known), steady).within
     assert criterion_of(None, {"saturated_fraction": Metric("", "")}) == {}
 
 
 def test_the_judgement_and_its_words():
     criterion = {"position_rms": 0.05, "attitude_rms": 0.1}
-    good = judged(criterion, {"position_rms": 0.01, "attitude_rms": 0.02})
+    good = evaluate_success(criterion, {"position_rms": 0.01, "attitude_rms": 0.02})
     assert good.within and good.sentence(KNOWN) == "tracking: within position_rms 0.05 m, attitude_rms 5.73 deg"
-    bad = judged(criterion, {"position_rms": 0.2, "attitude_rms": 0.02})
+    bad = evaluate_success(criterion, {"position_rms": 0.2, "attitude_rms": 0.02})
     assert not bad.within and bad.sentence(KNOWN) == "tracking: not within position_rms 0.05 m (is 0.2 m)"
-    undefined = judged(criterion, {"position_rms": 0.01})
+    undefined = evaluate_success(criterion, {"position_rms": 0.01})
     assert undefined.exceeded == {"attitude_rms": None} and "not defined" in undefined.sentence(KNOWN)
-    failed = judged(criterion, None)
+    failed = evaluate_success(criterion, None)
     assert not failed.within and "did not reach its end" in failed.sentence(KNOWN)
-    assert judged({}, {"position_rms": 9.0}) is None
+    assert evaluate_success({}, {"position_rms": 9.0}) is None
 
 
 SCENARIO = {

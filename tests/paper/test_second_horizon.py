@@ -9,7 +9,7 @@ import pytest
 from undertow.analysis.drift import gain_of, time_to_divergence
 from undertow.control.controllers.presets.paper import paper
 from undertow.core.status import Status
-from undertow.paper import claims, drifting, horizons, lag_map
+from undertow.paper import claims, drift_study, horizons, lag_map
 from undertow.paper.all_outputs import with_all_outputs
 from undertow.paper.claims import estimation
 from undertow.paper.claims.tracking import perfect_variation
@@ -94,9 +94,9 @@ def test_the_winding_breaks_it():
 
 def test_weights_drift_until_the_loop_is_stable():
     """Behind 50 ms every axis ends with a gain c beyond what the linearised loop asks for; a box of 20 keeps it away."""
-    found = run_batches(drifting.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
+    found = run_batches(drift_study.scenarios(), ((10.0, 20.0),), 1.0, ("weights", "weights_peak"))
     free, bounded = found["drifting_free"], found["drifting_bounded"]
-    needed, _ = lag_map.stable_gains(lambda c: lag_map.lag_matrix(law_of(free), drifting.LAG, drifted=c), 2000.0)
+    needed, _ = lag_map.stable_gains(lambda c: lag_map.lag_matrix(law_of(free), drift_study.LAG, drifted=c), 2000.0)
     gains = [gain_of(law_of(run), run.series["weights"][-1]) for run in (free, bounded)]
     assert needed == pytest.approx(453, abs=1)
     assert (gains[0] > needed).all() and gains[0].max() < 1.5 * needed, "and then it stops"

@@ -88,7 +88,7 @@ def test_demands_of_px4(seed):
     y = model.coordinates.measurement(y.position, model.coordinates.output_velocity(y, jnp.asarray(nu)))
     turn = np.asarray(rotation_from_euler(jnp.asarray(angles)))
     off = model.coordinates.tracking_error(y, Target(still, still, still))
-    found, _ = law.demand(law.begin(y, Target(still, still, still)), y, off)
+    found, _ = law.acceleration(law.init_law(y, Target(still, still, still)), y, off)
     most = np.repeat([0.1, 0.3], 3)
     expected = np.clip(demand_of_px4(turn, place, turn @ nu[:3], nu[3:]), -most, most)
     np.testing.assert_allclose(found / AUTHORITY, expected, rtol=0.02, atol=1e-3)

@@ -11,7 +11,7 @@ from undertow.control.references import setpoint, sine
 from undertow.core.actuator_model import DirectActuator, LaggedActuator
 from undertow.core.contracts import Load, Measurement, Target
 from undertow.physics.disturbances import none, sinusoid
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance
 from undertow.physics.plants import double_integrator, linear_plant, two_link_arm
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop

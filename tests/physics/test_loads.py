@@ -11,7 +11,7 @@ from textbook import rotation_from_euler
 
 from undertow.core.contracts import Pose
 from undertow.core.errors import BadInput
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.parameter_error import parameter_error
 from undertow.physics.disturbances.payload import payload
 from undertow.physics.disturbances.sheared_current import sheared_current

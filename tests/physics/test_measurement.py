@@ -7,7 +7,7 @@ import pytest
 
 from undertow.core.contracts import Measurement, Target
 from undertow.core.errors import BadInput
-from undertow.core.measurement import completed, measurement_of_outputs, measurement_of_pose, with_outputs
+from undertow.core.measurement import measurement_of_outputs, measurement_of_pose, with_outputs, with_pose
 from undertow.core.numerics.rotations import (
     quaternion_from_euler,
     quaternion_rate,
@@ -90,10 +90,10 @@ def test_noise_on_outputs_reaches_the_pose():
     (eta, rate), (other, faster) = somewhere(), somewhere()
     truth, expected = measurement_of_outputs(eta, rate), measurement_of_outputs(other, faster)
     alike(with_outputs(truth, other, faster), expected)
-    alike(completed(truth._replace(position=other, velocity=faster), truth), expected)
-    alike(completed(Measurement(other, faster), truth), expected)
-    assert completed(truth, truth) is truth
-    assert completed(expected, truth) is expected
+    alike(with_pose(truth._replace(position=other, velocity=faster), truth), expected)
+    alike(with_pose(Measurement(other, faster), truth), expected)
+    assert with_pose(truth, truth) is truth
+    assert with_pose(expected, truth) is expected
 
 
 def test_outputs_alone_are_refused_in_body_axes():

@@ -10,9 +10,9 @@ from textbook import rotation_from_euler
 from undertow.core.contracts import Pose, Water
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
-from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.current import current
 from undertow.physics.disturbances.gauss_markov_current import gauss_markov_current
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.sheared_current import sheared_current
 from undertow.physics.disturbances.waves import spectrum, waves
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle

@@ -10,7 +10,7 @@ import pytest
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.physics.disturbances import random_suite, sinusoid, table, wrench
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 
 TIMES = np.array([-1.0, 0.0, 0.7, 1.5, 2.0, 3.9, 4.0, 5.3, 100.0])
 CALM = Load(jnp.zeros(2), jnp.zeros(2))

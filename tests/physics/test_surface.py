@@ -11,7 +11,7 @@ from undertow.core.contracts import FreeSurface, Pose, Water
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.rotations import rotation_from_quaternion
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.surface import UnderSurface, stated_depths, surface
 from undertow.physics.disturbances.waves import waves
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle

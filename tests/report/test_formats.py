@@ -2,7 +2,7 @@
 
 import pytest
 
-from undertow.report.formats import number, outcome, plain, prose, quantity, within
+from undertow.report.formats import meets_default_criterion, number, outcome, plain, prose, quantity
 
 MINUS, TIMES = "\u2212", "&thinsp;&times;&thinsp;10"
 
@@ -54,9 +54,9 @@ def test_numbers_in_sentences_are_typeset(words, shown):
 
 
 def test_completing_is_not_success():
-    assert within({"position_rms": 0.049, "attitude_rms": 0.049}) is True
-    assert within({"position_rms": 0.049, "attitude_rms": 0.051}) is False
-    assert within(None) is None
+    assert meets_default_criterion({"position_rms": 0.049, "attitude_rms": 0.049}) is True
+    assert meets_default_criterion({"position_rms": 0.049, "attitude_rms": 0.051}) is False
+    assert meets_default_criterion(None) is None
     colours = [outcome("x", *one) for one in ((True, True), (True, False), (True, None), (False, None), (False, True))]
     assert [one.split('"')[1] for one in colours] == [
         "chip holds", "chip partly", "chip open", "chip fails", "chip fails",

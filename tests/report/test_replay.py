@@ -22,7 +22,7 @@ from undertow.report.replay.replay_data import hull_size, packed, page_data, rep
 from undertow.report.replay.trials_again import replays_of_trials
 from undertow.report.run_page import RunPageContents, write_run_page
 from undertow.scenario.build import build
-from undertow.scenario.faulted import faulted
+from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.reading import from_data
 from undertow.scenario.results.run_facts import facts_from
 from undertow.scenario.results.run_result import RunRecord, RunResult
@@ -44,7 +44,7 @@ def loop():
     law, hold = ut.controllers.pid(plant.model(), frequency=1.0), ut.references.setpoint([0.0] * 6)
     healthy = ClosedLoop(plant, law, hold, ut.disturbances.current(WATER), perfect())
     lost = Fault(target="thruster 3", mode="fraction", severity=0.0, onset=10.0)
-    return faulted(healthy, [lost])[0]
+    return with_faults(healthy, [lost])[0]
 
 
 @pytest.fixture
@@ -217,5 +217,5 @@ def test_failed_trials_leave_the_others(trials, monkeypatch):
 
 def test_failed_replay_is_a_sentence(run, loop, monkeypatch):
     monkeypatch.setattr(run_page, "replay_of", lambda *_: 1 / 0)
-    shown = run_page.shown(RunResult(run, facts_from(run.attrs), loop, None), lambda: Plotted({}, {}, []))
+    shown = run_page.page_contents(RunResult(run, facts_from(run.attrs), loop, None), lambda: Plotted({}, {}, []))
     assert shown.replay is None and "the replay could not be made" in shown.failures[0]

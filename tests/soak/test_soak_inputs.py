@@ -7,10 +7,10 @@ import pytest
 
 from soak import mutation, specimens
 from soak.command import attacked
+from soak.input_runner import try_in_process
 from soak.input_soak import try_inputs
 from soak.inputs import BUILD, KINDS, Attack, attack, planned
-from soak.trying import try_in_process
-from soak.verdict import Done, judged
+from soak.verdict import Done, failure_of
 from undertow.scenario.build import build
 from undertow.scenario.reading import parse
 
@@ -91,7 +91,7 @@ FILES = {"s.yaml": b""}
     ],
 )
 def test_what_must_never_happen_is_found(event, change):
-    failure = judged("inputs/scenario/1/2", ["check", "s.yaml"], FILES, DONE._replace(**change))
+    failure = failure_of("inputs/scenario/1/2", ["check", "s.yaml"], FILES, DONE._replace(**change))
     assert failure is not None and failure.event == event and failure.identity == "inputs/scenario/1/2"
 
 
@@ -108,7 +108,7 @@ def test_what_must_never_happen_is_found(event, change):
     ],
 )
 def test_what_may_happen_is_no_failure(done):
-    assert judged("", ["check", "s.yaml", "b" * 3000], FILES, done) is None
+    assert failure_of("", ["check", "s.yaml", "b" * 3000], FILES, done) is None
 
 
 def test_hostile_inputs_of_every_kind_are_refused_or_accepted(tmp_path):
@@ -117,7 +117,7 @@ def test_hostile_inputs_of_every_kind_are_refused_or_accepted(tmp_path):
         for number in range(4):
             given = attack(kind, 1, number, VALID)
             done = try_in_process(attacked, given, tmp_path)
-            failure = judged(given.identity, given.arguments, given.files, done._replace(seconds=(0.0, 0.0)))
+            failure = failure_of(given.identity, given.arguments, given.files, done._replace(seconds=(0.0, 0.0)))
             assert failure is None, (failure, done.err)
             assert not list(tmp_path.iterdir())
 

@@ -4,9 +4,9 @@ import pytest
 
 from soak import plug_ins, specimens
 from soak.command import attacked
+from soak.input_runner import try_in_process
 from soak.inputs import BUILD, Attack
-from soak.trying import try_in_process
-from soak.verdict import judged
+from soak.verdict import failure_of
 from undertow.core.errors import BadInput, printable
 
 pytestmark = pytest.mark.soak
@@ -85,7 +85,7 @@ def test_what_was_found_is_refused_in_one_line(name, tmp_path):
     files, words, said = FOUND[name]
     done = try_in_process(attacked, Attack("", files, words), tmp_path)
     assert done.code == 2 and said in done.err, done
-    assert judged("", words, files, done._replace(seconds=(0.0, 0.0))) is None
+    assert failure_of("", words, files, done._replace(seconds=(0.0, 0.0))) is None
 
 
 def test_printable_text_is_one_line_that_any_terminal_shows():

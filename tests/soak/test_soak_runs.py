@@ -7,8 +7,8 @@ import pytest
 
 from soak import controls, faults_soak, hours_soak
 from soak.controls import CONTROLS, run_controls
+from soak.counters import Counts
 from soak.judged_runs import Judged, judge, judged_runs
-from soak.watching import Counts
 from undertow.core.status import Status
 
 pytestmark = pytest.mark.soak

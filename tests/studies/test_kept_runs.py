@@ -3,7 +3,7 @@
 import pytest
 import xarray as xr
 
-from undertow.paper.running import begin_all
+from undertow.paper.running import start_all
 from undertow.scenario.reading import read
 from undertow.scenario.results.repetition import compare
 from undertow.scenario.results.run_scenario import run_scenario
@@ -24,7 +24,7 @@ AXIS = {
 
 def test_a_kept_run_is_repeated_bit_for_bit(tmp_path):
     with worker_processes(1) as pool:
-        ran = begin_all({"axis": AXIS}, tmp_path, Tasks(pool, lambda words, share: None))()["axis"]
+        ran = start_all({"axis": AXIS}, tmp_path, Tasks(pool, lambda words, share: None))()["axis"]
     file = tmp_path / "runs" / "axis.nc"
     series = {"position", "reference", "input", "uncertainty", "estimate"}
     with xr.open_dataset(file) as kept:

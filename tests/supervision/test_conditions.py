@@ -31,7 +31,7 @@ from undertow.core.measurement import with_outputs
 from undertow.core.numerics.integrators import METHODS
 from undertow.core.signals import Signal
 from undertow.physics.plants.double_integrator import DoubleIntegrator
-from undertow.simulation.loop.sampled import moved
+from undertow.simulation.loop.sampled import integrate_plant
 
 T = 0.02
 BLOCK = 50  # steps of a call, at most: a call takes longer than a step
@@ -224,7 +224,7 @@ def _step(parts, t, first, now, how):
     u, _ = mover.command(moving, truth, _target(t, Tampering()))
     applied = plant.admissible(x, u)
     motion = lambda t, x: plant.dynamics(t, x, applied, plant.no_load())
-    new = moved(motion, t, x, jnp.asarray(T), METHODS["rk4"], 1)
+    new = integrate_plant(motion, t, x, jnp.asarray(T), METHODS["rk4"], 1)
     moving = mover.advance(moving, truth, _target(t, Tampering()), applied, jnp.asarray(T))
     return (new, moving, z), (output, z.state, z.reason)
 

@@ -10,7 +10,7 @@ import undertow as ut
 from undertow.control.supervision.fault_tolerant_law import fault_tolerant
 from undertow.core.contracts import Target
 from undertow.core.measurement import measurement_of_outputs
-from undertow.scenario.faulted import faulted
+from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.schema import Fault
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import RunPlan
@@ -32,7 +32,7 @@ def loops(law, faults):
     reference = ut.references.lissajous((1.0, 1.0, 0.5, 0.5), (0.3, 0.35, 0.25, 0.3))
     noise, current = ut.navigation.white_noise(0.005, 0.005), ut.disturbances.current([0.5, 0.2, 0.2])
     healthy = ClosedLoop(PLANT, law, reference, current, noise)
-    return [faulted(healthy, [fault], sampling_time=DT)[0] for fault in faults]
+    return [with_faults(healthy, [fault], sampling_time=DT)[0] for fault in faults]
 
 
 def batch(several, signals, every=1):

@@ -18,7 +18,7 @@ from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 from undertow.scenario.results.run_result import lost_thrusters
 from undertow.simulation.loop import simd_batch
-from undertow.simulation.loop.sampled import moved
+from undertow.simulation.loop.sampled import integrate_plant
 
 pytestmark = pytest.mark.full
 
@@ -107,7 +107,9 @@ def _step(parts, x, z):
     y, r = plant.output(t, x), target.at(t)
     u, _ = supervised.command(z, y, r)
     applied = plant.admissible(x, u)
-    new = moved(lambda t, x: plant.dynamics(t, x, applied, plant.no_load()), t, x, jnp.asarray(T), METHODS["rk4"], 1)
+    new = integrate_plant(
+        lambda t, x: plant.dynamics(t, x, applied, plant.no_load()), t, x, jnp.asarray(T), METHODS["rk4"], 1
+    )
     return new, supervised.advance(z, y, r, applied, jnp.asarray(T)), u
 
 

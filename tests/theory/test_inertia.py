@@ -10,7 +10,7 @@ from undertow.analysis.certificate.function import estimation_bound, fastest_unc
 from undertow.control.controllers import rcaf
 from undertow.control.controllers.robust.estimator import Estimator
 from undertow.control.controllers.robust.inertia import InertiaIdentification
-from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.controllers.robust.memory import TrainingSample, memory
 from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.control.navigation import perfect
 from undertow.control.references import lissajous
@@ -151,7 +151,7 @@ def test_the_command_does_not_jump_when_the_inertia_changes():
     state = state._replace(inertia=window._replace(since=jnp.asarray(one.window)))
     rest, beside = jnp.asarray([0.4, -0.3]), jnp.asarray([1.2, 0.8])
     off = jnp.asarray([0.05, 0.02])
-    seen = Observed(
+    seen = TrainingSample(
         rest, jnp.asarray([0.1, 0.2]), off, beside - rest, jnp.asarray([0.3, -0.2]), jnp.asarray([5.0, 7.0])
     )
     gains, phi = Estimator(gaussian_sets(1), bandwidth=8.0).gains(jnp.asarray(DT)), 0.5 + state.lagged

@@ -8,7 +8,7 @@ import pytest
 from undertow.control.controllers import rcaf
 from undertow.control.controllers.robust.estimator import Estimator
 from undertow.control.controllers.robust.knowledge import load_knowledge, save_knowledge
-from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.controllers.robust.memory import TrainingSample, memory
 from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.control.navigation import perfect
 from undertow.control.references import lissajous, sine
@@ -33,7 +33,7 @@ ONE = jnp.ones(())
 def observed(rest, error):
     """A step of an observer, for a memory that does not identify inertias."""
     still = jnp.zeros_like(rest)
-    return Observed(rest, error, *4 * [still])
+    return TrainingSample(rest, error, *4 * [still])
 
 
 def learnt(part, state, regressors, rest_of, free=ONE, error_of=lambda state: jnp.zeros(2)):

@@ -8,7 +8,7 @@ import pytest
 from undertow.control.controllers import rcaf
 from undertow.control.controllers.robust import evidence
 from undertow.control.controllers.robust.estimator import Estimator
-from undertow.control.controllers.robust.memory import Observed, memory
+from undertow.control.controllers.robust.memory import TrainingSample, memory
 from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.control.navigation import perfect
 from undertow.control.references import sine
@@ -79,7 +79,9 @@ def test_the_modelling_error_without_a_memory_is_known_without_a_second_observer
     load = jnp.asarray(np.random.default_rng(3).normal(size=(200, 2)))
     with_memory = without = OBSERVER.init(jnp.zeros(2))
     velocity, still, gains = jnp.zeros(2), jnp.zeros(2), OBSERVER.gains(jnp.asarray(DT))
-    step = jax.jit(lambda state, phi: part.advance(state, phi, Observed(*6 * [still]), gains, jnp.ones(()), DT)[0])
+    step = jax.jit(
+        lambda state, phi: part.advance(state, phi, TrainingSample(*6 * [still]), gains, jnp.ones(()), DT)[0]
+    )
     observed = jax.jit(lambda z, v, more: OBSERVER.advance(z, OBSERVER.estimate(z, v), more, jnp.zeros(2), DT))
     for phi, d in zip(phis, load, strict=True):
         with_memory = observed(with_memory, velocity, used * weights.T @ phi)
@@ -100,7 +102,9 @@ def test_the_covariance_of_a_memory_that_is_wrong_returns_to_its_start_and_never
 
     def step(state, phi):
         nothing, error = jnp.zeros(2), -2 * state.weights.T @ state.ahead  # of a load that is minus what is remembered
-        return part.advance(state, phi, Observed(nothing, error, *4 * [nothing]), gains, jnp.ones(()), DT)[0], None
+        return part.advance(state, phi, TrainingSample(nothing, error, *4 * [nothing]), gains, jnp.ones(()), DT)[
+            0
+        ], None
 
     last = jax.jit(lambda state: jax.lax.scan(step, state, waves)[0])(start)
     assert np.linalg.eigvalsh(np.asarray(last.covariance)).min() > 0

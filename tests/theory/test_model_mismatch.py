@@ -16,7 +16,7 @@ from undertow.control.navigation import perfect, white_noise
 from undertow.control.references import setpoint
 from undertow.core.contracts import AbstractNavigation
 from undertow.physics.disturbances import current, sinusoid, waves
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.plants import double_integrator, hybrid_vehicle
 from undertow.physics.thrusters import first_order, t200
 from undertow.physics.vehicles import bluerov2_heavy

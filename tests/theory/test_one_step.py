@@ -73,13 +73,13 @@ def adrc(own, share):
 )
 def indi(own, share):
     w, zeta = np.array([3.0, 5.0]), np.array([0.8, 1.2])
-    missing = own.acceleration - own.known
+    missing = own.acceleration - own.modelled
     demand = A + np.array([2.0, 4.0]) * E + np.array([3.0, 1.0]) * R - missing
     after = (
         own.velocity + DT * own.acceleration,
         own.acceleration + DT * (w**2 * (V - own.velocity) - 2 * zeta * w * own.acceleration),
-        own.known + DT * own.known_rate,
-        own.known_rate + DT * (w**2 * (KNOWN - own.known) - 2 * zeta * w * own.known_rate),
+        own.modelled + DT * own.modelled_rate,
+        own.modelled_rate + DT * (w**2 * (KNOWN - own.modelled) - 2 * zeta * w * own.modelled_rate),
     )
     return demand, {"estimate": missing, "modelling_error": own.velocity - V}, after
 
@@ -371,7 +371,7 @@ def steps():
     y, off = Measurement(X, V), TrackingError(E, R, A)
     still = Target(X, V, A)
     made = {name: make() for name, (make, _, _) in LAWS.items()}
-    starts = {name: law.begin(y, still) for name, law in made.items()}
+    starts = {name: law.init_law(y, still) for name, law in made.items()}
     running = {name: one for name, (_, one, _) in LAWS.items()}
     which, shares = (np.array(column) for column in zip(*CASES.values(), strict=True))
     states = jax.tree.map(lambda *both: np.stack(both)[which], starts, running)
@@ -381,7 +381,7 @@ def steps():
     def taken(own, share):
         given = ActuationResult(jnp.asarray(KNOWN), jnp.asarray(MISSING), share)
         return {
-            name: (*law.demand(own[name], y, off), law.adapt(own[name], y, off, given, jnp.asarray(DT)))
+            name: (*law.acceleration(own[name], y, off), law.update(own[name], y, off, given, jnp.asarray(DT)))
             for name, law in made.items()
         }
 

@@ -12,7 +12,7 @@ from undertow.control.controllers.robust import evidence
 from undertow.control.controllers.robust.estimator import EstimatorState
 from undertow.control.controllers.robust.evidence import Evidence
 from undertow.control.controllers.robust.inertia import InertiaIdentification, InertiaState
-from undertow.control.controllers.robust.memory import MemoryState, Observed, memory
+from undertow.control.controllers.robust.memory import MemoryState, TrainingSample, memory
 from undertow.control.controllers.robust.robust_law import RobustState
 from undertow.core.contracts import TrackingError
 from undertow.physics.plants import double_integrator
@@ -198,7 +198,7 @@ def test_one_step_of_the_memory(with_inertia):
     """Recursive least squares that forgets what is excited; the observer loses what the memory gains."""
     one = InertiaIdentification(AMPLITUDE, FREQUENCY, expected=jnp.asarray(EXPECTED), **PROBED)
     part, z = remembered(one if with_inertia else None)
-    seen = Observed(*RNG.normal(size=(6, 2)) * 0.3)
+    seen = TrainingSample(*RNG.normal(size=(6, 2)) * 0.3)
     gains = np.array(0.2), np.array(1.9)
     share = (V + R) / [0.5, 0.8]
     phi = np.concatenate([[1.0], A, share, share * np.abs(share)])
@@ -216,7 +216,7 @@ def test_one_step_of_the_memory(with_inertia):
         found_phi, rules, (after, lost) = memory_step(part, z, seen, gains, np.asarray(free))
         same(found_phi, phi)
         same(rules, (value, h, probing), rtol=1e-4)
-        innovation = h * seen.rest - (1 - trust) * (z.weights.T @ z.lagged)
+        innovation = h * seen.estimate - (1 - trust) * (z.weights.T @ z.lagged)
         towards = z.covariance @ z.lagged
         size = DT * z.lagged @ towards
         kept = 1 - DT / HORIZON / size
@@ -246,7 +246,7 @@ def test_one_step_of_the_memory(with_inertia):
         after_h = np.ones(2)
         if with_inertia:
             nominal = seen.nominal + trust * (z.weights.T @ phi)
-            same(list(after.inertia), list(probed(z.inertia, seen.off, seen.rate, nominal, free)), rtol=1e-5)
+            same(list(after.inertia), list(probed(z.inertia, seen.tracking_error, seen.rate, nominal, free)), rtol=1e-5)
             after_h = np.maximum(ratio_of(jax.tree.map(np.asarray, after.inertia)), 1.0)
         gained = after_trust * (np.asarray(after.weights).T @ phi) + (1 - after_h) * seen.correction - value
         same((lost, after.taken - z.taken), (gained / after_h, gained / after_h), rtol=1e-3, atol=1e-6)
@@ -293,7 +293,7 @@ def test_the_law_uses_what_it_remembers():
     after, limited = (jax.tree.map(lambda leaf, row=row: leaf[row], advanced) for row in range(2))
     gains = np.array(2 * double), np.array(double**2 / DT)
     of_memory = lambda *seen, free=1.0: jax.tree.map(
-        np.asarray, memory_step(part, kept, Observed(*seen), gains, np.array(free))
+        np.asarray, memory_step(part, kept, TrainingSample(*seen), gains, np.array(free))
     )
     phi, (_, h, probing), _ = of_memory(*np.zeros((6, 2)))
     desired = A + GAINS[:, 0] * E + GAINS[:, 1] * R + probing

@@ -147,7 +147,7 @@ def test_one_step_of_nmpc():
     law = nmpc(
         model, sampling_time=DT, bandwidth=POLE, tracking=W, horizon=0.4, steps=4, iterations=2, reference_frequency=0.0
     )
-    begun = law.begin(Y, GOAL)
+    begun = law.init_law(Y, GOAL)
     plan = begun.plan._replace(
         forces=np.array([[0.4, -0.2], [0.3, 0.1], [0.2, 0.0], [39.0, 0.1]]),
         start=np.array([0.04, -0.02, 0.01, 0.03]),
@@ -163,7 +163,7 @@ def test_one_step_of_nmpc():
     given = ActuationResult(jnp.asarray(known), jnp.zeros(2), jnp.ones(()))
 
     def step(z):
-        return law.demand(z, Y, off)[0], law.adapt(z, Y, off, given, jnp.asarray(DT))
+        return law.acceleration(z, Y, off)[0], law.update(z, Y, off, given, jnp.asarray(DT))
 
     states = begun, held, beyond, broken
     stacked = jax.tree.map(lambda *each: np.stack(each), *states)

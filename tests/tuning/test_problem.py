@@ -14,7 +14,7 @@ from undertow.control.references import setpoint
 from undertow.core.contracts import Load, Pose
 from undertow.core.errors import BadInput
 from undertow.physics.disturbances import current, sinusoid, wrench
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.sensors import depth, dvl, imu
 from undertow.physics.thrusters import t200

@@ -422,7 +422,7 @@ def gathered_meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] =
     return {name: metric for name, metric in meanings(loop, user_metrics).items() if name not in _AFTERWARDS}
 
 
-def for_people(value: float, unit: str) -> tuple[float, str]:
+def display_units(value: float, unit: str) -> tuple[float, str]:
     """A value and its unit as tables show them: angles in degrees."""
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import display_units
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.metric import Metric
 
@@ -29,7 +29,7 @@ class Success(NamedTuple):
 
     def sentence(self, metrics: Mapping[str, Metric]) -> str:
         """The verdict as a sentence."""
-        quantity = lambda name, value: "{:.4g} {}".format(*for_people(value, metrics[name].unit)).rstrip()
+        quantity = lambda name, value: "{:.4g} {}".format(*display_units(value, metrics[name].unit)).rstrip()
         bound_text = lambda name: f"{name} {quantity(name, self.criterion[name])}"
         if self.within:
             return f"tracking: within {', '.join(map(bound_text, self.criterion))}"
@@ -60,7 +60,7 @@ def criterion_of(criterion: Mapping[str, float] | None, metrics: Mapping[str, Me
     return dict(criterion)
 
 
-def judged(criterion: Mapping[str, float], steady: Mapping[str, Any] | None) -> Success | None:
+def evaluate_success(criterion: Mapping[str, float], steady: Mapping[str, Any] | None) -> Success | None:
     """Verdict on a run from the metrics of its steady window; None where it ended early, or without a criterion."""
     if not criterion:
         return None

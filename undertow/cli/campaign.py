@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import display_units
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.options.campaign import CampaignCommand
 from undertow.cli.pdf_option import check_pdf
@@ -110,7 +110,7 @@ def table(results: Results, summary_data: dict) -> Table:
     swept = list(results.campaign.axes)
     metric_names = [*results.tracking, "input_rms"]
     counts = ("trials", "failed", "invalid") if summary_data["invalid"] else ("trials", "failed")
-    metrics = (f"{name.replace('_', ' ')}, {for_people(0.0, results.unit(name))[1]}" for name in metric_names)
+    metrics = (f"{name.replace('_', ' ')}, {display_units(0.0, results.unit(name))[1]}" for name in metric_names)
     table = titled("Median [5 %, 95 %] of completed trials", *swept, *counts, "within", *metrics)
     for combination in summary_data["combinations"]:
         cells = [_spread(combination["metrics"].get(name), results.unit(name)) for name in metric_names]
@@ -132,7 +132,7 @@ def _within(combination: dict) -> str:
 def _spread(quantiles: dict | None, unit: str) -> str:
     if quantiles is None:
         return "-"
-    low, middle, high = (for_people(value, unit)[0] for value in quantiles.values())
+    low, middle, high = (display_units(value, unit)[0] for value in quantiles.values())
     return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
 
 

@@ -22,7 +22,7 @@ from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.report.plotted import Plotted
 from undertow.report.plotting import PlottingProcess
 from undertow.report.replay.replay_data import ReplayData, hull_size
-from undertow.report.run_page import RunPageContents, shown, write_run_page
+from undertow.report.run_page import RunPageContents, page_contents, write_run_page
 from undertow.report.run_tables import prediction_rows
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.results.netcdf import write_metrics
@@ -49,7 +49,7 @@ class PredictedMetrics(NamedTuple):
     foregone: bool = False  # known before anything was linearised
 
 
-def present(
+def write_outputs(
     result: ScenarioResult,
     plotting: PlottingProcess,
     predicting: Future[PredictedMetrics] | None,
@@ -74,7 +74,7 @@ def present(
     """
     page = draft.path / "run.html"
     with stage(console, "figures and page"):
-        looks = shown(result, lambda: _written(result, plotting, draft))
+        looks = page_contents(result, lambda: _written(result, plotting, draft))
         warn_of(looks.failures)
         write_run_page(page, result, looks)
     draft.publish()  # nobody waits for the prediction, which is added to the page

@@ -11,7 +11,7 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.options.simulate import SimulateCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.run_presentation import predict, present
+from undertow.cli.run_presentation import predict, write_outputs
 from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.status import Status
@@ -55,7 +55,7 @@ def simulate(command: SimulateCommand) -> int:
         predicting = None if command.prediction is False else thread.submit(predict, result)
         _print_results(result, folder, console)
         code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
-        replay = present(result, plotting, predicting, bool(command.prediction), draft, folder, console)
+        replay = write_outputs(result, plotting, predicting, bool(command.prediction), draft, folder, console)
     if rerun is not None:
         write_rerun(log_of_run(result.dataset), rerun, None if replay is None else replay.size)
     return code

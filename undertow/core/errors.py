@@ -2,8 +2,8 @@
 
     Error: `plant.thruster.resistance` must be positive, but is -1.2 ohm (scenario.yaml, line 14)
 
-Whoever reads a file says where he stands (`within`), so that an error is worded once, where it is found, with the key
-path and the line that the user knows.
+Whoever reads a file says where he stands (`error_location`), so that an error is worded once, where it is found, with
+the key path and the line that the user knows.
 
 Advice is not an error: the run continues. A part returns sentences from its method `advice()`; advice on a key of a
 file names its place like an error.
@@ -31,7 +31,7 @@ _PLACES: ContextVar[tuple[_Place, ...]] = ContextVar("places", default=())
 
 
 @contextlib.contextmanager
-def within(
+def error_location(
     key: str = "",
     location: Callable[[str], str] = lambda name: "",
     note: str = "",
@@ -87,7 +87,7 @@ class BadInput(ValueError):
         must: what it must be, completing "must ..."; "" where an action failed.
         got: what it is; or which action failed, and why.
         hint: the remedy, a full sentence.
-        where: file and line, when known otherwise than by `within`.
+        where: file and line, when known otherwise than by `error_location`.
     """
 
     def __init__(self, name: str, must: str, got: object = None, *, hint: str = "", where: str = ""):

@@ -50,7 +50,7 @@ def body_of(y: Measurement) -> BodyMotion:
     return y.body
 
 
-def completed(y: Measurement, truth: Measurement) -> Measurement:
+def with_pose(y: Measurement, truth: Measurement) -> Measurement:
     """Measurement of a navigation filter, with the pose recomputed where the filter changed the outputs alone."""
     if truth.body is None or (y.position is truth.position and y.velocity is truth.velocity):
         return y

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.logs import frames, units
 from undertow.logs.ardupilot_parameters import motor_channels, motor_direction, pulse_columns
 from undertow.logs.ardusub_frames import FRAMES, motor_columns
@@ -22,14 +22,14 @@ def log_of(recording: Recording, mapping: LogMapping) -> Log:
     notes = list(recording.notes)
     signals = {}
     for name, entries in mapping.signals.items():
-        with within("signals"), within(name):
+        with error_location("signals"), error_location(name):
             entries = tuple(_with_motors(entry, recording) for entry in entries)
             entry = next((candidate for candidate in entries if _has(recording, candidate)), entries[-1])
             topic, table = recording.table(entry.topic)
         cleaned_table, repeated = cleaned(_timed(table, mapping.time, recording.source) if mapping.time[0] else table)
         if repeated:
             notes.append(f"{topic or 'the file'}: {repeated} samples of the time of the one before are left out")
-        with within("signals"), within(name):
+        with error_location("signals"), error_location(name):
             ours, series = _series(name, entry, topic, cleaned_table, recording)
             signals[ours] = series
     return Log(signals, recording.source, recording.format, tuple(dict.fromkeys(notes)))
@@ -94,7 +94,7 @@ def _other_frame(recording: Recording, entry: SignalMapping) -> str:
 def _timed(table: TopicMessages, time: tuple[str, str], source: str) -> TopicMessages:
     """The table with the time of one of its columns."""
     column, unit = time
-    with within("time"):
+    with error_location("time"):
         values = _column(table, column, source, "column")
     return table._replace(time=np.asarray(values, dtype=float) * units.seconds(unit))
 

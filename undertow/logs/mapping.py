@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.core.errors import BadInput, did_you_mean, known_key, within
+from undertow.core.errors import BadInput, did_you_mean, error_location, known_key
 from undertow.logs import units
 from undertow.logs.ardusub_frames import FRAMES
 from undertow.logs.known_signals import BODY, SIGNALS, WORLD
@@ -80,13 +80,13 @@ def mapping_of(data: Any) -> LogMapping:
     _keys(data, "", ("time", "world", "body", "signals"), "signals")
     frame = (_word(data, "world", WORLD), _word(data, "body", BODY))
     signals = {}
-    with within("signals"):
+    with error_location("signals"):
         if not isinstance(data["signals"], Mapping) or not data["signals"]:
             raise BadInput("", "be a mapping of signals", data["signals"])
         for name, settings in data["signals"].items():
             if name not in SIGNALS:
                 raise BadInput(str(name), "be a known signal", "unknown", hint=did_you_mean(str(name), SIGNALS))
-            with within(str(name)):
+            with error_location(str(name)):
                 signals[name] = (_entry(name, settings, frame),)
         if {"attitude", "quaternion"} <= set(signals):
             raise BadInput("quaternion", "be left out where `attitude` is given", "given too")
@@ -114,7 +114,7 @@ def _word(data: Mapping[str, Any], key: str, allowed: tuple[str, str]) -> str:
 def _time(settings: Any) -> tuple[str, str]:
     if isinstance(settings, str):
         return settings, "s"
-    with within("time"):
+    with error_location("time"):
         _keys(settings, "", ("column", "unit"), "column")
         unit = str(settings.get("unit", "s"))
         units.seconds(unit)

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.logs.ardupilot import read_ardupilot
 from undertow.logs.csv_reader import read_csv
 from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mapping
@@ -70,7 +70,7 @@ def _mapped(recording: Recording, mapping: LogMapping | None, location: Callable
             raise BadInput("mapping", "be given", got, hint=hint)
         return log_of(recording, usual)
     signals = {name: entries for name, entries in usual.signals.items() if not _replaced(name, mapping)}
-    with within("mapping", location):
+    with error_location("mapping", location):
         _check_time(recording, mapping)
         return log_of(recording, mapping._replace(signals=signals | dict(mapping.signals)))
 

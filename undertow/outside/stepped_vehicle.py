@@ -22,7 +22,7 @@ from undertow.physics.power.esc import esc
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
-from undertow.simulation.loop.stepped import put, step_of
+from undertow.simulation.loop.stepped import compile_step, copy_into
 
 # Gravity that ArduPilot and PX4 subtract from what accelerometers measure, m/s^2.
 STANDARD_GRAVITY = 9.80665
@@ -78,7 +78,7 @@ class SteppedVehicle:
                 return (), _state_of(part, *arguments)
 
             realization, x = self.vehicle.realization, self.vehicle.state
-            self._look = step_of(look, realization, (), (zero, x, none))
+            self._look = compile_step(look, realization, (), (zero, x, none))
 
     def restart(self) -> None:
         """Go back to the start of the scenario: the same state, and the same disturbances."""
@@ -115,7 +115,7 @@ class SteppedVehicle:
         """Motion and electrical side now, with the last input still applied."""
         applied = self.vehicle.output.applied
         zero_input = np.zeros(self.plant.inputs())
-        put(self._look.inputs, (self.time, self.vehicle.state, zero_input if applied is None else applied))
+        copy_into(self._look.inputs, (self.time, self.vehicle.state, zero_input if applied is None else applied))
         self._look()
         return jax.tree.map(np.array, self._look.outputs)
 

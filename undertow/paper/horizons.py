@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from undertow.analysis.success import DEFAULT, judged
+from undertow.analysis.success import DEFAULT, evaluate_success
 from undertow.paper.running import BatchedRun
 from undertow.paper.setup import FIDELITIES, RAFC, RCAFC, equal_gain, scenario
 
@@ -61,7 +61,7 @@ def described(name: str, facts: dict[str, Any], run: BatchedRun) -> dict[str, An
     peaks = run.series["weights_peak"]
     indices = np.unique(np.geomspace(1, max(len(peaks) - 1, 1), _KEPT).round().astype(int)) if len(peaks) > 1 else [0]
     reached = [window_metrics for window_metrics in run.windows if window_metrics is not None]
-    success = judged(DEFAULT, reached[-1]) if run.lasted and reached else None
+    success = evaluate_success(DEFAULT, reached[-1]) if run.lasted and reached else None
     return facts | {
         "scenario": f"scenarios/{name}.yaml",
         "status": run.status.word,

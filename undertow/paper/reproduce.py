@@ -9,9 +9,9 @@ import xarray as xr
 
 from undertow.core.atomic_io import write_whole
 from undertow.core.json_text import to_json
-from undertow.paper import claims, drifting, examples, horizons, lag_map
+from undertow.paper import claims, drift_study, examples, horizons, lag_map
 from undertow.paper.robust_variant import chapter
-from undertow.paper.running import begin_all, begin_batches, write_all
+from undertow.paper.running import start_all, start_batches, write_all
 from undertow.paper.setup import CONTROLLERS
 from undertow.paper.thruster_response import ThrusterResponse, thruster_response
 from undertow.scenario.provenance import versions
@@ -46,9 +46,9 @@ def reproduce(folder: Path, quick: bool, progress: Callable[[str, float], None],
     named = examples.scenarios() | claims.scenarios(quick)
     batched = horizons.scenarios(quick) | lag_map.scenarios(quick) | claims.batched(quick)
     write_all(batched, folder)
-    of_paper = begin_all(named, folder, tasks)
-    of_batches = begin_batches(batched, horizons.windows(quick), 1.0, ("weights_peak",), tasks)
-    of_drift, of_chapter = drifting.begin(folder, tasks), chapter.begin(folder, quick, tasks)
+    of_paper = start_all(named, folder, tasks)
+    of_batches = start_batches(batched, horizons.windows(quick), 1.0, ("weights_peak",), tasks)
+    of_drift, of_chapter = drift_study.start_runs(folder, tasks), chapter.start_chapter(folder, quick, tasks)
     runs, long = of_paper(), of_batches()
     results = {
         "provenance": {"quick": quick, "scenarios": sorted(named | batched), **versions()},
@@ -62,7 +62,7 @@ def reproduce(folder: Path, quick: bool, progress: Callable[[str, float], None],
             "rows": horizons.table(long, quick),
         },
         "lags": lag_map.table(long, quick),
-        "drifting": drifting.shown(of_drift()),
+        "drifting": drift_study.drift_results(of_drift()),
         "claims": claims.audit(runs, long),
     }
     results["robust_variant"], chapter_runs = of_chapter()

@@ -35,7 +35,7 @@ Window = tuple[float, float]  # s
 _KEPT = ("position", "reference", "input", "uncertainty", "estimate")
 
 
-def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, ScenarioResult]]:
+def start_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], dict[str, ScenarioResult]]:
     """Begin to run named scenarios with everything that is recorded of them, those of equal programs in one batch.
 
     Writes `scenarios/<name>.yaml` and `runs/<name>.nc`.
@@ -52,12 +52,12 @@ def begin_all(scenarios: Scenarios, folder: Path, tasks: Tasks) -> Callable[[], 
     (folder / "runs").mkdir(exist_ok=True)
     # The adaptive integrator takes longest to compile, once for all of them: it begins before others are built.
     adaptive = {name: data for name, data in scenarios.items() if data["loop"].get("method") == "adaptive"}
-    pieces = [tasks.begin(f"ran {_words(adaptive)}", _one_by_one, _built(adaptive), folder)] if adaptive else []
+    pieces = [tasks.submit(f"ran {_words(adaptive)}", _one_by_one, _built(adaptive), folder)] if adaptive else []
     built = _built({name: data for name, data in scenarios.items() if name not in adaptive})
     names = list(built)
     for group in ProgramCache().groups(_recorded(built_scenario) for built_scenario in built.values()):
         group_scenarios = {names[index]: built[names[index]] for index in group.places}
-        pieces.append(tasks.begin(f"ran {_words(group_scenarios)}", _executed, group, group_scenarios, folder))
+        pieces.append(tasks.submit(f"ran {_words(group_scenarios)}", _executed, group, group_scenarios, folder))
 
     def finished() -> dict[str, ScenarioResult]:
         results = {name: result for piece in pieces for name, result in piece.result().items()}
@@ -92,12 +92,12 @@ class BatchedRun(NamedTuple):
 def run_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str]
 ) -> dict[str, BatchedRun]:
-    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `begin_batches`."""
+    """Run sampled scenarios, those of equal programs in one batch; arguments and errors of `start_batches`."""
     with worker_processes(1) as pool:
-        return begin_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
+        return start_batches(scenarios, windows, every, signals, Tasks(pool, lambda words, share: None))()
 
 
-def begin_batches(
+def start_batches(
     scenarios: Scenarios, windows: Sequence[Window], every: float, signals: Sequence[str], tasks: Tasks
 ) -> Callable[[], dict[str, BatchedRun]]:
     """Begin to run sampled scenarios, one task for each program.
@@ -120,7 +120,7 @@ def begin_batches(
     pieces = []
     for group in ProgramCache().groups(runs):
         words = _words([names[index] for index in group.places])
-        pieces.append(tasks.begin(f"ran {words}", run_group, group))
+        pieces.append(tasks.submit(f"ran {words}", run_group, group))
 
     def finished() -> dict[str, BatchedRun]:
         batches = [batch for piece in pieces for batch in piece.result()]

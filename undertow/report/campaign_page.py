@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from undertow.analysis.metrics import for_people, infinite, titled_name
+from undertow.analysis.metrics import display_units, infinite, titled_name
 from undertow.core.atomic_io import write_whole
 from undertow.core.status import Status
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
@@ -306,17 +306,17 @@ def _headed(results: Results, name: str) -> Html:
 
 def _people(results: Results, name: str) -> tuple[float, str]:
     """Factor from a metric to what people read, and its unit."""
-    return for_people(1.0, results.unit(name))
+    return display_units(1.0, results.unit(name))
 
 
 def _shown(results: Results, name: str, value: float | None) -> Html:
-    return number(None if value is None else for_people(value, results.unit(name))[0], _DIGITS)
+    return number(None if value is None else display_units(value, results.unit(name))[0], _DIGITS)
 
 
 def _spread(results: Results, name: str, quantiles: Mapping[str, float] | None) -> Html:
     if quantiles is None:
         return number(None)
     metric_unit = results.unit(name)
-    formatted = lambda value: infinite(metric_unit) if np.isinf(value) else number(for_people(value, metric_unit)[0])
+    formatted = lambda value: infinite(metric_unit) if np.isinf(value) else number(display_units(value, metric_unit)[0])
     low, middle, high = map(formatted, quantiles.values())
     return join(middle, " [", low, ", ", high, "]")

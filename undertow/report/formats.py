@@ -8,8 +8,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.analysis.metrics import for_people
-from undertow.analysis.success import DEFAULT, judged
+from undertow.analysis.metrics import display_units
+from undertow.analysis.success import DEFAULT, evaluate_success
 from undertow.report.mathml import with_symbols
 from undertow.report.page import Html, join, marked, tag, text
 
@@ -50,7 +50,7 @@ def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
     """A number with its unit; angles in degrees."""
     if value is None:
         return number(None)
-    displayed, name = for_people(value, of)
+    displayed, name = display_units(value, of)
     return join(number(displayed, digits), Html("&nbsp;"), unit(name)) if name else number(displayed, digits)
 
 
@@ -115,7 +115,7 @@ def condition(verdict: str) -> str:
 _CLASSES = {True: "holds", False: "partly", None: "open"}
 
 _WITHIN = " and ".join(
-    f"{'{:.3g} {}'.format(*for_people(most, of))} in {name}"
+    f"{'{:.3g} {}'.format(*display_units(most, of))} in {name}"
     for most, of, name in ((DEFAULT["position_rms"], "m", "position"), (DEFAULT["attitude_rms"], "rad", "attitude"))
 )
 
@@ -126,9 +126,9 @@ CRITERION = (
 )
 
 
-def within(steady: Mapping[str, Any] | None) -> bool | None:
+def meets_default_criterion(steady: Mapping[str, Any] | None) -> bool | None:
     """Whether the metrics of a steady window keep to the default criterion; None without any, as in a failed run."""
-    verdict = judged(DEFAULT, steady) if steady else None
+    verdict = evaluate_success(DEFAULT, steady) if steady else None
     return verdict and verdict.within
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import display_units
 from undertow.report.figures.prediction import force_label, prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
@@ -210,7 +210,7 @@ def _metrics(prediction: Prediction) -> PredictionTable:
     metrics = prediction.operating_point.built.known_metrics()
     rows = []
     for name, value in (prediction.metrics or {}).items():
-        displayed, unit = for_people(value, metrics[name].unit)
+        displayed, unit = display_units(value, metrics[name].unit)
         rows.append((name, _number(displayed), unit))
     return PredictionTable(
         "Predicted metrics of the steady window",

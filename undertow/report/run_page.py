@@ -44,7 +44,7 @@ class RunPageContents(NamedTuple):
     failures: list[str]  # a sentence for each part that could not be made
 
 
-def shown(result: RunResult, plotted: Callable[[], Plotted]) -> RunPageContents:
+def page_contents(result: RunResult, plotted: Callable[[], Plotted]) -> RunPageContents:
     """What the page of a run shows. A failed part affects neither the others nor the results.
 
     Args:

@@ -5,7 +5,7 @@ from math import isinf
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from undertow.analysis.metrics import for_people, infinite
+from undertow.analysis.metrics import display_units, infinite
 from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core.metric import Metric
 
@@ -45,7 +45,7 @@ def metrics_rows(
             displayed = lambda values, name=name, metric=metric: _measured(values[name], metric.unit)
             predicted_cell = [displayed(predicted) if name in predicted else ""] if predicted else []
             steady_cell = displayed(steady) if steady and name in steady else "-"
-            rows.append((name, *predicted_cell, steady_cell, displayed(whole_run), for_people(0.0, metric.unit)[1]))
+            rows.append((name, *predicted_cell, steady_cell, displayed(whole_run), display_units(0.0, metric.unit)[1]))
     head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
     return RunTable("Metrics", head, rows, meanings={name: metrics[name].meaning for name, *_ in rows})
 
@@ -59,7 +59,7 @@ def prediction_rows(
         unit = metrics[comparison.name].unit
         cells = (_measured(value, unit) for value in (comparison.predicted, comparison.measured))
         departure = "-" if isinf(comparison.departure) else f"{100 * comparison.departure:.0f} %"
-        rows.append((comparison.name, *cells, departure, for_people(0.0, unit)[1]))
+        rows.append((comparison.name, *cells, departure, display_units(0.0, unit)[1]))
     return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
 
 
@@ -208,7 +208,7 @@ def _share(value: float | None) -> str:
 
 def _measured(value: float | None, unit: str) -> str | float:
     """A metric as people read it, or the word for an infinite one, which is null in a result file."""
-    return infinite(unit) if value is None or isinf(value) else for_people(value, unit)[0]
+    return infinite(unit) if value is None or isinf(value) else display_units(value, unit)[0]
 
 
 def plain(value: str | float) -> str:

@@ -30,10 +30,10 @@ from undertow.core.contracts import (
     AbstractReference,
     Model,
 )
-from undertow.core.errors import Advice, BadInput, advice, within
+from undertow.core.errors import Advice, BadInput, advice, error_location
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rounding import three_digits
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario import factory
 from undertow.scenario.consistency import (
@@ -45,7 +45,7 @@ from undertow.scenario.consistency import (
     check_window,
     rounded_times,
 )
-from undertow.scenario.faulted import faulted, without_faults
+from undertow.scenario.fault_injection import with_faults, without_faults
 from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
@@ -90,7 +90,7 @@ class Built(NamedTuple):
     @in_its_precision
     def advice(self) -> tuple[Advice, ...]:
         """Warnings about a scenario that can be run."""
-        with within(location=self.text.location):
+        with error_location(location=self.text.location):
             return tuple(self._advised())
 
     def _advised(self) -> Iterator[Advice]:
@@ -169,7 +169,7 @@ def build_scenario(scenario: Scenario, text: Text, part_cache: PartCache | None 
     Raises:
         BadInput: the scenario is invalid; the error names key path and location.
     """
-    with runtime.on_processor(), within(location=text.location, written=text.as_written):
+    with runtime.on_processor(), error_location(location=text.location, written=text.as_written):
         with runtime.in_precision("float64"):
             built = _build(text, scenario, part_cache or PartCache())
         with runtime.in_precision(scenario.precision):
@@ -199,7 +199,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     def make_part(key: str, where: str, part: Part, leading_arguments: tuple = ()) -> tuple[Any, dict[str, Any]]:
         described = {"part": part.model_dump(), "context": context}
         new = lambda: factory.make(KIND_OF[key], described["part"], text.folder, leading_arguments, context)
-        with within(where):
+        with error_location(where):
             return part_cache.part(where, described, leading_arguments, new)
 
     def disturbance() -> AbstractDisturbance:
@@ -238,7 +238,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         described["follow"] = True
     options = scenario.model.options
     make_model = lambda: factory.call(nominal.model, options, folder=text.folder)
-    with within("model"):
+    with error_location("model"):
         model, of_model = part_cache.part("model", options, (nominal,), make_model)
     resolved["model"] = of_model | described
     if "sensors" in (scenario.navigation.model_extra or {}):  # a filter of readings
@@ -252,17 +252,17 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         controller = supervised(scenario.supervisor, controller)
     loop = ClosedLoop(plant, controller, make("reference"), disturbance(), navigation)
     resolved["navigation"] = resolved.pop("navigation")  # in the order of the scenario
-    with within("faults"):
-        loop, entries = faulted(loop, scenario.faults, text.folder, scenario.loop.dt)
+    with error_location("faults"):
+        loop, entries = with_faults(loop, scenario.faults, text.folder, scenario.loop.dt)
     if entries:
         resolved["faults"] = entries
-    with within("loop"):
+    with error_location("loop"):
         if scenario.loop.kind == "continuous":
             continuous.check(loop)
         check_times(scenario.loop)
-    with within("steady"):
+    with error_location("steady"):
         check_window(scenario.steady, scenario.loop)
-    with within("initial"):
+    with error_location("initial"):
         check_start(loop, scenario.initial)
     part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))
     described_metrics = [make_part("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
@@ -272,9 +272,9 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     placed = loop.starting_at(scenario.initial.position)
     code = code_hashes(resolved, Path())  # its paths are absolute
     built = Built(placed, scenario, resolved, metrics, text, loop.reference, code)
-    with within("controller.signals"):
+    with error_location("controller.signals"):
         loop.signals()
-    with within("success"):
+    with error_location("success"):
         criterion = criterion_of(scenario.success, built.known_metrics())
     resolved["success"] = criterion
     if not scenario.requirements:
@@ -282,7 +282,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     resolved["requirements"] = {
         name: requirement.model_dump(exclude_none=True) for name, requirement in scenario.requirements.items()
     }
-    with within("requirements"):
+    with error_location("requirements"):
         return built._replace(requirements=_required(built))
 
 

@@ -13,8 +13,8 @@ from jax.typing import ArrayLike
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractNavigation, AbstractPlant, Load, Target
-from undertow.core.errors import Advice, BadInput, advice, joined, within
-from undertow.core.returned import check_state, form
+from undertow.core.errors import Advice, BadInput, advice, error_location, joined
+from undertow.core.return_checks import check_state, form
 from undertow.core.signals import check_declared
 from undertow.core.user_code import RAISED, fault_of
 from undertow.scenario.schema import ClosedLoopSettings, Initial, Window
@@ -205,7 +205,7 @@ def _part(key: str, user_parts: Mapping[str, str]) -> Iterator[Callable[..., Any
             )
             raise BadInput("", "", message, hint=joined(fault.hint, remedy)) from error
 
-    with within(key):
+    with error_location(key):
         yield traced
 
 

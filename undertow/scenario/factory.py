@@ -13,7 +13,7 @@ import numpy as np
 from undertow.core import catalogue, checks, contracts
 from undertow.core.arrays import as_array
 from undertow.core.composite_model import parts_of
-from undertow.core.errors import BadInput, joined, known_key, within
+from undertow.core.errors import BadInput, error_location, joined, known_key
 from undertow.core.metric import AbstractMetric
 from undertow.core.user_code import RAISED, fault_of, place_of
 from undertow.logs.log import Log
@@ -189,7 +189,7 @@ def adjust(part: Any, changes: Mapping[str, Any], options: Sequence[str] = ()) -
         if isinstance(values[key], eqx.Module):
             if not isinstance(change, Mapping):
                 raise BadInput(key, "be a mapping of parameters", change)
-            with within(key):
+            with error_location(key):
                 values[key] = adjust(values[key], change)
         else:
             number: Any = checked(key, change, None, 0.0)
@@ -334,7 +334,7 @@ def _law_of_each(
     for part in parts_of(leading_arguments[0])[0]:
         after = before + len(part.coordinates.angles)
         part_context = {key: value[before:after] if np.ndim(value) else value for key, value in context.items()}
-        with within(_LAW):
+        with error_location(_LAW):
             described_laws.append(make("controllers", description, folder, (part,), part_context))
         before = after
     # What differs between the subsystems follows from the rest of the scenario each time that it is built.
@@ -352,7 +352,7 @@ def _at(
         description = {**default, **description}
     elif not isinstance(description, str):
         raise BadInput(name, "be a name, or a mapping with `kind` and options", description)
-    with within(name):
+    with error_location(name):
         return make(kind, description, folder or Path())
 
 
@@ -379,7 +379,7 @@ def _samples(
         if rows_of_log is None:
             options["csv"] = read_csv(folder / name)
         else:
-            with within(written=lambda key: "file" if key == "log" else key):
+            with error_location(written=lambda key: "file" if key == "log" else key):
                 options["csv"] = csv_of(rows_of_log(read_log(name, options.pop("mapping", None), folder)))
     else:
         name = "csv"

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.logs.log import Log
 from undertow.logs.mapping import mapping_of
 from undertow.logs.read import read_log as read_mapped
@@ -38,7 +38,7 @@ def read_log(
 
 def _read(path: Path, mapping: Any, location: Callable[[str], str]) -> Log:
     """The log; errors about columns name the key of the mapping that names them."""
-    with within("mapping", location):
+    with error_location("mapping", location):
         checked_mapping = mapping_of(mapping)
     return read_mapped(path, checked_mapping, location)
 

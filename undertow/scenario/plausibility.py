@@ -15,9 +15,9 @@ from jaxtyping import Float
 from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
-from undertow.physics.disturbances.adding import SumOfDisturbances
 from undertow.physics.disturbances.current import Current
 from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurrent
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.surface import stated_depths
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean

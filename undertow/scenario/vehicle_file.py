@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
@@ -33,7 +33,7 @@ class VehicleFile(NamedTuple):
         Raises:
             BadInput: numbers that cannot be a vehicle's, with their place in the file.
         """
-        with within(location=_location(self.text, self.changed)):
+        with error_location(location=_location(self.text, self.changed)):
             return self.data.vehicle()
 
 
@@ -66,7 +66,7 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}
     changed = frozenset(changes)
-    with within(location=_location(text, changed)):
+    with error_location(location=_location(text, changed)):
         return VehicleFile(parse(contents), contents, text, changed)
 
 

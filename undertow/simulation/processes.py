@@ -103,11 +103,11 @@ class Tasks:
 
     def __init__(self, pool: Executor, progress: Callable[[str, float], None]):
         self._pool, self._progress = pool, progress
-        self._begun, self._done, self._lock = 0, 0, threading.Lock()
+        self._submitted, self._done, self._lock = 0, 0, threading.Lock()
 
-    def begin(self, words: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    def submit(self, words: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Begin a task: a function of a module, with arguments and a result that can be pickled."""
-        self._begun += 1
+        self._submitted += 1
         future = self._pool.submit(function, *arguments)
         future.add_done_callback(lambda ended: self._show(words, ended))
         return future
@@ -116,7 +116,7 @@ class Tasks:
         with self._lock:
             self._done += 1
             if not ended.cancelled() and ended.exception() is None:
-                self._progress(words, self._done / self._begun)
+                self._progress(words, self._done / self._submitted)
 
 
 @contextlib.contextmanager

@@ -66,7 +66,7 @@ def parse_formula(text: str, names: FormulaNames) -> Formula:
     """A formula from its text.
 
     Raises:
-        BadInput: the text is no formula, or it names what is no signal; without a name, which `within` adds.
+        BadInput: the text is no formula, or it names what is no signal; without a name, which `error_location` adds.
     """
     reader = _Reader(text, names)
     formula = reader.formula()

@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.analysis.temporal.formula import Arithmetic, Formula
 from undertow.analysis.temporal.parsing import Entries, FormulaNames, parse_formula
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.core.metric import Metric
 from undertow.core.status import Status
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -78,7 +78,7 @@ def requirements_of(
     requirements = []
     names = known_of(loop)
     for name, text in formulas.items():
-        with within(f"{name}.formula"):
+        with error_location(f"{name}.formula"):
             formula = parse_formula(text, names)
             if formula.horizon() > duration:
                 raise BadInput("", f"begin before the end of the run ({duration:g} s)", f"{formula.horizon():g} s")
@@ -90,7 +90,7 @@ def requirements_of(
     return tuple(requirements)
 
 
-def judged(
+def evaluate_requirements(
     requirements: Sequence[Requirement],
     signals: Mapping[str, Any],
     period: float,

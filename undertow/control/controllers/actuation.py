@@ -56,7 +56,7 @@ class ActuatedState(NamedTuple):
 class ActuationResult(NamedTuple):
     """What the applied input gives."""
 
-    known: PerAxis  # modelled acceleration F + G f, m/s^2, rad/s^2
+    modelled: PerAxis  # modelled acceleration F + G f, m/s^2, rad/s^2
     missing: PerAxis  # acceleration that the actuators are driven to, less the demanded one: what limits take, and
     # along directions in which no actuator acts all of it
     share: Float[Array, ""]  # of the demanded acceleration, along its direction, 0 to 1
@@ -66,23 +66,25 @@ class ActuationDecisions(NamedTuple):
     """Decisions of one instant."""
 
     actuators: Any
-    off: TrackingError
+    tracking_error: TrackingError
     desired: PerAxis  # of the actuators: the demanded acceleration less what the model compensates
     forces: Float[Array, " m"]  # for that, without limits
     signals: dict[str, Array]
 
 
 class AbstractAccelerationLaw(AbstractController):
-    """A law given by the acceleration that it demands: `begin`, `demand` and `adapt`."""
+    """A law given by the acceleration that it demands: `init_law`, `acceleration` and `update`."""
 
     actuation: eqx.AbstractVar[Actuation]
 
     @abc.abstractmethod
-    def begin(self, y: Measurement, r: Target) -> PyTree:
+    def init_law(self, y: Measurement, r: Target) -> PyTree:
         """State of the law itself before the first measurement is used."""
 
     @abc.abstractmethod
-    def demand(self, state: PyTree, y: Measurement, tracking_error: TrackingError) -> tuple[PerAxis, dict[str, Array]]:
+    def acceleration(
+        self, state: PyTree, y: Measurement, tracking_error: TrackingError
+    ) -> tuple[PerAxis, dict[str, Array]]:
         """Acceleration, m/s^2 and rad/s^2, and the values of the law's signals.
 
         Args:
@@ -92,7 +94,7 @@ class AbstractAccelerationLaw(AbstractController):
         """
 
     @abc.abstractmethod
-    def adapt(
+    def update(
         self,
         state: PyTree,
         y: Measurement,
@@ -104,7 +106,7 @@ class AbstractAccelerationLaw(AbstractController):
 
     def init(self, y: Measurement, r: Target) -> ActuatedState:
         smoothing = None if self.actuation.filter is None else self.actuation.filter.init(y.position)
-        return ActuatedState(self.begin(y, r), self._actuators().init(), smoothing)
+        return ActuatedState(self.init_law(y, r), self._actuators().init(), smoothing)
 
     def command(self, z: ActuatedState, y: Measurement, r: Target):
         path, plan, actuators, effect = self.actuation, self._plan(z, y, r), self._actuators(), self._effect(y)
@@ -122,7 +124,7 @@ class AbstractAccelerationLaw(AbstractController):
         missing = matvec(effect, actual - intended + plan.forces) - plan.desired
         coordinates = self.model.coordinates
         return ActuatedState(
-            law=self.adapt(z.law, y, plan.off, ActuationResult(modelled, missing, share), dt),
+            law=self.update(z.law, y, plan.tracking_error, ActuationResult(modelled, missing, share), dt),
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=None if path.filter is None else path.filter.advance(z.filter, r, coordinates, share, dt),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         )
@@ -156,7 +158,7 @@ class AbstractAccelerationLaw(AbstractController):
         smoothing = self.actuation.filter
         target = r if smoothing is None else smoothing.smoothed(z.filter, r, coordinates)  # pyright: ignore[reportArgumentType] - a law with a filter has its state
         tracking_error = coordinates.tracking_error(y, target)
-        acceleration, signals = self.demand(z.law, y, tracking_error)
+        acceleration, signals = self.acceleration(z.law, y, tracking_error)
         desired = acceleration - self._compensated(y, tracking_error)
         estimated = self._actuators().update_from_report(z.actuators, y.actuator)
         return ActuationDecisions(estimated, tracking_error, desired, dynamics.invert(y, desired), signals)

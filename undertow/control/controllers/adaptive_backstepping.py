@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import Axis, LoopTransfer, alike, axes_of, best_frequency
+from undertow.control.controllers.bandwidths import Axis, LoopTransfer, axes_of, best_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -73,14 +73,14 @@ class AdaptiveBackstepping(AbstractAccelerationLaw):
         checks.not_negative("adaptation", self.adaptation, "1/s^2")
         checks.not_negative("lag", self.lag, "s")
 
-    def begin(self, y: Measurement, r: Target) -> BacksteppingState:
+    def init_law(self, y: Measurement, r: Target) -> BacksteppingState:
         still = jnp.zeros_like(y.position)
         return BacksteppingState(still, still)
 
-    def demand(self, state: BacksteppingState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: BacksteppingState, y: Measurement, tracking_error: TrackingError):
         return self._steps(state, tracking_error).demand, {"estimate": state.load}
 
-    def adapt(
+    def update(
         self, state: BacksteppingState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> BacksteppingState:
         errors = self._steps(state, tracking_error)
@@ -162,9 +162,9 @@ def adaptive_backstepping(
     checks.not_negative("lag", actuator_lag, "s")
     lagged = actuator_lag >= _SHORT * conditions.sampling_time
     if rate is None:
-        rate = alike([backstepping_rate(axis, actuator_lag if lagged else None) for axis in axes])
+        rate = scalar_if_uniform([backstepping_rate(axis, actuator_lag if lagged else None) for axis in axes])
     if bound is None:
-        bound = alike([axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
+        bound = scalar_if_uniform([axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
     checks.per_axis("rate", rate, len(axes))
     checks.positive("rate", rate)
     c = jnp.asarray(rate, dtype=float)

@@ -43,17 +43,17 @@ class ADRC(AbstractAccelerationLaw):
     def __check_init__(self):
         check_second_order_gains(self.bandwidth, self.damping, self.feedback, len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> ExtendedStateObserverState:
+    def init_law(self, y: Measurement, r: Target) -> ExtendedStateObserverState:
         rates = self.model.coordinates.velocity(y)
         return ExtendedStateObserverState(rates, jnp.zeros_like(rates))
 
-    def demand(self, state: ExtendedStateObserverState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: ExtendedStateObserverState, y: Measurement, tracking_error: TrackingError):
         error, rate, acceleration = tracking_error
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
         signals = {"estimate": state.estimate, "modelling_error": state.rates - self.model.coordinates.velocity(y)}
         return feedback - state.estimate, signals
 
-    def adapt(
+    def update(
         self,
         state: ExtendedStateObserverState,
         y: Measurement,
@@ -63,7 +63,7 @@ class ADRC(AbstractAccelerationLaw):
     ) -> ExtendedStateObserverState:
         eps = state.rates - self.model.coordinates.velocity(y)
         return ExtendedStateObserverState(
-            state.rates + dt * (actuation.known + state.estimate - 2 * self.damping * self.bandwidth * eps),
+            state.rates + dt * (actuation.modelled + state.estimate - 2 * self.damping * self.bandwidth * eps),
             state.estimate - dt * self.bandwidth**2 * eps,
         )
 

@@ -149,7 +149,7 @@ def _actuation(
     return None if time_constants is None else jnp.max(time_constants), actuators.max_bandwidth(fastest), forces
 
 
-def alike(values: Sequence[float]):
+def scalar_if_uniform(values: Sequence[float]):
     """One number where all axes have the same value."""
     return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
 
@@ -174,7 +174,7 @@ def robust_bandwidths(axis: Axis, order: int = 2) -> Bandwidths:
     return Bandwidths(*(float(rate[best, 0]) for rate in (actuators, bandwidth, tracking)))
 
 
-def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: int = 2):
+def default_bandwidths(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: int = 2):
     """Bandwidth and tracking (one entry per axis) and actuator rate, each chosen if not given, rad/s and 1/s.
 
     Args:
@@ -190,7 +190,7 @@ def completed(axes: Sequence[Axis], bandwidth, tracking, actuator_rate, order: i
         if value is not None:
             checks.positive(name, value, "rad/s")
     rates, *of_axes = zip(*(robust_bandwidths(axis, order) for axis in axes), strict=True)
-    default = Bandwidths(max(rates), *(alike(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
+    default = Bandwidths(max(rates), *(scalar_if_uniform(values) for values in of_axes))  # pyright: ignore[reportArgumentType] - one number or one per axis
     if bandwidth is None:
         rate, bandwidth, beside = default
     else:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.control.controllers.actuation import actuation_for
-from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.control.controllers.bandwidths import axes_of, pid_frequency, scalar_if_uniform
 from undertow.control.controllers.cascade_law import Cascade
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -61,7 +61,7 @@ def placed(
     model = model.in_body_axes()
     if any(gain is None for gain in (outer, inner, integral)):
         axes = axes_of(model, conditions)
-        w = jnp.asarray(alike([pid_frequency(axis) for axis in axes]), dtype=float)
+        w = jnp.asarray(scalar_if_uniform([pid_frequency(axis) for axis in axes]), dtype=float)
         outer = _OUTER_SHARE * w if outer is None else outer
         inner = 2 * w if inner is None else inner
         integral = 0.1 / _OUTER_SHARE * w**2 if integral is None else integral

@@ -56,18 +56,18 @@ class Cascade(AbstractAccelerationLaw):
         for name in (*gains, *optional_gains, *limits):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> CascadeState:
+    def init_law(self, y: Measurement, r: Target) -> CascadeState:
         still = jnp.zeros_like(y.position)
         return CascadeState(still, still, jnp.zeros(()))
 
-    def demand(self, state: CascadeState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: CascadeState, y: Measurement, tracking_error: TrackingError):
         error = self._rate_error(tracking_error)
         step = jnp.where(state.elapsed > 0, state.elapsed, 1.0)
         slope = jnp.where(state.elapsed > 0, self._new(state) * (error - state.smooth) / step, 0.0)
         demanded = tracking_error.acceleration + self.inner * error + state.integral + self.derivative * slope
         return jnp.clip(demanded, -self.limit, self.limit), {"estimate": -state.integral}
 
-    def adapt(
+    def update(
         self, state: CascadeState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> CascadeState:
         """Anti-windup of the integral by back-calculation, with the time constant of `pid`."""

@@ -50,15 +50,15 @@ class DisturbanceObserver(AbstractAccelerationLaw):
             checks.positive(name, getattr(self, name))
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> DisturbanceObserverState:
+    def init_law(self, y: Measurement, r: Target) -> DisturbanceObserverState:
         velocity = self.model.coordinates.velocity(y)
         return DisturbanceObserverState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
-    def demand(self, state: DisturbanceObserverState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: DisturbanceObserverState, y: Measurement, tracking_error: TrackingError):
         estimate = self._estimate(state, y)
         return pole_placement(tracking_error, self.tracking, self.damping) - estimate, {"estimate": estimate}
 
-    def adapt(
+    def update(
         self,
         state: DisturbanceObserverState,
         y: Measurement,
@@ -68,7 +68,7 @@ class DisturbanceObserver(AbstractAccelerationLaw):
     ) -> DisturbanceObserverState:
         estimate = self._estimate(state, y)
         return DisturbanceObserverState(
-            self.model.coordinates.velocity(y) + dt * (actuation.known + estimate), estimate, dt
+            self.model.coordinates.velocity(y) + dt * (actuation.modelled + estimate), estimate, dt
         )
 
     def signals(self):

@@ -22,8 +22,8 @@ class INDIState(NamedTuple):
 
     velocity: PerAxis
     acceleration: PerAxis  # its derivative
-    known: PerAxis
-    known_rate: PerAxis
+    modelled: PerAxis
+    modelled_rate: PerAxis
 
 
 class INDI(AbstractAccelerationLaw):
@@ -45,25 +45,27 @@ class INDI(AbstractAccelerationLaw):
     def __check_init__(self):
         check_second_order_gains(self.bandwidth, self.damping, self.feedback, len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> INDIState:
+    def init_law(self, y: Measurement, r: Target) -> INDIState:
         rates = self.model.coordinates.velocity(y)
         zero = jnp.zeros_like(rates)
         return INDIState(rates, zero, zero, zero)
 
-    def demand(self, state: INDIState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: INDIState, y: Measurement, tracking_error: TrackingError):
         error, rate, acceleration = tracking_error
-        missing = state.acceleration - state.known
+        missing = state.acceleration - state.modelled
         feedback = acceleration + self.feedback[..., 0] * error + self.feedback[..., 1] * rate
         signals = {"estimate": missing, "modelling_error": state.velocity - self.model.coordinates.velocity(y)}
         return feedback - missing, signals
 
-    def adapt(
+    def update(
         self, state: INDIState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> INDIState:
         velocity, acceleration = self._filtered(
             state.velocity, state.acceleration, self.model.coordinates.velocity(y), dt
         )
-        return INDIState(velocity, acceleration, *self._filtered(state.known, state.known_rate, actuation.known, dt))
+        return INDIState(
+            velocity, acceleration, *self._filtered(state.modelled, state.modelled_rate, actuation.modelled, dt)
+        )
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
+from undertow.control.controllers.bandwidths import LoopTransfer, axes_of, best_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -56,15 +56,15 @@ class IntegralSlidingMode(AbstractAccelerationLaw):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
             checks.positive(name, getattr(self, name))
 
-    def begin(self, y: Measurement, r: Target) -> SlidingState:
+    def init_law(self, y: Measurement, r: Target) -> SlidingState:
         return SlidingState(jnp.zeros_like(y.position), jnp.zeros(()))
 
-    def demand(self, state: SlidingState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: SlidingState, y: Measurement, tracking_error: TrackingError):
         surface, switching = self._surface(state, tracking_error)
         demanded = tracking_error.acceleration + self._nominal(tracking_error) + switching
         return demanded, {"estimate": -switching, "surface": surface}
 
-    def adapt(
+    def update(
         self, state: SlidingState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> SlidingState:
         integral = jnp.where(state.begun > 0, state.integral, -tracking_error.rate)
@@ -110,9 +110,11 @@ def integral_sliding_mode(
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
     if frequency is None:
-        frequency = alike([best_frequency(axis, _inside_the_layer) for axis in axes])
+        frequency = scalar_if_uniform([best_frequency(axis, _inside_the_layer) for axis in axes])
     if amplitude is None:
-        amplitude = alike([_SHARE * axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
+        amplitude = scalar_if_uniform(
+            [_SHARE * axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes]
+        )
     for name, value in (("frequency", frequency), ("amplitude", amplitude)):
         checks.per_axis(name, value, len(axes))
         checks.positive(name, value)

@@ -60,25 +60,25 @@ class L1Adaptive(AbstractAccelerationLaw):
             checks.positive(name, getattr(self, name))
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> PredictorState:
+    def init_law(self, y: Measurement, r: Target) -> PredictorState:
         velocity = self.model.coordinates.velocity(y)
         return PredictorState(velocity, jnp.zeros_like(velocity), jnp.zeros(()))
 
-    def demand(self, state: PredictorState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: PredictorState, y: Measurement, tracking_error: TrackingError):
         adapted = self._adapted(state, y)
         return pole_placement(tracking_error, self.tracking, self.damping) - adapted.filtered, {
             "estimate": adapted.filtered,
             "modelling_error": adapted.error,
         }
 
-    def adapt(
+    def update(
         self, state: PredictorState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> PredictorState:
         adapted = self._adapted(state, y)
         velocity = self.model.coordinates.velocity(y)
         decayed = -jnp.expm1(-self.predictor * dt)
         correction = (1 - decayed) * adapted.error + decayed / self.predictor * adapted.uncertainty
-        return PredictorState(velocity + dt * actuation.known + correction, adapted.filtered, dt)
+        return PredictorState(velocity + dt * actuation.modelled + correction, adapted.filtered, dt)
 
     def signals(self):
         return ESTIMATE | MODELLING_ERROR | ATTAINED_SHARE

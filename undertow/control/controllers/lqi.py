@@ -10,7 +10,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import Axis, LoopTransfer, alike, axes_of, bandwidth_grid, best_frequency
+from undertow.control.controllers.bandwidths import (
+    Axis,
+    LoopTransfer,
+    axes_of,
+    bandwidth_grid,
+    best_frequency,
+    scalar_if_uniform,
+)
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -63,23 +70,23 @@ class LQI(AbstractAccelerationLaw):
         checks.not_negative("lag", self.lag, "s")
         checks.positive("sampling_time", self.sampling_time, "s")
 
-    def begin(self, y: Measurement, r: Target) -> LQIState:
+    def init_law(self, y: Measurement, r: Target) -> LQIState:
         return LQIState(jnp.zeros_like(y.position), jnp.zeros_like(y.position))
 
-    def demand(self, state: LQIState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: LQIState, y: Measurement, tracking_error: TrackingError):
         error, rate, acceleration = tracking_error
         _, of_error, of_rate, of_acceleration = jnp.moveaxis(self.gains, -1, 0)
         demanded = acceleration + of_error * error + of_rate * rate + state.integral
         demanded = demanded - of_acceleration * (state.acceleration - acceleration)
         return demanded, {"estimate": -state.integral / (1 + of_acceleration)}
 
-    def adapt(
+    def update(
         self, state: LQIState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> LQIState:
         """State one sampling time later; what limits take away is given back to the integral, as in `pid`."""
         of_integral, _, of_rate, _ = jnp.moveaxis(self.gains, -1, 0)
         back_calculation = jnp.minimum(jnp.sqrt(of_integral / of_rate), 1 / dt) * actuation.missing
-        demanded, _ = self.demand(state, y, tracking_error)
+        demanded, _ = self.acceleration(state, y, tracking_error)
         lag_share = -jnp.expm1(-dt / jnp.maximum(self.lag, _LEAST_LAG))
         return LQIState(
             state.integral + dt * (of_integral * tracking_error.error + back_calculation),
@@ -169,7 +176,7 @@ def lqi(
     if frequency is None:
         weights_and_lag = ((integral_weight, _INTEGRAL), (rate_weight, _RATE), (actuator_lag, 0.0))
         nominal = [float(np.max(value)) if checks.known(value) else usual for value, usual in weights_and_lag]
-        frequency = alike([lqi_frequency(axis, *nominal) for axis in axes])
+        frequency = scalar_if_uniform([lqi_frequency(axis, *nominal) for axis in axes])
     for name, value in (("frequency", frequency), ("integral_weight", integral_weight), ("rate_weight", rate_weight)):
         checks.per_axis(name, value, len(axes))
         checks.positive(name, value)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
+from undertow.control.controllers.bandwidths import LoopTransfer, axes_of, best_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.tracking_error import pole_placement
@@ -74,17 +74,17 @@ class MRAC(AbstractAccelerationLaw):
             least = float(np.max(self.filter_ratio)) / 2
             raise BadInput("damping", f"be more than {least:g}, half of `filter_ratio`", float(np.min(self.damping)))
 
-    def begin(self, y: Measurement, r: Target) -> AdaptiveState:
+    def init_law(self, y: Measurement, r: Target) -> AdaptiveState:
         still = jnp.zeros_like(y.position)
         return AdaptiveState(jnp.zeros((still.size, 4)), still, still, jnp.zeros(()))
 
-    def demand(self, state: AdaptiveState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: AdaptiveState, y: Measurement, tracking_error: TrackingError):
         nominal, basis = self._basis(y, tracking_error)
         adapted = (state.parameters * basis).sum(-1)
         model_error = jnp.where(state.begun > 0, tracking_error.error - state.error, 0.0)
         return nominal - adapted, {"estimate": adapted, "model_error": model_error}
 
-    def adapt(
+    def update(
         self, state: AdaptiveState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> AdaptiveState:
         """State one sampling time later; the reference model is sampled as a double integrator is.
@@ -160,9 +160,9 @@ def mrac(
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
     if frequency is None:
-        frequency = alike([best_frequency(axis, _load_alone) for axis in axes])
+        frequency = scalar_if_uniform([best_frequency(axis, _load_alone) for axis in axes])
     if bound is None:
-        bound = alike([axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
+        bound = scalar_if_uniform([axis.authority if np.isfinite(axis.authority) else _UNLIMITED for axis in axes])
     for name, value in (("frequency", frequency), ("bound", bound)):
         checks.per_axis(name, value, len(axes))
         checks.positive(name, value)

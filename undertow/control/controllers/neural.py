@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.control.controllers.bandwidths import axes_of, pid_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE, ROBUST_TERM
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -75,10 +75,10 @@ class Neural(AbstractAccelerationLaw):
         for name in ("slope", "gain", "adaptation"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> NetworkWeights:
+    def init_law(self, y: Measurement, r: Target) -> NetworkWeights:
         return NetworkWeights(jnp.zeros((self.start.shape[1] + 1, y.position.shape[0])), self.start)
 
-    def demand(self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError):
         network = self._evaluate(state, y, tracking_error)
         learned = state.output[0] + matvec(state.output[1:].T, network.layer)
         robust = self.robust_gain * (network.size + self.weights_bound) * network.filtered
@@ -86,7 +86,7 @@ class Neural(AbstractAccelerationLaw):
         demanded = feedback + learned + robust
         return demanded, {"estimate": -learned, "robust_term": robust, "weights_size": network.size}
 
-    def adapt(
+    def update(
         self, state: NetworkWeights, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> NetworkWeights:
         network = self._evaluate(state, y, tracking_error)
@@ -160,7 +160,7 @@ def neural(
     model = model.in_body_axes()
     if slope is None or gain is None:
         axes = axes_of(model, conditions)
-        w = alike([pid_frequency(axis) for axis in axes])
+        w = scalar_if_uniform([pid_frequency(axis) for axis in axes])
         slope, gain = w if slope is None else slope, w if gain is None else gain
     for name, value in (("slope", slope), ("gain", gain)):
         checks.positive(name, value, "1/s")

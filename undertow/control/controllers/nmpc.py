@@ -64,14 +64,14 @@ class NMPC(AbstractAccelerationLaw):
         for name in ("bandwidth", "tracking"):
             checks.per_axis(name, getattr(self, name), len(self.model.coordinates.angles))
 
-    def begin(self, y: Measurement, r: Target) -> PlannedState:
+    def init_law(self, y: Measurement, r: Target) -> PlannedState:
         velocity = self.model.coordinates.velocity(y)
         still, inputs = jnp.zeros_like(velocity), self.model.dynamics.gain(y).shape[1]
         start = jnp.concatenate([still, still])
         plan = Improved(jnp.zeros((self.steps, inputs)), start, jnp.zeros((inputs, start.shape[0])))
         return PlannedState(plan, still, velocity, still, jnp.zeros(()))
 
-    def demand(self, state: PlannedState, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: PlannedState, y: Measurement, tracking_error: TrackingError):
         dynamics, estimate, horizon = self.model.dynamics, self._estimate(state, y), self._horizon(y)
         error_state = jnp.concatenate([tracking_error.error, tracking_error.rate])
         force = state.plan.forces[0] + matvec(state.plan.gain, error_state - state.plan.start)
@@ -85,7 +85,7 @@ class NMPC(AbstractAccelerationLaw):
         usable = (state.elapsed > 0) & jnp.isfinite(planned).all()
         return jnp.where(usable, planned, fallback), {"estimate": estimate}
 
-    def adapt(
+    def update(
         self, state: PlannedState, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> PlannedState:
         """The plan, moved on by dt and improved from the measured state; made anew where it was not finite."""
@@ -99,7 +99,7 @@ class NMPC(AbstractAccelerationLaw):
         motion = self._motion(y, tracking_error, estimate)
         iterate = lambda plan, _: (improved(motion, horizon, start, plan.forces), None)
         plan, _ = jax.lax.scan(iterate, state.plan._replace(forces=warm_start, start=start), None, self.iterations)
-        predicted = self.model.coordinates.velocity(y) + dt * (actuation.known + estimate)
+        predicted = self.model.coordinates.velocity(y) + dt * (actuation.modelled + estimate)
         return PlannedState(plan, tracking_error.acceleration, predicted, estimate, dt)
 
     def signals(self):

@@ -6,7 +6,7 @@ from typing import Any
 import jax.numpy as jnp
 
 from undertow.control.controllers.actuation import Actuation, actuation_for
-from undertow.control.controllers.bandwidths import axes_of, completed
+from undertow.control.controllers.bandwidths import axes_of, default_bandwidths
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
@@ -28,7 +28,7 @@ def gains_and_path(
         BadInput: a value is out of its range.
     """
     axes = axes_of(model, conditions)
-    bandwidth, tracking, actuator_rate = completed(axes, *gains, actuation.actuator_rate, order=order)
+    bandwidth, tracking, actuator_rate = default_bandwidths(axes, *gains, actuation.actuator_rate, order=order)
     path_options = dataclasses.replace(actuation, actuator_rate=actuator_rate)
     return bandwidth, tracking, actuation_for(conditions.sampling_time, tracking, path_options)
 

@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import alike, axes_of, pid_frequency
+from undertow.control.controllers.bandwidths import axes_of, pid_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -43,15 +43,15 @@ class PID(AbstractAccelerationLaw):
             worst = np.asarray(self.integral / most).max()
             raise BadInput("integral", "be less than proportional times derivative", f"{worst:g} times that")
 
-    def begin(self, y: Measurement, r: Target) -> PerAxis:
+    def init_law(self, y: Measurement, r: Target) -> PerAxis:
         return jnp.zeros_like(y.position)
 
-    def demand(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
         error, rate, acceleration = tracking_error
         demanded = acceleration + self.proportional * error + self.derivative * rate + state
         return demanded, {"estimate": -state}
 
-    def adapt(
+    def update(
         self, state: PerAxis, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> PerAxis:
         """Anti-windup of the integral by back-calculation, Astrom and Murray (2008), 10.4.
@@ -96,7 +96,7 @@ def pid(
     if gains is None:
         if frequency is None:
             axes = axes_of(model, conditions)
-            frequency = alike([pid_frequency(axis) for axis in axes])
+            frequency = scalar_if_uniform([pid_frequency(axis) for axis in axes])
         for name, value, check in (
             ("frequency", frequency, checks.positive),
             ("damping", damping, checks.positive),

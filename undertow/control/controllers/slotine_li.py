@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
+from undertow.control.controllers.bandwidths import LoopTransfer, axes_of, best_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -96,10 +96,10 @@ class SlotineLi(AbstractAccelerationLaw):
             count = self.regressor.parametrization().nominal.size
             checks.length("adaptation_rate", self.adaptation_rate, count, "parameters of the model")
 
-    def begin(self, y: Measurement, r: Target) -> Parameters:
+    def init_law(self, y: Measurement, r: Target) -> Parameters:
         return self.regressor.parametrization().nominal
 
-    def demand(self, state: Parameters, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: Parameters, y: Measurement, tracking_error: TrackingError):
         structure, surface = self.regressor.parametrization(), self._surface(tracking_error)
         force, nominal = self._force(state, y, tracking_error), self._force(structure.nominal, y, tracking_error)
         # This is the whole acceleration; the path that all laws share compensates the modelled forces once more.
@@ -111,7 +111,7 @@ class SlotineLi(AbstractAccelerationLaw):
         }
         return demanded + self._compensated(y, tracking_error), signals
 
-    def adapt(
+    def update(
         self, state: Parameters, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> Parameters:
         """Parameters one sampling time later.
@@ -179,7 +179,7 @@ def slotine_li(
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
     if slope is None:
-        slope = alike([best_frequency(axis, _small_errors) for axis in axes])
+        slope = scalar_if_uniform([best_frequency(axis, _small_errors) for axis in axes])
     checks.per_axis("slope", slope, len(axes))
     checks.positive("slope", slope)
     gain = slope if gain is None else gain

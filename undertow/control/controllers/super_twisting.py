@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from undertow.control.controllers.actuation import AbstractAccelerationLaw, Actuation, ActuationResult, actuation_for
-from undertow.control.controllers.bandwidths import LoopTransfer, alike, axes_of, best_frequency
+from undertow.control.controllers.bandwidths import LoopTransfer, axes_of, best_frequency, scalar_if_uniform
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
@@ -57,17 +57,17 @@ class SuperTwisting(AbstractAccelerationLaw):
             least = float(np.max(least_second(np.asarray(self.first))))
             raise BadInput("second", f"be more than {least:.4g} with this `first`", float(np.min(self.second)))
 
-    def begin(self, y: Measurement, r: Target) -> PerAxis:
+    def init_law(self, y: Measurement, r: Target) -> PerAxis:
         return jnp.zeros_like(y.position)
 
-    def demand(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
+    def acceleration(self, state: PerAxis, y: Measurement, tracking_error: TrackingError):
         error, rate, acceleration = tracking_error
         surface = rate + self.slope * error
         root = surface / jnp.sqrt(jnp.maximum(jnp.abs(surface), self.layer))
         demanded = acceleration + self.slope * rate + self.first * jnp.sqrt(self.rate_bound) * root + state
         return demanded, {"estimate": -state, "surface": surface}
 
-    def adapt(
+    def update(
         self, state: PerAxis, y: Measurement, tracking_error: TrackingError, actuation: ActuationResult, dt
     ) -> PerAxis:
         """w one sampling time later; what limits take away is given back to it, as to the integral of `pid`."""
@@ -147,9 +147,11 @@ def super_twisting(
     model = model.in_body_axes()
     axes = axes_of(model, conditions)
     if slope is None:
-        slope = alike([best_frequency(axis, _inside_the_layer) for axis in axes])
+        slope = scalar_if_uniform([best_frequency(axis, _inside_the_layer) for axis in axes])
     if rate_bound is None:
-        rate_bound = alike([_SHARE * axis.authority if np.isfinite(axis.authority) else 1.0 for axis in axes])
+        rate_bound = scalar_if_uniform(
+            [_SHARE * axis.authority if np.isfinite(axis.authority) else 1.0 for axis in axes]
+        )
     for name, value in (("slope", slope), ("rate_bound", rate_bound), ("first", first)):
         checks.per_axis(name, value, len(axes))
         checks.positive(name, value)

@@ -331,7 +331,7 @@ def _times() -> tuple[PerCondition, PerCondition, PerCondition]:
     return tuple(as_array(column) for column in rows.T)  # pyright: ignore[reportReturnType] - three columns
 
 
-def judged(level: PerCondition) -> tuple[Int[Array, ""], Int[Array, ""]]:
+def state_of_levels(level: PerCondition) -> tuple[Int[Array, ""], Int[Array, ""]]:
     """State that the levels of the conditions ask for, and the code of its reason."""
     top = level.max()
     first = jnp.where(level >= top, jnp.arange(len(CONDITIONS)), len(CONDITIONS)).min()

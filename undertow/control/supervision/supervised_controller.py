@@ -21,8 +21,8 @@ from undertow.control.supervision.conditions import (
     State,
     code_of,
     held_for,
-    judged,
     none_held,
+    state_of_levels,
 )
 from undertow.control.supervision.fault_tolerant_law import FaultTolerantController
 from undertow.control.supervision.held_place import PlaceState, after_jump, is_another, no_place, released, target
@@ -216,7 +216,7 @@ class Supervised(AbstractController):
         divergence = NUMBER["estimator_diverged"]
         at_once = (jnp.arange(len(NAMES)) == divergence) & broken & view.controls
         conditions = conditions._replace(level=jnp.where(at_once, jnp.maximum(conditions.level, 1.0), conditions.level))
-        condition_state, reason = judged(conditions.level)
+        condition_state, reason = state_of_levels(conditions.level)
         state, reason = self._next(z, view, condition_state, reason)
         begins = _controls(state) & ~view.controls
         diverged = view.controls & (

@@ -32,7 +32,7 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
 from undertow.scenario.reading import Text
 from undertow.simulation.loop.closed_loop import ClosedLoop
-from undertow.simulation.loop.stepped import Uncopied, put, step_of
+from undertow.simulation.loop.stepped import Uncopied, compile_step, copy_into
 
 _NO_ROTATION = 1e-6  # largest entry of a quaternion that is none
 
@@ -150,19 +150,19 @@ class Autopilot(Uncopied):
 
     def _compile(self, functions: Functions) -> None:
         self._form, zero = functions.form, jnp.zeros(len(self._loop.plant.outputs))
-        self._begin = step_of(
+        self._begin = compile_step(
             lambda law, _, received: ((), functions.first(law, received)), functions.controller, (), functions.given
         )
         memory = self._begin.outputs[0]
         inputs = (functions.given, functions.applied, functions.time + self.sampling_time)
-        self._go_on = step_of(
+        self._go_on = compile_step(
             lambda law, memory, received: functions.following(law, memory, *received),
             functions.controller,
             memory,
             inputs,
         )
-        self._convert = step_of(lambda output, _, u: ((), output.of(u)), functions.output, (), functions.applied)
-        self._at = step_of(
+        self._convert = compile_step(lambda output, _, u: ((), output.of(u)), functions.output, (), functions.applied)
+        self._at = compile_step(
             lambda reference, _, t: ((), reference.at(t)), starting_at(functions.reference, zero), (), functions.time
         )
         self.backend = self._go_on.backend
@@ -216,19 +216,19 @@ class Autopilot(Uncopied):
             checks.finite("propellers", value)
         applied_input = np.full_like(before, np.nan) if applied is None else before.copy()  # the caller's may change
         self._received = ReceivedStep(motion, report, self._target(target), self._health(health), applied_input, 0.0)
-        put(self._begin.inputs, self._received[:4])
+        copy_into(self._begin.inputs, self._received[:4])
         self._begin()
         self._clock.begin()
         if target is None:  # the reference begins here
             self._place_reference(self._begin.outputs[0].y.position)
             self._received = self._received._replace(target=self._target(None))
-            put(self._begin.inputs.target, self._received.target)
+            copy_into(self._begin.inputs.target, self._received.target)
             self._begin()
         if not np.isfinite(self._begin.outputs[1].command).all():
             raise BadInput(
                 "start", "lead to a finite command of the law", "one that is not", hint="Check the measurement"
             )
-        put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+        copy_into((self._go_on.state, self._go_on.outputs), self._begin.outputs)
         if self._supervisor is not None and applied is not None:
             self._turn_from(before, self._supervisor)
         self._command[...] = before
@@ -284,7 +284,7 @@ class Autopilot(Uncopied):
         elif not passed:
             return self._convert.outputs.copy()
         self._received = ReceivedStep(motion, report, new_target or self._target(None), healthy, applied_input, elapsed)
-        put(self._go_on.inputs, (*self._received[:5], passed))
+        copy_into(self._go_on.inputs, (*self._received[:5], passed))
         self._go_on()
         if not self.supervised:
             self._start_again_if_broken()
@@ -303,9 +303,9 @@ class Autopilot(Uncopied):
         elif not self._broken:
             self._broken[...] = True
         else:
-            put(self._begin.inputs, self._received[:4])
+            copy_into(self._begin.inputs, self._received[:4])
             self._begin()
-            put((self._go_on.state, self._go_on.outputs), self._begin.outputs)
+            copy_into((self._go_on.state, self._go_on.outputs), self._begin.outputs)
             self._restarts += 1
             self._command[...] = 0.0  # unless the command is finite now
 
@@ -469,7 +469,7 @@ class Autopilot(Uncopied):
     def _place_reference(self, position: np.ndarray) -> None:
         with runtime.on_processor(), runtime.in_precision(self.precision):
             placed = in_present_precision(starting_at(self._loop.reference, jnp.asarray(position)))
-        put(self._at.numbers, eqx.filter(placed, eqx.is_array))
+        copy_into(self._at.numbers, eqx.filter(placed, eqx.is_array))
 
     def _input(self, applied: Any) -> np.ndarray:
         values = numbers("applied", applied, self._command.shape)

@@ -19,7 +19,7 @@ from undertow.outside.autopilot.saved_state import packed, restore_arrays
 from undertow.outside.autopilot.step_log import StepLog, filter_signals
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
-from undertow.simulation.loop.stepped import Uncopied, put, step_of
+from undertow.simulation.loop.stepped import Uncopied, compile_step, copy_into
 
 
 class NavigationFilter(Uncopied):
@@ -85,12 +85,12 @@ class NavigationFilter(Uncopied):
         self.sensors = functions.sensors
         self._delays = functions.delays
         self._signals = functions.filter.signals()
-        self._begin = step_of(
+        self._begin = compile_step(
             lambda navigation, _, pose: ((), functions.first(navigation, pose)), functions.filter, (), functions.pose
         )
         state = jax.tree.map(jnp.asarray, self._begin.outputs)
         inputs = (jnp.zeros(()), functions.nothing)
-        self._go_on = step_of(
+        self._go_on = compile_step(
             lambda navigation, state, inputs: functions.following(navigation, state, *inputs),
             functions.filter,
             state,
@@ -125,9 +125,9 @@ class NavigationFilter(Uncopied):
             raise BadInput("attitude", "be a quaternion of some length", "zero")
         angles = quaternions(motion.attitude) if as_angles else motion.attitude / length
         received = self._received(readings or {}, {})
-        put(self._begin.inputs, motion._replace(attitude=angles))
+        copy_into(self._begin.inputs, motion._replace(attitude=angles))
         self._begin()
-        put(self._go_on.state, self._begin.outputs)
+        copy_into(self._go_on.state, self._begin.outputs)
         self._clock.begin()
         self._started[...] = True
         return self._stepped(0.0, received)
@@ -215,7 +215,7 @@ class NavigationFilter(Uncopied):
         return received
 
     def _stepped(self, elapsed: float, received: list[tuple[Any, bool, float]]) -> EstimatedMotion:
-        put(self._go_on.inputs, (elapsed, received))
+        copy_into(self._go_on.inputs, (elapsed, received))
         self._go_on()
         motion = EstimatedMotion(*(part.copy() for part in self._go_on.outputs.motion))
         if self._log is not None:

@@ -28,7 +28,7 @@ from undertow.simulation.loop import plant_step
 from undertow.simulation.loop.closed_loop import Realization
 from undertow.simulation.loop.outcome import status_of
 from undertow.simulation.loop.plant_step import PlantObservation, PlantState
-from undertow.simulation.loop.stepped import Uncopied, put, realized, step_of
+from undertow.simulation.loop.stepped import Uncopied, compile_step, copy_into, realized
 
 COMMANDS = ("input", "pulses")
 
@@ -168,13 +168,13 @@ class Vehicle(Uncopied):
 
     def _compile(self, key: Any) -> None:
         realization = self._realization = realized(self._loop, key)
-        self._begin = step_of(lambda part, _, start: ((), self._first(part, start)), realization, (), self._start)
+        self._begin = compile_step(lambda part, _, start: ((), self._first(part, start)), realization, (), self._start)
         self._begin()
         types, _ = eqx.filter_eval_shape(self._first, realization, self._start)
         state = jax.tree.map(lambda value, like: jnp.asarray(value, like.dtype), self._begin.outputs[0], types)
         zero = np.zeros((), dtype=jax.dtypes.canonicalize_dtype(float))
         step_inputs = _Given(zero, zero, zero, np.zeros(self.thrusters, dtype=zero.dtype))
-        self._go_on = step_of(self._next, (realization, self.esc), state, step_inputs)
+        self._go_on = compile_step(self._next, (realization, self.esc), state, step_inputs)
         self.backend = self._go_on.backend
 
     def _first(self, part: Realization, start: Any) -> tuple[PlantState, _Shown]:
@@ -217,14 +217,14 @@ class Vehicle(Uncopied):
             with runtime.on_processor(), runtime.in_precision(self.precision):
                 self._realization = realized(self._loop, key_of_seed(seed))
                 numbers_of_seed = eqx.filter(self._realization, eqx.is_array)
-            put(self._begin.numbers, numbers_of_seed)
-            put(self._go_on.numbers[0], numbers_of_seed)
+            copy_into(self._begin.numbers, numbers_of_seed)
+            copy_into(self._go_on.numbers[0], numbers_of_seed)
             self._begin()
         self._restart()
         return self.output
 
     def _restart(self) -> None:
-        put(self._go_on.state, self._begin.outputs[0])
+        copy_into(self._go_on.state, self._begin.outputs[0])
         self._show(self._begin.outputs[1])
         self.output = self.output._replace(applied=None)
         self._since, self._steps, self._dt = 0.0, 0, self.sampling_time
@@ -281,7 +281,7 @@ class Vehicle(Uncopied):
         if dt != self._dt:
             self._since, self._steps, self._dt = t, 0, dt
         self._steps += 1
-        put(self._go_on.inputs, _Given(np.asarray(t), np.asarray(self.time), np.asarray(dt), command))
+        copy_into(self._go_on.inputs, _Given(np.asarray(t), np.asarray(self.time), np.asarray(dt), command))
         self._go_on()
         self._show(self._go_on.outputs)
 

@@ -15,7 +15,7 @@ import numpy as np
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput
 from undertow.simulation.loop.simd_batch import Unsupported, simdjit, unavailable
-from undertow.simulation.loop.stepped import CompiledStep, put
+from undertow.simulation.loop.stepped import CompiledStep, copy_into
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
 _TAKEN = ("test", "example", "clean")  # a file of this name would be overwritten, or a target of the Makefile
@@ -197,10 +197,10 @@ class CProgram:
         for k in range(_VECTORS):
             compiled = later if k else first
             inputs = system.sample(chance, k)
-            put(compiled.inputs, inputs)
+            copy_into(compiled.inputs, inputs)
             compiled()
             if k == 0:
-                put(later.state, first.outputs[0])
+                copy_into(later.state, first.outputs[0])
             rows_of_inputs.append(self._initialiser(jax.tree.leaves(compiled.inputs)))
             rows_of_outputs.append(self._initialiser(jax.tree.leaves(later.outputs if k else first.outputs[1])))
         inputs, outputs = (",\n    ".join(rows) for rows in (rows_of_inputs, rows_of_outputs))

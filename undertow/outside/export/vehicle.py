@@ -19,7 +19,7 @@ from undertow.core.status import Status
 from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion, motion_in
 from undertow.outside.export.c_program import CProgram, Exported, System, check_compiler, has_counterpart, made_from
 from undertow.outside.export.controller import checked, described
-from undertow.physics.disturbances.adding import SumOfDisturbances
+from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.scenario.build import Built
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.outcome import status_of

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.outside.gymnasium.agent_interface import agent_interface
 from undertow.outside.gymnasium.episodes import Episodes, EpisodeStep, QuadraticCost
-from undertow.outside.gymnasium.shown import shown
 from undertow.outside.gymnasium.variants import Vary
 from undertow.simulation.loop.stepped import Uncopied
 
@@ -53,7 +53,7 @@ class Env(Uncopied, gymnasium.Env[NDArray[Any], NDArray[Any]]):
             raise BadInput("render_mode", "be None", render_mode, hint=hint)
         self._episodes = Episodes(scenario, 1, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt = self._episodes.interface, self._episodes.dt
-        self._shown = shown(self.interface, self._episodes.dtype, float32, normalised, reward)
+        self._shown = agent_interface(self.interface, self._episodes.dtype, float32, normalised, reward)
         self.observation_space, self.action_space = self._shown.spaces()
         self._step, self._over = 0, True
 

@@ -23,7 +23,7 @@ from undertow.scenario.build import build
 from undertow.scenario.reading import from_data, read
 from undertow.simulation.loop import plant_step
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
-from undertow.simulation.loop.outcome import Ending, going
+from undertow.simulation.loop.outcome import Ending, running
 from undertow.simulation.loop.plant_step import PlantState
 from undertow.simulation.loop.recording import freeze_on_failure, instant
 from undertow.simulation.loop.stepped_batch import CompiledBatchStep, Starter
@@ -202,7 +202,7 @@ def _begin(plan: EpisodeSettings, realization: Realization, start: Any) -> tuple
     r = realization.loop.reference.at(zero)
     blank = jnp.concatenate([jnp.zeros(len(plan.interface.bounds())), action])
     observation = _observed(plan, plant_observation.measurement, r, action, blank)
-    state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), going())
+    state = _State(vehicle, action, observation, jnp.zeros((), dtype=int), running())
     error = plan.interface.coordinates.difference(r.position, plant_observation.truth.position)
     return state, EpisodeStep(observation, zero, state.ending.status, plant_observation.truth.position, error)
 

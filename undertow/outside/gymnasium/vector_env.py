@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
 from undertow.core.status import Status
+from undertow.outside.gymnasium.agent_interface import agent_interface
 from undertow.outside.gymnasium.env import actions_of
 from undertow.outside.gymnasium.episodes import Episodes, EpisodeStep, QuadraticCost
-from undertow.outside.gymnasium.shown import shown
 from undertow.outside.gymnasium.variants import Vary
 from undertow.simulation.loop.stepped import Uncopied
 
@@ -57,7 +57,7 @@ class VectorEnv(Uncopied, vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
             raise BadInput("num_envs", "be a positive integer", num_envs)
         self._episodes = Episodes(scenario, num_envs, action, scale, cost, vary, variants, allow_code)
         self.interface, self.dt, self.num_envs = self._episodes.interface, self._episodes.dt, num_envs
-        self._shown = shown(self.interface, self._episodes.dtype, float32, normalised, reward)
+        self._shown = agent_interface(self.interface, self._episodes.dtype, float32, normalised, reward)
         self.single_observation_space, self.single_action_space = self._shown.spaces()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)

@@ -4,7 +4,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from undertow.outside.mavlink.signing import SignedParser, ahead_of, present, signing_of
+from undertow.outside.mavlink.signing import SignedParser, ahead_of, signing_of, timestamp_now
 
 _UNSIGNED = "Invalid signature"  # pymavlink's words for a message without a signature or with a wrong one
 
@@ -31,7 +31,7 @@ class MessageCodec:
         """Messages as datagrams, numbered on."""
         datagrams = []
         if self._signing is not None:
-            self._signing.timestamp = max(self._signing.timestamp, present())
+            self._signing.timestamp = max(self._signing.timestamp, timestamp_now())
         for message in messages:
             datagrams.append(message.pack(self._packer))
             self._packer.seq = (self._packer.seq + 1) % 256

@@ -63,11 +63,11 @@ def signing_of(key: bytes) -> Any:
     """State of pymavlink for a key, with which messages are signed; its time is that of the machine."""
     state: Any = mavlink.MAVLinkSigning()
     state.secret_key, state.sign_outgoing = key, True
-    state.timestamp = present()
+    state.timestamp = timestamp_now()
     return state
 
 
-def present() -> int:
+def timestamp_now() -> int:
     """Time of a signature that is made now."""
     return int((max(time.time(), _EPOCH) - _EPOCH) * _PER_SECOND)
 
@@ -77,7 +77,7 @@ def ahead_of(state: Any, times: int = 1) -> int:
 
     What is dated ahead twice is newer than they.
     """
-    return max(state.timestamp, present()) + times * _AHEAD
+    return max(state.timestamp, timestamp_now()) + times * _AHEAD
 
 
 class SignedParser(mavlink.MAVLink):

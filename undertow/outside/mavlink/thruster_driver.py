@@ -13,7 +13,7 @@ from undertow.outside.thruster_channels import channels_of_vehicle
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.plants.pulse_input import pulse_driven
 from undertow.physics.power.esc import ESC, esc
-from undertow.simulation.loop.stepped import step_of
+from undertow.simulation.loop.stepped import compile_step
 
 
 class ThrusterDriver:
@@ -41,7 +41,7 @@ class ThrusterDriver:
         self.channels = channels_of_vehicle(np.asarray(plant.thruster_matrix), frame, channels)
         self._commands = commands_of(output, int(self.channels.numbers.max()))
         with runtime.on_processor(), runtime.in_precision(autopilot.precision):
-            self._drive = step_of(driven, (plant, self._esc), (), jnp.zeros(plant.inputs()))
+            self._drive = compile_step(driven, (plant, self._esc), (), jnp.zeros(plant.inputs()))
 
     def commands(self, volts: np.ndarray, time_usec: int) -> list[Any]:
         """Commands for the volts of a law; `time_usec` is that of the odometry which they answer."""

@@ -31,10 +31,10 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.reading import from_data, read
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop, MeasurementState, Realization
-from undertow.simulation.loop.outcome import going
+from undertow.simulation.loop.outcome import running
 from undertow.simulation.loop.plant_step import PlantState, hold
 from undertow.simulation.loop.recording import instant
-from undertow.simulation.loop.stepped import step_of
+from undertow.simulation.loop.stepped import compile_step
 
 Scenario = str | Path | Mapping[str, Any] | Built
 
@@ -142,7 +142,7 @@ def closed_loop(scenario: Scenario) -> ct.NonlinearIOSystem:
             return realization._replace(loop=loop)
 
         def stepped(realization: Realization, k: Any, state: Any, u: Any):
-            carry = (state_from(state), (), going())
+            carry = (state_from(state), (), running())
             with_reference = following(realization, u)
             return vector_of(sampled.control_step(with_reference, (), dt, integrate, settings.substeps, carry, k)[0])
 
@@ -195,7 +195,7 @@ def reference(scenario: Scenario, time: Any) -> NDArray:
     checks.finite("time", instants, "s")
     with computing(built):
         desired = lambda part, _, t: ((), jnp.concatenate(part.at(t)))
-        step = step_of(desired, built.closed_loop.reference, (), np.zeros(()))
+        step = compile_step(desired, built.closed_loop.reference, (), np.zeros(()))
     references = []
     for now in instants:  # by the program of a step, for the bits of a simulation
         step.inputs[...] = now
@@ -304,7 +304,7 @@ def _system(
     arguments = (instant, start, jnp.zeros(len(inputs)))
 
     def called(function: Callable) -> Callable:
-        step = step_of(lambda part, _, arguments: ((), function(part, *arguments)), realization, (), arguments)
+        step = compile_step(lambda part, _, arguments: ((), function(part, *arguments)), realization, (), arguments)
         at, state, u = step.inputs
 
         def call(t: float, x: NDArray, input_vector: NDArray, params: Any) -> NDArray:
@@ -340,7 +340,7 @@ def _begun(built: Built) -> tuple[Realization, tuple[Any, Any, MeasurementState]
     start = _start(built)
     sampled_once = lambda loop, key: eqx.filter(loop.realize(key)[1:], eqx.is_array)
     first = lambda loop, key: sampled.begin(loop.realize(key), start, ())[0]
-    step = step_of(lambda loop, _, key: ((), (sampled_once(loop, key), first(loop, key))), loop, (), key)
+    step = compile_step(lambda loop, _, key: ((), (sampled_once(loop, key), first(loop, key))), loop, (), key)
     step()
     arrays, states = jax.tree.map(jnp.asarray, step.outputs)
     static = eqx.filter(loop.realize(key)[1:], eqx.is_array, inverse=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.outside.autopilot.measured_motion import Format
 from undertow.outside.realtime.datagrams import COMMAND, MEASUREMENT, MOTION, DatagramFilter, Sender, address_of
 from undertow.outside.realtime.link import AbstractLink, LinkMeasurement
@@ -188,7 +188,7 @@ class UdpVehicleServer:
 
 
 def _check_vehicle(built: Built) -> None:
-    with within(location=built.text.location):
+    with error_location(location=built.text.location):
         if not isinstance(built.closed_loop.plant, HybridVehicle):
             raise BadInput("plant", "be a vehicle with thrusters for a link by UDP", built.scenario.plant.kind)
         if built.scenario.model.options.get("speed_sensor"):

@@ -1,6 +1,6 @@
 """What a scenario must have for ROS 2."""
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
 
@@ -11,7 +11,7 @@ def check_vehicle(built: Built) -> None:
     Raises:
         BadInput: it has not.
     """
-    with within(location=built.text.location):
+    with error_location(location=built.text.location):
         if not isinstance(built.closed_loop.plant, HybridVehicle):
             raise BadInput("plant", "be a vehicle with thrusters", built.scenario.plant.kind)
         if built.scenario.loop.kind != "sampled":

@@ -13,7 +13,7 @@ from undertow.outside.ros2.checked_scenario import check_vehicle
 from undertow.outside.ros2.from_messages import thruster_label
 from undertow.scenario.build import build
 from undertow.scenario.link_scenario import at_sampling_time, read_for_link
-from undertow.simulation.loop.stepped import put, step_of
+from undertow.simulation.loop.stepped import compile_step, copy_into
 
 
 class CompiledController:
@@ -61,11 +61,11 @@ class CompiledController:
         with runtime.on_processor(), runtime.in_precision(built.scenario.precision):
             conversion = output_of(output, plant, law, None)
             self.label = thruster_label(conversion.unit)
-            self._conversion = step_of(_limited, conversion, (), jnp.zeros(self.thrusters))
+            self._conversion = compile_step(_limited, conversion, (), jnp.zeros(self.thrusters))
 
     def limited(self, u: NDArray) -> tuple[NDArray, NDArray]:
         """An input as far as the thrusters can give it, and the same as output."""
-        put(self._conversion.inputs, u)
+        copy_into(self._conversion.inputs, u)
         self._conversion()
         applied, values = self._conversion.outputs
         return applied.copy(), values.copy()

@@ -5,7 +5,7 @@ from typing import Any
 
 from undertow.paper.all_outputs import unit_of
 from undertow.paper.pages import ablations_page
-from undertow.report.formats import CRITERION, ending, number, outcome, prose, unit, within
+from undertow.report.formats import CRITERION, ending, meets_default_criterion, number, outcome, prose, unit
 from undertow.report.page import Html, bullets, join, table, tag
 
 TITLE = "The robust variant"
@@ -98,7 +98,7 @@ def fidelity_table(rows: Sequence[Mapping[str, Any]]) -> Html:
         steady = row["steady"] or {}
         case = tag("b", row["words"]) if row["words"] != last else ""
         last = row["words"]
-        ended = outcome(ending(row), row["status"] == "completed", within(row["steady"]))
+        ended = outcome(ending(row), row["status"] == "completed", meets_default_criterion(row["steady"]))
         name = join(row["name"], tag("div", tag("code", row["scenario"]), class_="small"))
         table_rows.append((case, name, ended, *(number(steady.get(metric)) for metric in _FIDELITY)))
     metrics = (join(metric.replace("_", " "), " ", unit(unit_of(metric))) for metric in _FIDELITY)

@@ -3,7 +3,17 @@
 from typing import Any
 
 from undertow.paper.all_outputs import unit_of
-from undertow.report.formats import chip, condition, ending, number, outcome, percent, prose, unit, within
+from undertow.report.formats import (
+    chip,
+    condition,
+    ending,
+    meets_default_criterion,
+    number,
+    outcome,
+    percent,
+    prose,
+    unit,
+)
 from undertow.report.page import Html, join, table, tag
 
 # An independent solution of Example 1, steady window: the project's benchmark definitions, section 4.
@@ -85,7 +95,7 @@ def fidelity_levels(results: dict[str, Any]) -> Html:
             figures = [number(steady.get(m)) for m in ("tracking_rms", "estimation_rms", "input_variation")]
             lasted = entry["status"] == "completed"
             words = f"lasts {entry['simulated_s']:g} s" if lasted else ending(entry)
-            ended = outcome(words, lasted, within(entry["steady"]))
+            ended = outcome(words, lasted, meets_default_criterion(entry["steady"]))
             level = join(tag("b", fidelity), tag("span", _LEVELS.get(fidelity, ""), class_="said"))
             rows.append((level, NAMES.get(key, key), ended, *figures, prose(entry.get("why") or "")))
     metrics = map(_named, ("tracking_rms", "estimation_rms", "input_variation"))

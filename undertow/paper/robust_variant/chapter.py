@@ -8,14 +8,14 @@ from undertow.paper.ablations import study
 from undertow.paper.ablations.verdicts import ABLATIONS
 from undertow.paper.robust_variant import fidelity
 from undertow.paper.robust_variant.conclusions import conclusions
-from undertow.paper.running import begin_all
+from undertow.paper.running import start_all
 from undertow.scenario.results.run_result import ScenarioResult
 from undertow.simulation.processes import Tasks
 
 Chapter = tuple[dict[str, Any], dict[str, ScenarioResult]]
 
 
-def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
+def start_chapter(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
     """Begin to run the chapter; scenarios and campaigns are saved as all others of `reproduce`.
 
     Args:
@@ -27,11 +27,11 @@ def begin(folder: Path, quick: bool, tasks: Tasks) -> Callable[[], Chapter]:
         Function that waits for the entries of results.json, and the runs of the fidelity comparison.
     """
     selected = [entry for entry in ABLATIONS if not (quick and entry.long)]
-    compared = begin_all(fidelity.scenarios(quick), folder, tasks)
+    compared = start_all(fidelity.scenarios(quick), folder, tasks)
     # The longest begin first, so that no process waits for the last one.
     order = sorted(selected, key=study.trials_of, reverse=True)
     ablation_tasks = {
-        entry.id: tasks.begin(f"ablation {entry.id}", ablation, entry.id, quick, folder) for entry in order
+        entry.id: tasks.submit(f"ablation {entry.id}", ablation, entry.id, quick, folder) for entry in order
     }
 
     def finished() -> Chapter:

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.contracts import Load
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, with_water
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance, with_water
 
 
 class Current(AbstractSmoothDisturbance):

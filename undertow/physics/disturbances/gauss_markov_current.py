@@ -10,7 +10,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import with_water
+from undertow.physics.disturbances.loads import with_water
 
 _LONGEST = 1_000_000  # samples of a realization
 

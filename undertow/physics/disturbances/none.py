@@ -1,7 +1,7 @@
 """No disturbance."""
 
 from undertow.core.contracts import Load
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance
 
 
 class NoDisturbance(AbstractSmoothDisturbance):

@@ -9,7 +9,7 @@ from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load, ModelScaling
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import with_scaling
+from undertow.physics.disturbances.loads import with_scaling
 
 _RANGES = ("mass", "damping", "restoring", "thrust")
 

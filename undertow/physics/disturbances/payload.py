@@ -8,7 +8,7 @@ from undertow.core import checks, contracts
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import with_payload
+from undertow.physics.disturbances.loads import with_payload
 
 _LARGEST_GRAVITY = 9.84  # m/s^2, at the poles, rounded up
 

@@ -9,7 +9,7 @@ from undertow.core import checks
 from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, body_of, with_water
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance, body_of, with_water
 
 
 class ShearedCurrent(AbstractSmoothDisturbance):

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from undertow.core.contracts import Load
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance
 
 
 class Sinusoid(AbstractSmoothDisturbance):

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.contracts import AbstractDisturbance, Load
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, SumOfDisturbances, with_surface
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance, SumOfDisturbances, with_surface
 from undertow.physics.disturbances.waves import Waves
 
 

@@ -7,7 +7,7 @@ from undertow.core import checks
 from undertow.core.contracts import Load
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance, body_of, with_force
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance, body_of, with_force
 
 _TINY = 1e-9  # m
 

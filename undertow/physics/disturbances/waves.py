@@ -14,7 +14,7 @@ from undertow.core.errors import BadInput
 from undertow.core.numerics.number import Number
 from undertow.core.numerics.random_keys import keys_for
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import body_of, with_surface, with_water
+from undertow.physics.disturbances.loads import body_of, with_surface, with_water
 
 # Frequencies in units of the peak frequency; the range holds all but 1e-4 of the energy.
 _LOWEST, _HIGHEST, _POINTS = 0.4, 8.0, 4000

@@ -8,7 +8,7 @@ from undertow.core.contracts import Load
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_AXES
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import AbstractSmoothDisturbance
+from undertow.physics.disturbances.loads import AbstractSmoothDisturbance
 
 
 class ConstantWrench(AbstractSmoothDisturbance):

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.contracts import ModelScaling, Payload
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import with_payload, with_scaling
+from undertow.physics.disturbances.loads import with_payload, with_scaling
 from undertow.physics.faults.mode import AbstractPlantFault, Severity
 
 _GRAVITY = 9.81  # m/s^2

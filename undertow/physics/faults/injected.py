@@ -9,14 +9,14 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from undertow.core.contracts import AbstractFaults, Inputs, Load, Measurement, ModelScaling, Pose
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import with_scaling
+from undertow.physics.disturbances.loads import with_scaling
 from undertow.physics.faults.mode import (
     AbstractMode,
     AbstractPlantFault,
     AbstractThrustMode,
     Moment,
     Presence,
-    altered_by,
+    apply_mode,
 )
 from undertow.physics.faults.occurrence import Occurrence, Timing
 from undertow.physics.faults.quantities import quantities_of
@@ -122,7 +122,7 @@ class Faults(AbstractFaults):
             quantity = known[fault.quantity]
             value = quantity.read(y)
             moment = _moment(own, state, t, jnp.full(value.shape, quantity.turn), holds=True)
-            altered, memory = altered_by(fault.mode, memory, moment, value)
+            altered, memory = apply_mode(fault.mode, memory, moment, value)
             faulty = quantity.replaced(y, jnp.where(own.chosen > 0, altered.value, value))
             # What the fault leaves alone keeps its bits, which replacing it might round.
             y = jax.tree.map(lambda new, old, moment=moment: jnp.where(moment.active, new, old), faulty, y)
@@ -145,7 +145,7 @@ class Faults(AbstractFaults):
         for fault, own, memory in zip(self.of_input, realization[1], state.input, strict=True):
             if isinstance(fault.mode, AbstractMode):
                 moment = _moment(own, state, t, jnp.zeros_like(u), holds=False)
-                altered, memory = altered_by(fault.mode, memory, moment, u / scale)
+                altered, memory = apply_mode(fault.mode, memory, moment, u / scale)
                 acting = jnp.clip(scale * altered.value, low, high)
                 u = jnp.where(moment.active & (own.chosen > 0), acting, u)
             after.append(memory)

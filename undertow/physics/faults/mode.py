@@ -15,7 +15,7 @@ from undertow.core.contracts import AbstractController, Load, Measurement, Pose,
 from undertow.core.errors import BadInput
 from undertow.core.numerics.number import Number
 from undertow.core.option_groups import set_signature
-from undertow.core.returned import difference, form, not_two
+from undertow.core.return_checks import difference, form, not_two
 from undertow.core.user_code import place_of
 
 if TYPE_CHECKING:  # pyright takes an abstract variable of a class for an argument of each of its parts
@@ -246,7 +246,7 @@ def name_of(fault: AbstractFault) -> str:
     return getattr(fault, "function", type(fault)).__name__
 
 
-def altered_by(mode: AbstractMode, memory: PyTree, moment: Moment, value: Signal) -> tuple[Altered, PyTree]:
+def apply_mode(mode: AbstractMode, memory: PyTree, moment: Moment, value: Signal) -> tuple[Altered, PyTree]:
     """What a mode makes of a signal, and its memory afterwards.
 
     Raises:

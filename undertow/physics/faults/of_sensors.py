@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from undertow.core.param import Param, param
-from undertow.physics.faults.mode import AbstractMode, Moment, altered_by
+from undertow.physics.faults.mode import AbstractMode, Moment, apply_mode
 from undertow.physics.faults.occurrence import Occurrence
 from undertow.physics.sensors.received import AbstractSensorFaults, Received
 
@@ -53,7 +53,7 @@ class SensorFaults(AbstractSensorFaults):
             turn = jnp.concatenate([fault.turn, jnp.zeros(len(signal) - len(fault.turn))])
             active, since, elapsed = timing.active(t), t - timing.onset, t - state.time
             moment = Moment(active, since, elapsed, timing.severity, own, state.step, turn, holds=True)
-            altered, memory = altered_by(fault.mode, memory, moment, signal)
+            altered, memory = apply_mode(fault.mode, memory, moment, signal)
             width = len(before.reading)
             fresh = altered.value[width] > 0 if fault.mode.delays else before.fresh
             fresh = jnp.where(active, fresh & altered.present, before.fresh)

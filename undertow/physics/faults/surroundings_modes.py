@@ -6,7 +6,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.param import Param, param
-from undertow.physics.disturbances.adding import body_of, with_force, with_water
+from undertow.physics.disturbances.loads import body_of, with_force, with_water
 from undertow.physics.faults.mode import AbstractPlantFault, Severity
 
 _TINY = 1e-9  # m

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.analysis.metrics import for_people, output_groups, titled_name
+from undertow.analysis.metrics import display_units, output_groups, titled_name
 from undertow.core.status import Status
 from undertow.report.figures import style
 from undertow.report.figures.campaign import beside, distributions_figure, key_height, looks_of
@@ -76,7 +76,7 @@ def differences_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
         for position, name in enumerate(candidates):
             difference = next(difference for difference in findings.against(name, first) if difference.metric == metric)
             look = looks_of(findings.names)[name]
-            scale = for_people(1.0, findings.units[metric])[0]
+            scale = display_units(1.0, findings.units[metric])[0]
             differences = scale * (_values(dataset, findings, metric, name) - _values(dataset, findings, metric, first))
             differences = differences[np.isfinite(differences)]
             jittered = position + 0.28 * (chance.random(differences.size) - 0.5)
@@ -89,7 +89,7 @@ def differences_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
         panel.set_yticks(range(len(candidates)), candidates if column == 0 else [""] * len(candidates))
         panel.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         panel.xaxis.get_offset_text().set_fontsize(style.TINY)
-        unit = for_people(0.0, findings.units[metric])[1]
+        unit = display_units(0.0, findings.units[metric])[1]
         style.label(panel, ", ".join([titled_name(metric), *([style.power(unit)] if unit else [])]))
         panel.xaxis.set_label_coords(0.5, -0.32 / panel_height)
     return figure
@@ -115,7 +115,7 @@ def histories_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
         for i, (name, look) in enumerate(looks.items()):
             rows = dataset.isel({findings.dimension: i})
             sizes = np.sqrt((rows["series:error"].values[..., axes] ** 2).mean(-1))
-            sizes = for_people(1.0, unit)[0] * np.where(time <= rows["ended"].values[:, None], sizes, np.nan)
+            sizes = display_units(1.0, unit)[0] * np.where(time <= rows["ended"].values[:, None], sizes, np.nan)
             running = ~np.isnan(sizes).all(axis=0)
             if len(sizes) > 1:
                 low, high = np.nanquantile(sizes[:, running], _BAND, axis=0)
@@ -124,14 +124,14 @@ def histories_figure(dataset: xr.Dataset, findings: Findings) -> Figure:
             lines.append((name, time, sizes[0]))
         fit_log(panel, lines, 0.0)
         panel.set_xlim(time[0], time[-1])
-        style.label(panel, "time, s", f"{group} error per axis, {for_people(0.0, unit)[1]}")
+        style.label(panel, "time, s", f"{group} error per axis, {display_units(0.0, unit)[1]}")
     return figure
 
 
 def _distributions(dataset: xr.Dataset, findings: Findings) -> Figure:
     """Empirical CDFs of the metrics that have them."""
     constant_metrics = alike(dataset, findings)
-    units = {metric: for_people(1.0, unit) for metric, unit in findings.units.items()}
+    units = {metric: display_units(1.0, unit) for metric, unit in findings.units.items()}
     scaled = {}
     for metric in findings.units:
         if metric in constant_metrics:

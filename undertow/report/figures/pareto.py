@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from undertow.analysis.metrics import for_people, titled_name
+from undertow.analysis.metrics import display_units, titled_name
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
 from undertow.studies.comparison.findings import Findings
@@ -28,7 +28,7 @@ def pareto_figure(findings: Findings) -> Figure:
 
 
 def _plot(panel: Axes, findings: Findings, front: Front) -> None:
-    scales = [for_people(1.0, findings.units[metric]) for metric in (front.effort, front.error)]
+    scales = [display_units(1.0, findings.units[metric]) for metric in (front.effort, front.error)]
     scaled_medians = lambda name, metric, scale: scale * np.array(findings.medians[metric][name][:3])
     for name, look in looks_of(findings.names).items():
         if name not in front.points:

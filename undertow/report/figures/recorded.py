@@ -5,7 +5,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import display_units
 from undertow.report.figures.multiples import Curve
 from undertow.report.figures.style import Look, power
 
@@ -16,10 +16,10 @@ _OF_OUTPUTS = ("position", "reference", "error", "measured_position")
 def in_degrees(run: xr.Dataset) -> xr.Dataset:
     """A run as people read it: outputs that are angles in degrees, as in tables. Files hold radians."""
     units = run["axis"].attrs["unit_of_each"].split(", ")
-    factors, display_units = zip(*(for_people(1.0, unit) for unit in units), strict=True)
+    factors, shown_units = zip(*(display_units(1.0, unit) for unit in units), strict=True)
     scaled = {name: run[name].copy(data=run[name].values * factors) for name in _OF_OUTPUTS}
     axis = run["axis"].copy()
-    axis.attrs["unit_of_each"] = ", ".join(display_units)
+    axis.attrs["unit_of_each"] = ", ".join(shown_units)
     return run.assign(scaled).assign_coords(axis=axis)
 
 

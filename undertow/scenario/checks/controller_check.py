@@ -11,11 +11,11 @@ from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.control.navigation.perfect import perfect
 from undertow.control.references.setpoint import setpoint
 from undertow.core.contracts import AbstractController, Target
-from undertow.core.returned import PAIR, STATE, form
+from undertow.core.return_checks import PAIR, STATE, form
 from undertow.core.signals import check_declared
 from undertow.physics.disturbances.none import none
 from undertow.physics.plants.double_integrator import DoubleIntegrator
-from undertow.scenario.checks.finding import Finding, advice, alike, shaped, two_values
+from undertow.scenario.checks.finding import Finding, advice, same_structure, shaped, two_values
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _GROWTH = 0.01  # 1/s; a slower one may be rounding
@@ -45,7 +45,7 @@ def check_controller(controller: AbstractController) -> Iterator[Finding]:
         expected_shape = tuple(sizes.get(dimension, own_sizes.get(dimension, 1)) for dimension in signal.dimensions)
         yield from shaped(f"command, signal {name}", signals[name], expected_shape)  # pyright: ignore[reportArgumentType] - every size is known here
     after = jax.eval_shape(controller.advance, z, y, r, u, dt)
-    findings = list(alike("advance", after, z, STATE, types=True))
+    findings = list(same_structure("advance", after, z, STATE, types=True))
     yield from findings or shaped(
         "command", jax.jit(lambda: controller.command(controller.init(y, r), y, r)[0])(), (inputs,)
     )

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core.returned import difference, form, not_two
+from undertow.core.return_checks import difference, form, not_two
 
 
 class Finding(NamedTuple):
@@ -61,7 +61,7 @@ def two_values(name: str, value: Any, what: str) -> Iterator[Finding]:
         yield Finding("error", "contract", name, message)
 
 
-def alike(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
+def same_structure(name: str, value: Any, model: Any, must: str, types: bool = False) -> Iterator[Finding]:
     """Check for the same tree as `model`, with arrays of the same shapes, and of the same types if `types`."""
     if got := difference(value, model, types):
         yield error("contract", name, must, got)

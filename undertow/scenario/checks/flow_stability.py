@@ -13,7 +13,7 @@ from undertow.analysis.linearization.disturbance_profile import disturbance_prof
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.control.navigation.perfect import perfect
 from undertow.core.arrays import as_array
-from undertow.core.errors import Advice, BadInput, advice, within
+from undertow.core.errors import Advice, BadInput, advice, error_location
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.physics.plants import HybridVehicle
 from undertow.physics.vehicles.body import Body
@@ -43,7 +43,7 @@ def flow_advice(built: Built) -> tuple[Advice, ...]:
         f"at {1 / loop.dt:g} Hz the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow "
         f"by {growth:.2g} 1/s"
     )
-    with within(location=built.text.location):
+    with error_location(location=built.text.location):
         return (advice("loop.dt", message, _remedy(built)),)
 
 

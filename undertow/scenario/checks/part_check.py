@@ -39,7 +39,7 @@ from undertow.physics.sensors.motion import motion_of
 from undertow.physics.sensors.sensor import AbstractSensor
 from undertow.physics.thrusters.thruster import AbstractThruster, PropellerReport
 from undertow.scenario.checks.controller_check import check_controller
-from undertow.scenario.checks.finding import Finding, agree, alike, error, is_a, shaped, two_values
+from undertow.scenario.checks.finding import Finding, agree, error, is_a, same_structure, shaped, two_values
 from undertow.scenario.checks.plant_check import check_plant
 from undertow.scenario.checks.thruster_check import check_thruster
 
@@ -109,7 +109,7 @@ def _disturbance(disturbance: AbstractDisturbance, around: Surroundings) -> Iter
     zero_load = Load(jnp.zeros(n), jnp.zeros(n))
     other_load = Load(jnp.linspace(1.0, 2.0, n), jnp.linspace(3.0, 4.0, n))
     realization, repeated = (disturbance.realize(jax.random.PRNGKey(0)) for _ in range(2))
-    yield from alike("realize", repeated, realization, "give the same realization for the same key")
+    yield from same_structure("realize", repeated, realization, "give the same realization for the same key")
     if not all(map(np.array_equal, jax.tree.leaves(realization), jax.tree.leaves(repeated))):
         yield error("contract", "realize", "give the same realization for the same key", "another one")
     at = jax.jit(lambda t, load: disturbance.at(realization, t, pose, load))
@@ -138,7 +138,7 @@ def _navigation(navigation: AbstractNavigation, around: Surroundings) -> Iterato
         yield from unpaired
         return
     y, after = answer
-    yield from alike("measure", after, state, "return the state in the form that `init` gives it", types=True)
+    yield from same_structure("measure", after, state, "return the state in the form that `init` gives it", types=True)
     findings, shape = list(is_a("measure", y, Measurement)), np.shape(around.truth.position)
     yield from findings or [*shaped("measure", y.position, shape), *shaped("measure", y.velocity, shape)]
 
@@ -190,7 +190,7 @@ def _mode(mode: AbstractMode, around: Surroundings) -> Iterator[Finding]:
         yield from unpaired
         return
     altered, after = answer
-    yield from alike("apply", after, memory, "return the memory in the form that `init` gives it", types=True)
+    yield from same_structure("apply", after, memory, "return the memory in the form that `init` gives it", types=True)
     wrong = list(is_a("apply", altered, Altered))
     yield from wrong or [*shaped("apply", altered.value, value.shape), *shaped("apply", altered.present, ())]
 

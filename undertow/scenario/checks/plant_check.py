@@ -10,7 +10,7 @@ from jaxtyping import Array, PyTree
 
 from undertow.core.contracts import AbstractPlant, Effort, Measurement, Model
 from undertow.core.signals import check_declared
-from undertow.scenario.checks.finding import Finding, agree, alike, error, is_a, shaped
+from undertow.scenario.checks.finding import Finding, agree, error, is_a, same_structure, shaped
 
 _GRIP = 1e-9  # of the largest entry: below it an input does not act at once
 
@@ -92,7 +92,9 @@ def _forms(plant: AbstractPlant) -> Iterator[Finding]:
         if set(signal.dimensions) <= set(sizes):
             form = tuple(sizes[dimension] for dimension in signal.dimensions)
             yield from shaped(f"diagnostics, signal {name}", recorded[name], form)
-    yield from alike("dynamics", jax.eval_shape(plant.dynamics, t, x, u, no_load), x, "have the form of the state")
+    yield from same_structure(
+        "dynamics", jax.eval_shape(plant.dynamics, t, x, u, no_load), x, "have the form of the state"
+    )
     yield from shaped("acceleration", jax.eval_shape(plant.acceleration, t, x, u, no_load), (n,))
     yield from shaped("status", jax.eval_shape(plant.status, x), ())
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from undertow.physics.thrusters.motor import DCMotor
 from undertow.physics.thrusters.thruster import AbstractThruster, Powers, PropellerReport
-from undertow.scenario.checks.finding import Finding, advice, alike, error, is_a, shaped
+from undertow.scenario.checks.finding import Finding, advice, error, is_a, same_structure, shaped
 
 _COUNT = 3  # thrusters at once: no other size that a part may happen to have
 _VOLTAGE = 10.0  # V, where a thruster has no limit
@@ -28,7 +28,7 @@ def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
     per_thruster, scalar = (_COUNT,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
     findings = [
-        *alike("dynamics", thruster.dynamics(state, volts), state, "have the form of the state"),
+        *same_structure("dynamics", thruster.dynamics(state, volts), state, "have the form of the state"),
         *shaped("thrust", thruster.thrust(state, volts), per_thruster),
         *shaped("current", thruster.current(state, volts), per_thruster),
         *shaped("stored", thruster.stored(state), per_thruster, scalar),

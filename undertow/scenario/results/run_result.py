@@ -12,9 +12,9 @@ import xarray as xr
 from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
 from undertow.analysis.navigation_consistency import navigation_consistency
-from undertow.analysis.success import Success, judged
+from undertow.analysis.success import Success, evaluate_success
 from undertow.analysis.temporal.requirements import Requirement, Verdict, contiguous, needed_signals
-from undertow.analysis.temporal.requirements import judged as verdicts
+from undertow.analysis.temporal.requirements import evaluate_requirements as verdicts
 from undertow.control.supervision.supervised_controller import state_in, unsupervised
 from undertow.control.supervision.transition_log import transitions
 from undertow.core.contracts import AbstractController
@@ -169,7 +169,7 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         whole=whole,
         meanings={name: metric for name, metric in meanings(loop, settings.own).items() if name in metric_names},
         scenario=origin.scenario,
-        success=None if lasted_but_unseen else judged(settings.criterion, steady),
+        success=None if lasted_but_unseen else evaluate_success(settings.criterion, steady),
         requirements=_verdicts(outcome, settings, steady or {}),
         certificate=None if certified is None else finite_numbers(certified.summary),
         navigation=finite_numbers(navigation_consistency(loop, series, steady)),

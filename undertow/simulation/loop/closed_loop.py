@@ -28,9 +28,9 @@ from undertow.core.contracts import (
 )
 from undertow.core.errors import BadInput
 from undertow.core.expected_measurement import Expected, at_start
-from undertow.core.measurement import completed
+from undertow.core.measurement import with_pose
 from undertow.core.numerics.random_keys import keys_for
-from undertow.core.returned import check_command
+from undertow.core.return_checks import check_command
 from undertow.core.signals import Signal, check_declared
 from undertow.simulation.loop.recorded_signals import RECORDED, RECORDED_WITH_FAULTS, Signals
 
@@ -274,7 +274,7 @@ def _moved(realization: Realization, t: Time, x: PyTree, applied: Inputs) -> PyT
 
 
 def _completed(measured: tuple[Measurement, PyTree], truth: Measurement) -> tuple[Measurement, PyTree]:
-    return completed(measured[0], truth), measured[1]
+    return with_pose(measured[0], truth), measured[1]
 
 
 def _keys(key: PRNGKeyArray) -> dict[str, PRNGKeyArray]:

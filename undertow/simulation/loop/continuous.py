@@ -17,7 +17,7 @@ from undertow.core.expected_measurement import all_finite
 from undertow.core.numerics.integrators import rk4_compact
 from undertow.core.status import Status
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
-from undertow.simulation.loop.outcome import Ending, Outcome, going, status_of
+from undertow.simulation.loop.outcome import Ending, Outcome, running, status_of
 from undertow.simulation.loop.recording import freeze_on_failure, instant, record
 
 
@@ -145,7 +145,7 @@ def _run(loop: ClosedLoop, key, start, dt: Float[Array, ""], plan: tuple[int, in
 
 def begin(realization: Realization, start: tuple[Outputs, Outputs]) -> PyTree:
     """Carry before the first fixed step, of the form of `sampled.begin`: nothing is accumulated."""
-    return realization.start(*start), (), going()
+    return realization.start(*start), (), running()
 
 
 def step(realization: Realization, dt: Any, carry, k):
@@ -214,6 +214,6 @@ def solve(loop, key, start, times, until, jumps, rtol, atol) -> Outcome:
     samples = jax.lax.map(lambda at: realization.record(at[0], *unravel(at[1])), (times[index], states[index]))
     valid = jnp.where(status == int(Status.OK), final[0], states[last])
     ending = blamed(
-        going()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
+        running()._replace(status=status, time=ended[0]), realization, ended[0], unravel(final[0]), _FIRST_STEP
     )
     return Outcome(times, samples, (), unravel(valid), *ending)

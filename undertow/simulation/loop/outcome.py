@@ -33,7 +33,7 @@ class Ending(NamedTuple):
         )
 
 
-def going() -> Ending:
+def running() -> Ending:
     """Ending of a run that begins."""
     return Ending(jnp.asarray(int(Status.OK)), jnp.zeros(()), jnp.zeros((), dtype=int))
 

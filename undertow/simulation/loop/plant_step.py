@@ -13,7 +13,7 @@ from jaxtyping import Array, Int
 from undertow.core.contracts import Inputs, Measurement, Outputs, Time
 from undertow.simulation.loop.closed_loop import MeasurementState, Realization
 from undertow.simulation.loop.outcome import status_of
-from undertow.simulation.loop.sampled import moved
+from undertow.simulation.loop.sampled import integrate_plant
 
 
 class PlantState(NamedTuple):
@@ -59,14 +59,14 @@ def hold(
         t: s.
         dt: how long, s.
         applied: input within the limits of the plant; faults may change what acts.
-        integrate, substeps: integration, as of `sampled.moved`.
+        integrate, substeps: integration, as of `sampled.integrate_plant`.
     """
     acting = applied
     if realization.loop.faults is not None:
         acting, faults = realization.failed(state.faults, t, state.plant, applied)
         state = state._replace(faults=faults)
     motion = lambda t, x: realization.motion(t, x, acting)
-    return state._replace(plant=moved(motion, t, state.plant, dt, integrate, substeps))
+    return state._replace(plant=integrate_plant(motion, t, state.plant, dt, integrate, substeps))
 
 
 def observe(

@@ -13,9 +13,9 @@ from jaxtyping import Array, Float, PRNGKeyArray, PyTree
 from undertow.core.contracts import Outputs
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import METHODS, first_stage
-from undertow.core.returned import check_state
+from undertow.core.return_checks import check_state
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
-from undertow.simulation.loop.outcome import Outcome, going
+from undertow.simulation.loop.outcome import Outcome, running
 from undertow.simulation.loop.recorded_signals import Signals
 from undertow.simulation.loop.recording import freeze_on_failure, instant, record
 
@@ -96,7 +96,7 @@ def _run(loop, key, start, dt, accumulators, plan: tuple[int, int, str, int]) ->
     return Outcome(time, samples, gathered, final[:2], *ending.until(steps * dt))
 
 
-def moved(motion: Callable, t, x: PyTree, dt, integrate: Callable, substeps: int) -> PyTree:
+def integrate_plant(motion: Callable, t, x: PyTree, dt, integrate: Callable, substeps: int) -> PyTree:
     """State of the plant one control step after t, with the input held.
 
     Args:
@@ -119,7 +119,7 @@ def begin(realization: Realization, start: tuple[Outputs, Outputs], accumulators
     states = (x, z, realization.initial_measuring(x))
     blank = jax.tree.map(jnp.zeros_like, jax.eval_shape(realization.record, jnp.zeros(()), *states))
     gathered = tuple(a.init(blank) for a in accumulators)
-    return (states, gathered, going())
+    return (states, gathered, running())
 
 
 def control_step(realization: Realization, accumulators, dt, integrate, substeps: int, carry, k):
@@ -131,7 +131,7 @@ def control_step(realization: Realization, accumulators, dt, integrate, substeps
         # Of the first stage, whose acceleration is then computed once; where the load jumps, it has jumped.
         signals = realization.signals(jnp.asarray(first_stage(t, dt / substeps)), x, z, decision)
         gathered = tuple(a.update(g, t, signals) for a, g in zip(accumulators, gathered, strict=True))
-    new_x = moved(lambda t, x: realization.motion(t, x, decision.acting), t, x, dt, integrate, substeps)
+    new_x = integrate_plant(lambda t, x: realization.motion(t, x, decision.acting), t, x, dt, integrate, substeps)
     y, law = decision.y, loop.controller
     new_z = law.advance(z, y, decision.r, decision.applied, dt)
     check_state(law, new_z, z)

@@ -62,7 +62,7 @@ class CompiledStep(Uncopied):
         self._step()
 
 
-def step_of(function: Callable, part: Any, state: Any, inputs: Any) -> CompiledStep:
+def compile_step(function: Callable, part: Any, state: Any, inputs: Any) -> CompiledStep:
     """A compiled step whose numbers are those of a part: function(part, state, inputs) -> (state, outputs)."""
     of_part, static = eqx.partition(part, eqx.is_array)
     return CompiledStep(
@@ -95,7 +95,7 @@ def realized(loop: ClosedLoop, key: Any) -> Realization:
     return loop.realized_with(disturbance, key)
 
 
-def put(targets: Any, values: Any) -> None:
+def copy_into(targets: Any, values: Any) -> None:
     """Write the arrays of a tree into those of another."""
     for target, value in zip(jax.tree.leaves(targets), jax.tree.leaves(values), strict=True):
         if target is not value:

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.scenario.build import Built, build, build_scenario
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import loop_run
@@ -61,7 +61,7 @@ def build_trial(campaign_trials: Trials, part_cache: PartCache, row: int) -> Bui
     Raises:
         BadInput: its scenario cannot be built.
     """
-    with within(location=campaign_trials.location, note=f"trial {row}"):
+    with error_location(location=campaign_trials.location, note=f"trial {row}"):
         return build_data(campaign_trials, part_cache, campaign_trials.data(row))
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.special import bdtr
 
 from undertow.studies.campaign.columns import ENDINGS, JUDGEMENTS
-from undertow.studies.campaign.realized import realized_scalars
+from undertow.studies.campaign.random_scalars import realized_scalars
 from undertow.studies.campaign.requirements import verdict
 from undertow.studies.campaign.store_results import Results
 from undertow.studies.campaign.task import reasons

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built
 from undertow.scenario.checks.vehicle_lint import vehicle_advice
@@ -54,16 +54,16 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     check_kind(campaign_trials.scenario, "scenario", source.where(("scenario",)))
     text = whole(campaign, campaign_trials.scenario.data)
     folder = campaign_trials.scenario.folder
-    context = tasks.site(text, str(folder))
+    context = tasks.task_context(text, str(folder))
     firsts = [_first(campaign_trials, context, combination) for combination in range(len(campaign_trials.combinations))]
-    with within(location=source.location):
-        _check_shapes(campaign, context.probes().values())
+    with error_location(location=source.location):
+        _check_shapes(campaign, context.representative_trials().values())
     metrics = context.metrics()
     advice: dict[str, str] = {}
     for row, built in firsts:
-        with within(location=source.location):
+        with error_location(location=source.location):
             _check(campaign, built, metrics)
-        with within(location=campaign_trials.location):
+        with error_location(location=campaign_trials.location):
             trial_advice = (*built.advice(), *vehicle_advice(built))
         for warning in trial_advice:
             advice.setdefault(warning.sentence, f"trial {row}: {warning.sentence}")
@@ -75,14 +75,14 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     return Prepared(campaign_trials, text, folder, firsts[0][1], metrics, named, advice_given)
 
 
-def _invalid(campaign_trials: Trials, context: tasks.Site) -> tuple[str, ...]:
+def _invalid(campaign_trials: Trials, context: tasks.TaskContext) -> tuple[str, ...]:
     """Why some of the first trials cannot be built."""
-    rows = campaign_trials.probes()
-    groups = reasons(campaign_trials, [row for row in rows if row not in context.probes()])
+    rows = campaign_trials.representative_trials()
+    groups = reasons(campaign_trials, [row for row in rows if row not in context.representative_trials()])
     return tuple(f"{group.trials} of the first {len(rows)} trials are invalid: {group.why}" for group in groups)
 
 
-def _first(campaign_trials: Trials, context: tasks.Site, combination: int) -> tuple[int, Built]:
+def _first(campaign_trials: Trials, context: tasks.TaskContext, combination: int) -> tuple[int, Built]:
     """The first trial of a combination that can be built.
 
     Raises:
@@ -90,8 +90,8 @@ def _first(campaign_trials: Trials, context: tasks.Site, combination: int) -> tu
     """
     rows = campaign_trials.first(combination)
     for row in rows:
-        if row in context.probes():
-            return row, context.probes()[row]
+        if row in context.representative_trials():
+            return row, context.representative_trials()[row]
     return rows[0], build_trial(campaign_trials, context.part_cache, rows[0])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from undertow.analysis.temporal import requirements as temporal
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built
 from undertow.scenario.consistency import record_period
@@ -25,7 +25,7 @@ def formulas_of(campaign: Campaign, built: Built) -> tuple[temporal.Requirement,
     """
     if not campaign.formulas:
         return ()
-    with within("requirements"):
+    with error_location("requirements"):
         loop = built.closed_loop
         duration = built.scenario.loop.duration
         return temporal.requirements_of(campaign.formulas, {}, loop, {}, duration)
@@ -89,7 +89,9 @@ def robustness(
         needed = temporal.needed_signals(requirements)
         signals = temporal.contiguous({name: series[name][row] for name in needed}, needed)
         ending = (int(status[row]), float(ended[row]), loop.duration)
-        for name, verdict in temporal.judged(requirements, signals, record_period(loop), {}, *ending).items():
+        for name, verdict in temporal.evaluate_requirements(
+            requirements, signals, record_period(loop), {}, *ending
+        ).items():
             by_name[name][row] = verdict.robustness
     return by_name
 

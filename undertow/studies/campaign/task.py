@@ -31,36 +31,36 @@ INVALID = -1
 NOT_JUDGED = -1
 
 
-class Site(NamedTuple):
+class TaskContext(NamedTuple):
     """Objects that a process keeps between the tasks of one campaign."""
 
     trials: Trials
     part_cache: PartCache
     programs: ProgramCache
     traceable: dict[TrialSignature, bool]  # see `build_trials`
-    probes: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
+    representative_trials: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
     alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
 
     def metrics(self) -> dict[str, Metric]:
         """Metrics that any of the trials may have. Each has a column, which is NaN where a trial has no such metric."""
         metrics: dict[str, Metric] = {}
-        for built in (*self.probes().values(), *self.alternatives()):
+        for built in (*self.representative_trials().values(), *self.alternatives()):
             metrics = gathered_meanings(built.closed_loop, built.metrics) | metrics
         return metrics | formula_metrics(self.trials.campaign)
 
 
 @functools.lru_cache(maxsize=2)
-def site(text: str, folder: str) -> Site:
+def task_context(text: str, folder: str) -> TaskContext:
     """The campaign of this text in this process; relative paths in it start at the folder."""
     campaign_trials = trials(*read_text(text, Path(folder)))
     part_cache = PartCache()
-    rows = campaign_trials.probes()
+    rows = campaign_trials.representative_trials()
     probes = functools.cache(
         lambda: {rows[index]: built for index, built in valid_trials(campaign_trials, part_cache, rows)}
     )
     alternatives = functools.cache(lambda: list(_alternatives(campaign_trials, part_cache)))
     programs = ProgramCache(lambda: [prepare_trial(built, None) for built in probes().values()], gpu=True)
-    return Site(campaign_trials, part_cache, programs, {}, probes, alternatives)
+    return TaskContext(campaign_trials, part_cache, programs, {}, probes, alternatives)
 
 
 def run_block(text: str, folder: str, layout: StoreLayout, task: int) -> dict[str, np.ndarray]:
@@ -71,10 +71,10 @@ def run_block(text: str, folder: str, layout: StoreLayout, task: int) -> dict[st
 def run_trials(text: str, folder: str, rows: Sequence[int]) -> dict[str, np.ndarray]:
     """Run the trials of these numbers and return their columns: sampled values, status and metrics."""
     with runtime.on_processor():
-        return _ran(site(text, folder), rows)
+        return _ran(task_context(text, folder), rows)
 
 
-def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
+def _ran(context: TaskContext, rows: Sequence[int]) -> dict[str, np.ndarray]:
     trials = np.array(rows, dtype=np.int64)
     sampled = context.trials.sampled(trials)
     columns = {f"vary:{key}": column for key, column in _columns(context.trials, sampled)}
@@ -93,10 +93,16 @@ def _ran(context: Site, rows: Sequence[int]) -> dict[str, np.ndarray]:
             yield trial_batch.batch
 
     campaign = context.trials.campaign
-    series = recorded(campaign, next(iter(context.probes().values()))) if campaign.formulas else campaign.series
+    series = (
+        recorded(campaign, next(iter(context.representative_trials().values())))
+        if campaign.formulas
+        else campaign.series
+    )
     result = run_prepared(batches(), context.programs)
     if result is None:  # no trials: the arrays of one trial, cut to length zero
-        one_trial = run_prepared([prepare_trial(next(iter(context.probes().values())), series)], context.programs)
+        one_trial = run_prepared(
+            [prepare_trial(next(iter(context.representative_trials().values())), series)], context.programs
+        )
         result = jax.tree.map(lambda values: values[:0], one_trial)
     robust = robustness(campaign, firsts, result.series, result.status, result.ended)
     scatter = functools.partial(_scatter, len(rows), result_rows)

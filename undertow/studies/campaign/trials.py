@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Int, UInt32
 
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.scenario.reading import Text, read
 from undertow.studies.campaign.campaign_schema import VARIANT, Campaign
 from undertow.studies.campaign.labels import is_number, words
@@ -55,7 +55,7 @@ class Trials(NamedTuple):
         """The trials of a combination that are built before the first run."""
         return [sample * len(self.combinations) + combination for sample in range(min(_PROBES, self.campaign.trials))]
 
-    def probes(self) -> list[int]:
+    def representative_trials(self) -> list[int]:
         """The first trials of all combinations."""
         return [trial for combination in range(len(self.combinations)) for trial in self.first(combination)]
 
@@ -115,7 +115,7 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
 def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
     scenario = campaign.scenario
     if isinstance(scenario, str):
-        with within(location=text.location):
+        with error_location(location=text.location):
             scenario_text = read(text.folder / scenario, "scenario", allow_code)
             if "scenario" in scenario_text.data:
                 raise BadInput("scenario", "be the file of a scenario", f"{scenario}, a campaign")

@@ -215,7 +215,7 @@ def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
 def _firsts(prepared: Prepared) -> tuple[Built, ...]:
     """The first valid trial of each candidate."""
     campaign_trials = prepared.trials
-    probes = tasks.site(prepared.text, str(prepared.folder)).probes()
+    probes = tasks.task_context(prepared.text, str(prepared.folder)).representative_trials()
     return tuple(
         next(probes[row] for row in campaign_trials.first(number) if row in probes)
         for number in range(len(campaign_trials.combinations))

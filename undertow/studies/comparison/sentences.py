@@ -2,7 +2,7 @@
 
 import math
 
-from undertow.analysis.metrics import for_people
+from undertow.analysis.metrics import display_units
 from undertow.studies.comparison.findings import COMPLETED, Findings
 from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, PairedDifference
 from undertow.studies.comparison.pareto import Front
@@ -63,9 +63,9 @@ def metric_name(metric: str) -> str:
     return metric.replace("_", " ")
 
 
-def shown(value: float, unit: str) -> str:
+def value_with_unit(value: float, unit: str) -> str:
     """A value in three digits with its unit; angles in degrees."""
-    number, unit = for_people(value, unit)
+    number, unit = display_units(value, unit)
     return f"{digits(number)} {unit}".rstrip()
 
 
@@ -79,7 +79,7 @@ def digits(value: float) -> str:
 def relative(difference: PairedDifference, unit: str) -> str:
     """Median difference in percent of the baseline; in the unit of the metric where the baseline has zeros."""
     if math.isnan(difference.relative):
-        return f"{'+' if difference.median > 0 else ''}{shown(difference.median, unit)}"
+        return f"{'+' if difference.median > 0 else ''}{value_with_unit(difference.median, unit)}"
     sign = "+" if difference.relative > 0 else ""
     return f"{sign}{digits(100 * difference.relative)} %"
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from undertow.analysis.metrics import for_people, infinite, titled_name
+from undertow.analysis.metrics import display_units, infinite, titled_name
 from undertow.studies.comparison.findings import Findings, Median
 from undertow.studies.comparison.paired import PairedDifference
 from undertow.studies.comparison.sentences import digits, relative
@@ -92,12 +92,12 @@ def median(estimate: Median, unit: str, number: Callable[[float], str] = digits)
 
 def value_in(value: float, unit: str, number: Callable[[float], str] = digits) -> str:
     """A value in the unit of tables for people, without its name."""
-    return infinite(unit) if math.isinf(value) else number(for_people(value, unit)[0])
+    return infinite(unit) if math.isinf(value) else number(display_units(value, unit)[0])
 
 
 def titled(findings: Findings, metric: str) -> str:
     """A metric with its unit."""
-    unit = for_people(0.0, findings.units[metric])[1]
+    unit = display_units(0.0, findings.units[metric])[1]
     return f"{titled_name(metric)} ({unit})" if unit else titled_name(metric)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
+from undertow.analysis.temporal.requirements import Requirement, contiguous, evaluate_requirements, needed_signals
 from undertow.core import runtime
 from undertow.core.errors import BadInput
 from undertow.scenario.build import Built, build
@@ -92,6 +92,6 @@ class Evaluator:
             signals = contiguous({name: result.series[name][row] for name in self._names}, self._names)
             metrics = {name: float(values[row]) for name, values in result.metrics.items()}
             status, ended, duration = int(result.status[row]), float(result.ended[row]), built.scenario.loop.duration
-            verdicts = judged(self.requirements, signals, self.period, metrics, status, ended, duration)
+            verdicts = evaluate_requirements(self.requirements, signals, self.period, metrics, status, ended, duration)
             robustness[i] = [verdicts[requirement.name].robustness for requirement in self.requirements]
         return robustness

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from undertow.analysis.temporal.requirements import Requirement, contiguous, judged, needed_signals
+from undertow.analysis.temporal.requirements import Requirement, contiguous, evaluate_requirements, needed_signals
 from undertow.core import checks
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.scenario.build import Built, build
 from undertow.scenario.consistency import record_period
 from undertow.scenario.provenance import text_hash
@@ -145,7 +145,7 @@ def judged_alone(requirements: Sequence[Requirement], result: ScenarioResult) ->
     """Robustness of every requirement in one run of a scenario, by name."""
     loop = result.built.scenario.loop
     names = needed_signals(requirements)
-    verdicts = judged(
+    verdicts = evaluate_requirements(
         requirements,
         contiguous(result.outcome.signals, names),
         record_period(loop),
@@ -176,7 +176,7 @@ def evaluator_of(text: Text) -> Evaluator:
     Raises:
         BadInput: nothing varies or is required; a key path leads nowhere; the loop is not sampled.
     """
-    with within(location=text.location):
+    with error_location(location=text.location):
         built = build(text)
         settings, loop = built.scenario.falsify, built.scenario.loop
         if loop.kind != "sampled":
@@ -186,11 +186,11 @@ def evaluator_of(text: Text) -> Evaluator:
         every_step = text._replace(data={**text.data, "steady": {**text.data.get("steady", {}), "every_step": True}})
         evaluator = Evaluator(every_step, build(every_step), box, _required(built, settings))
         for axis in box.axes:
-            with within(f"falsify.vary.{axis.key}"):
+            with error_location(f"falsify.vary.{axis.key}"):
                 scenario_at(text, {axis.key: axis.high})
         for departure in (*np.diag(box.lower), *np.diag(box.upper)):
             if evaluator.built(departure) is None:
-                with within(note="at a bound of `falsify.vary`"):
+                with error_location(note="at a bound of `falsify.vary`"):
                     build(scenario_at(text, box.values(departure)))
         return evaluator
 

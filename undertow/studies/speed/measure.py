@@ -84,7 +84,7 @@ def with_cache(folder: str) -> dict[str, str]:
 
 def _single(job: Workload, repetitions: int = _REPETITIONS) -> dict[str, float]:
     single, compiling = _timed(lambda: workload.batch(job, width=1))
-    numbers = workload.alone(job.run)
+    numbers = workload.batch_of_one(job.run)
     tracking = float(workload.tracking(single.run(numbers).accumulated)[0])
     ns_per_step = _shortest(lambda: single.run(numbers), repetitions) / job.steps
     return {"single_compile_s": compiling, "single_ns": ns_per_step, "tracking_rms": tracking}

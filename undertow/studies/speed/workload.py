@@ -92,6 +92,6 @@ def tracking(accumulated: Any) -> np.ndarray:
     return np.sqrt(np.asarray(squares).mean(-1) / np.asarray(samples))
 
 
-def alone(run: LoopRun) -> Any:
+def batch_of_one(run: LoopRun) -> Any:
     """Numbers of the run itself."""
     return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], eqx.filter(run, eqx.is_array))

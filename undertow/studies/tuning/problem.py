@@ -11,7 +11,7 @@ import numpy as np
 
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
-from undertow.core.errors import BadInput, did_you_mean, within
+from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text
 from undertow.studies.tuning import tunable_parameters as tunable_parameters
@@ -68,7 +68,7 @@ def problem(text: Text) -> Problem:
     Raises:
         BadInput: the scenario, or its section `tune`, cannot be used.
     """
-    with within(location=text.location):
+    with error_location(location=text.location):
         return _problem(text, build(text).of_the_law())
 
 
@@ -96,7 +96,7 @@ def _problem(text: Text, built: Built) -> Problem:
     begin = [parameter.share(_mean(tunable, loop.controller, base_options, parameter)) for parameter in chosen]
     tuning_problem = Problem(built, chosen, law, np.array(begin), training_loop, train, held_out)
     try:
-        with within("controller"):
+        with error_location("controller"):
             tuning_problem.law(tuning_problem.options(tuning_problem.start))
             jax.eval_shape(
                 lambda point: eqx.filter(law(tuning_problem.options(point)), eqx.is_array), tuning_problem.start

@@ -11,7 +11,7 @@ import numpy as np
 
 from undertow.core import runtime
 from undertow.core.contracts import AbstractController
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.scenario.build import in_its_precision
 from undertow.scenario.provenance import text_hash
 from undertow.scenario.reading import Text, dump
@@ -135,7 +135,7 @@ def tune(
     designed = objective.evaluations
     start = objective.best
     if start is None:
-        with within(location=text.location):
+        with error_location(location=text.location):
             raise no_certificate(certifier(evaluation.law(task.start)), tried, designed)
     say("tuning")
     try:

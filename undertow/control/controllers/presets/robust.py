@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.control.controllers.bandwidths import axes_of, completed
+from undertow.control.controllers.bandwidths import axes_of, default_bandwidths
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.control.controllers.reference_filter import ReferenceFilter
 from undertow.control.controllers.robust.estimator import Estimator, widened
@@ -79,7 +79,7 @@ def robust(
     actuator_rate, reference_frequency = actuation.actuator_rate, actuation.reference_frequency
     if any(rate is None for rate in (bandwidth, tracking, actuator_rate)):
         axes = axes_of(model, conditions)
-        bandwidth, tracking, actuator_rate = completed(axes, bandwidth, tracking, actuator_rate)
+        bandwidth, tracking, actuator_rate = default_bandwidths(axes, bandwidth, tracking, actuator_rate)
     for name, value, unit in (("bandwidth", bandwidth, "rad/s"), ("tracking", tracking, "rad/s")):
         checks.positive(name, value, unit)
     if reach is None:

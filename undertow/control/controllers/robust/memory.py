@@ -42,13 +42,13 @@ class MemoryState(NamedTuple):
     inertia: InertiaState | None  # what probing has found
 
 
-class Observed(NamedTuple):
-    """What one control step tells a memory, per axis."""
+class TrainingSample(NamedTuple):
+    """What a memory learns from in one control step, per axis."""
 
-    rest: PerAxis  # what the observer adds to the memory, m/s^2, rad/s^2
+    estimate: PerAxis  # what the observer adds to the memory, m/s^2, rad/s^2
     error: PerAxis  # modelling error of the observer, m/s, rad/s
-    off: PerAxis  # error of the plant from the reference, m, rad
-    correction: PerAxis  # desired acceleration besides that of the reference, less `rest`, m/s^2, rad/s^2
+    tracking_error: PerAxis  # error of the plant from the reference, m, rad
+    correction: PerAxis  # desired acceleration besides that of the reference, less `estimate`, m/s^2, rad/s^2
     rate: PerAxis  # velocity of the plant besides that of the reference, m/s, rad/s
     nominal: PerAxis  # F + G u of the applied input besides the acceleration of the reference, m/s^2, rad/s^2
 
@@ -185,21 +185,21 @@ class Memory(eqx.Module):
         return self.recalled(state, phi) + (1 - self.inertia_ratio(state)) * correction
 
     def advance(
-        self, state: MemoryState, phi: Regressor, observed: Observed, gains, free, dt
+        self, state: MemoryState, phi: Regressor, sample: TrainingSample, gains, free, dt
     ) -> tuple[MemoryState, PerAxis]:
         """State one sampling time later, and what the observer loses of its estimate, m/s^2 and rad/s^2.
 
         Args:
             state: now.
             phi: regressor now.
-            observed: what this step tells.
+            sample: of this control step.
             gains: of the observer, per sampling time and 1/s.
             free: 1, or 0 while limits bind and nothing is learnt.
             dt: sampling time, s.
         """
         of_rates, of_estimate = gains
         used, span, h = evidence.trust(state.evidence), free * dt, self.inertia_ratio(state)
-        innovation = h * observed.rest - (1 - used) * matvec(state.weights.T, state.lagged)
+        innovation = h * sample.estimate - (1 - used) * matvec(state.weights.T, state.lagged)
         direction = matvec(state.covariance, state.lagged)
         size = dt * (state.lagged * direction).sum()
         forgetting = dt / self.horizon
@@ -209,10 +209,10 @@ class Memory(eqx.Module):
         reopened = evidence.wrong(state.evidence) * span / self.judging_time
         unknown = self.learning_rate * jnp.eye(phi.shape[0])
         explained = matvec(state.weights.T, state.ahead)
-        alone, inertia = h * observed.error + used * explained, None
+        alone, inertia = h * sample.error + used * explained, None
         if self.inertia is not None and state.inertia is not None:
-            expected = observed.nominal + self.recalled(state, phi)
-            inertia = self.inertia.advance(state.inertia, observed.off, observed.rate, expected, free, dt)
+            expected = sample.nominal + self.recalled(state, phi)
+            inertia = self.inertia.advance(state.inertia, sample.tracking_error, sample.rate, expected, free, dt)
         after = MemoryState(
             weights=jnp.clip(weights, -self.bound, self.bound),
             covariance=state.covariance - shrunk + reopened * (unknown - state.covariance),
@@ -222,7 +222,7 @@ class Memory(eqx.Module):
             taken=state.taken,
             inertia=inertia,
         )
-        gained = self.value(after, phi, observed.correction) - self.value(state, phi, observed.correction)
+        gained = self.value(after, phi, sample.correction) - self.value(state, phi, sample.correction)
         lost = gained / self.inertia_ratio(after)
         return after._replace(taken=state.taken + lost), lost
 

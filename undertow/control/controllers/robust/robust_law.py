@@ -11,7 +11,7 @@ from undertow.control.controllers.law_signals import ADAPTIVE_LAW, INERTIA, MEMO
 from undertow.control.controllers.reference_filter import FilterState, ReferenceFilter, Room
 from undertow.control.controllers.robust import evidence
 from undertow.control.controllers.robust.estimator import Estimator, EstimatorState, UncertaintyEstimate
-from undertow.control.controllers.robust.memory import Memory, MemoryState, Observed
+from undertow.control.controllers.robust.memory import Memory, MemoryState, TrainingSample
 from undertow.control.controllers.thruster_allocation import allocate, attained
 from undertow.control.controllers.tracking_error import Tracking, check_gains, tracking
 from undertow.control.estimation.fuzzy_system import FuzzySystem
@@ -52,7 +52,7 @@ class RobustDecisions(NamedTuple):
 
     actuators: Any
     seen: UncertaintyEstimate
-    off: Tracking  # error from the target, filtered if there is a filter
+    tracking_error: Tracking  # error from the target, filtered if there is a filter
     robust: PerAxis  # u_r
     desired: PerAxis  # acceleration, m/s^2, rad/s^2
     forces: Float[Array, " m"]  # for the desired acceleration, without limits
@@ -129,7 +129,7 @@ class RobustRCAF(AbstractController):
             "modelling_error": plan.seen.error,
             "attained_share": attained(effect, plan.forces, forces),
         }
-        signals |= lyapunov_signals(plan.off, self.lyapunov(), self.weight)
+        signals |= lyapunov_signals(plan.tracking_error, self.lyapunov(), self.weight)
         if self.memory is not None and z.memory is not None and plan.recalled is not None:
             signals |= {
                 "memory": plan.recalled.value,
@@ -146,19 +146,19 @@ class RobustRCAF(AbstractController):
         # While limits bind, the reference waits, and the tracking error is not caused by d.
         applied = actuators.target_of(plan.actuators, u_applied, self.actuator_rate)
         share = attained(effect, plan.forces, applied)
-        tracking_term = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.off.filtered)
+        tracking_term = jnp.where(share < _WHOLE, 0.0, self.tracking_share * plan.tracking_error.filtered)
         modelled = self._known(plan.actuators, y, u_applied)
         remembered, lost = None, None
         if self.memory is not None and z.memory is not None and plan.recalled is not None:
-            tracking_error, correction = plan.off, plan.recalled.correction
+            tracking_error, correction = plan.tracking_error, plan.recalled.correction
             unexplained = plan.seen.uncertainty - plan.recalled.value
             nominal = modelled - tracking_error.acceleration
-            observed = Observed(
+            sample = TrainingSample(
                 unexplained, plan.seen.error, tracking_error.error, correction, -tracking_error.rate, nominal
             )
             gains = tuple(jnp.mean(gain) for gain in self.estimator.gains(dt))
             free = jnp.where(share < _WHOLE, 0.0, 1.0)
-            remembered, lost = self.memory.advance(z.memory, plan.recalled.phi, observed, gains, free, dt)
+            remembered, lost = self.memory.advance(z.memory, plan.recalled.phi, sample, gains, free, dt)
             # What differs from the desired acceleration acts on the inertia that was learnt.
             expected = modelled + plan.seen.uncertainty
             modelled = modelled + (1 / self.memory.inertia_ratio(z.memory) - 1) * (expected - plan.desired)
@@ -169,7 +169,7 @@ class RobustRCAF(AbstractController):
             estimator=estimator,
             actuators=actuators.advance(plan.actuators, u_applied, dt),
             filter=self.filter
-            and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.off)),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
+            and self.filter.advance(z.filter, r, self.model.coordinates, share, dt, self._room(y, plan.tracking_error)),  # pyright: ignore[reportArgumentType] - a law with a filter has its state
             memory=remembered,
         )
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from undertow.core.contracts import AbstractPlant
-from undertow.core.errors import Advice, advice, within
+from undertow.core.errors import Advice, advice, error_location
 from undertow.physics.vehicles.facts import Facts as Facts
 from undertow.physics.vehicles.facts import facts_of as facts_of
 from undertow.physics.vehicles.vehicle import VehicleModel
@@ -108,5 +108,5 @@ def vehicle_advice(built: Built) -> tuple[Advice, ...]:
         findings_shown = [
             finding._replace(hint=stays) if finding.rule == "gravity" else finding for finding in findings_shown
         ]
-    with within("plant.vehicle", vehicle_location(built.text)):
+    with error_location("plant.vehicle", vehicle_location(built.text)):
         return tuple(advice(finding.key, finding.says, finding.hint) for finding in findings_shown)

@@ -12,7 +12,7 @@ import numpy as np
 
 from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import catalogue
-from undertow.core.errors import BadInput, known_key, within
+from undertow.core.errors import BadInput, error_location, known_key
 from undertow.physics.faults.injected import Faults, InputFault, PlantFault, QuantityFault
 from undertow.physics.faults.kinds import FaultKind, check_pair
 from undertow.physics.faults.mode import AbstractFault
@@ -32,7 +32,7 @@ _OTHER_WORDS |= dict.fromkeys(("size", "value", "amount"), "severity")
 _OTHER_WORDS |= {"length": "duration", "lasts": "duration", "where": "target", "thruster": "number"}
 
 
-def faulted(
+def with_faults(
     loop: ClosedLoop,
     entries: Sequence[Fault],
     folder: Path = Path(),
@@ -59,7 +59,7 @@ def faulted(
     entries_of: dict[str, list[int]] = {name: [] for name in groups}
     resolved = []
     for place, entry in enumerate(entries):
-        with within(f"[{place}]"):
+        with error_location(f"[{place}]"):
             target, number = named(entry.target, entry.number, known, names)
             number = checked_number(target, number)
             fault, options = made.get(place), {}
@@ -106,7 +106,7 @@ def _made(entry: Fault, folder: Path, sampling_time: float) -> tuple[AbstractFau
             other = _OTHER_WORDS.get(str(key).lower())
             hint = f"Did you mean `{other}`?" if other else known_key(str(key), [*type(entry).model_fields, *own])
             raise BadInput(str(key), f"be a key of a fault, or an option of `{entry.mode}`", "unknown", hint=hint)
-    with within(written=lambda key: "mode" if key == "kind" else key):
+    with error_location(written=lambda key: "mode" if key == "kind" else key):
         fault, described = factory.make("faults", {"kind": entry.mode, **options}, folder, (), context)
     name = described.pop("kind")
     return fault, {"mode": name} | {key: value for key, value in described.items() if key not in context}

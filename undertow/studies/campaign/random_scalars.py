@@ -50,7 +50,7 @@ def realized_scalars(campaign_trials: Trials, rows: Sequence[int]) -> dict[str, 
     part_cache = PartCache()
     random = set[str]()
     columns = dict[tuple[str, str], np.ndarray]()
-    probes = {*rows[:1], *campaign_trials.probes()}
+    probes = {*rows[:1], *campaign_trials.representative_trials()}
     with runtime.on_processor(), contextlib.suppress(BadInput):  # a file that the scenario names may be gone by now
         for index, row in enumerate(rows[:MOST]):
             built = build_trial(campaign_trials, part_cache, int(row))

@@ -14,7 +14,7 @@ from undertow.analysis.drift import gain_bound, gain_of
 from undertow.analysis.motor_loop import lag_matrix, stable_gains
 from undertow.paper.horizons import BOUND
 from undertow.paper.lag_map import lag_thruster
-from undertow.paper.running import BatchedRun, begin_batches, write_all
+from undertow.paper.running import BatchedRun, start_batches, write_all
 from undertow.paper.setup import law_of, scenario
 from undertow.simulation.processes import Tasks
 
@@ -47,14 +47,14 @@ def scenarios() -> dict[str, dict[str, Any]]:
     return by_name
 
 
-def begin(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchedRun]]:
+def start_runs(folder: Path, tasks: Tasks) -> Callable[[], dict[str, BatchedRun]]:
     """Begin both runs, and return what waits for them; `scenarios/` is written in a folder."""
     named = scenarios()
     write_all(named, folder)
-    return begin_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"), tasks)
+    return start_batches(named, ((10.0, _SECONDS),), 1e-3, ("weights", "weights_peak", "input", "error"), tasks)
 
 
-def shown(batched_runs: Mapping[str, BatchedRun]) -> dict[str, Any]:
+def drift_results(batched_runs: Mapping[str, BatchedRun]) -> dict[str, Any]:
     """Gain c of every axis, largest weight and chattering against time, and the c that the linearised loop needs.
 
     Args:

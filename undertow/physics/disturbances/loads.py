@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractDisturbance, FreeSurface, Load, ModelScaling, Payload, Pose, Water
-from undertow.core.errors import BadInput, within
+from undertow.core.errors import BadInput, error_location
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.numerics.rotations import cross
 
@@ -36,7 +36,7 @@ class SumOfDisturbances(AbstractDisturbance):
 
     def at(self, realization, t, pose, load: Load) -> Load:
         for i, (member, own) in enumerate(zip(self.members, realization, strict=True)):
-            with within(f"[{i}]"):
+            with error_location(f"[{i}]"):
                 load = member.at(own, t, pose, load)
         return load
 

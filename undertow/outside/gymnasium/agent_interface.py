@@ -54,7 +54,9 @@ class AgentInterface(NamedTuple):
         return values if self.reward == "negative_cost" else 1 / (1 - values)
 
 
-def shown(interface: PolicyInterface, dtype: Any, float32: bool, normalised: bool, reward: str) -> AgentInterface:
+def agent_interface(
+    interface: PolicyInterface, dtype: Any, float32: bool, normalised: bool, reward: str
+) -> AgentInterface:
     """How numbers are shown.
 
     Raises:
