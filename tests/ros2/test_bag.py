@@ -132,7 +132,7 @@ def test_a_bag_is_complete_after_an_exception(tmp_path):
 
 
 def test_what_is_no_bag(run, tmp_path):
-    with pytest.raises(BadInput, match=r"must be the folder of a bag of ROS 2, with metadata\.yaml"):
+    with pytest.raises(BadInput, match=r"`log` must be a bag of ROS 2, with files \.mcap, \.db3"):
         read_rosbag2(tmp_path)
     with pytest.raises(BadInput, match="must be a new folder, but is there already"):
         write_rosbag2(run, tmp_path)

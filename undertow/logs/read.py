@@ -8,6 +8,7 @@ from pathlib import Path
 
 from undertow.core.errors import BadInput, error_location
 from undertow.logs.ardupilot import read_ardupilot
+from undertow.logs.bag_messages import STORAGE_FILES
 from undertow.logs.csv_reader import read_csv
 from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mapping
 from undertow.logs.log import Log
@@ -19,7 +20,6 @@ from undertow.logs.px4 import read_px4
 from undertow.logs.recording import Recording, TopicMessages
 from undertow.logs.ros2_bag import read_ros2_bag
 from undertow.logs.run_log import read_run
-from undertow.logs.unfinished_bag import STORAGE_FILES
 
 _SHOWN_TOPICS, _SHOWN_COLUMNS = 4, 6  # in an error
 

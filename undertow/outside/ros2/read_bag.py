@@ -1,18 +1,16 @@
 """Poses, velocities, wrenches and thruster commands of a rosbag2, in this package's axes."""
 
-import functools
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
 
 from undertow.core.errors import BadInput
-from undertow.logs.unfinished_bag import whole_files
+from undertow.logs.bag_messages import StoredMessage, stored_messages
+from undertow.logs.ros2_types import Decoder
 from undertow.outside.ros2.frames import between_attitudes, between_frd_and_flu
 from undertow.outside.ros2.from_messages import SECOND, Frames, motion_of, target_of, wrench_from
 
@@ -28,7 +26,7 @@ def read_rosbag2(
     """Poses, velocities, wrenches and arrays of a rosbag2, in this package's axes and SI units.
 
     Args:
-        path: folder of the bag, of either storage.
+        path: folder of the bag, or a file of one, of either storage.
         topics: those that are read; None for all of the types below.
         frames: names of the frames whose axes are those of REP 103. Messages in another frame, and others that cannot
             be used, are left out, with a warning. Readings of an IMU are in the axes of its own frame.
@@ -44,11 +42,13 @@ def read_rosbag2(
     """
     only = None if topics is None else set(topics)
     rows: dict[str, list[tuple[float, NDArray]]] = {}
-    refused: dict[str, list[BadInput]] = {}
-    for topic, kind, nanoseconds, data in _messages(Path(path), only):
+    refused: dict[str, list[Exception]] = {}
+    decoder = Decoder()
+    for topic, kind, definition, nanoseconds, data in _messages(Path(path), only):
         try:
-            values_by_name = _READERS[kind](_decoded(kind, data, topic), frames, topic)
-        except BadInput as error:
+            message = decoder.decoded(data, kind, definition)
+            values_by_name = _READERS[kind](message, frames, topic)
+        except (BadInput, ValueError) as error:
             refused.setdefault(topic, []).append(error)
             continue
         for name, value in values_by_name.items():
@@ -61,32 +61,22 @@ def read_rosbag2(
     return {name: _series(name, samples) for name, samples in rows.items()}
 
 
-def _messages(path: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
-    """Topic, type, time (ns) and bytes of the messages of known types."""
+def _messages(path: Path, only: set[str] | None) -> Iterator[StoredMessage]:
+    """Messages of known types, of all topics or of some."""
     notes: list[str] = []
+    requested = lambda topic, kind: kind in _READERS and (only is None or topic in only)
     try:
-        with whole_files(path, notes) as files:
-            if notes:
-                warnings.warn(f"{path}: {'; '.join(notes)}", stacklevel=3)
-            for file in files:
-                yield from _messages_of(file, only)
+        for message in stored_messages(path, requested, notes):
+            if requested(message.topic, message.kind):
+                yield message
     except (BadInput, OSError):
         raise
     except Exception as error:  # whatever rosbags, SQLite, YAML or zstd say of damaged bytes
         raise BadInput(
             str(path), "be a rosbag2", f"damaged, or something else ({type(error).__name__}: {error})"
         ) from None
-
-
-def _messages_of(file: Path, only: set[str] | None) -> Iterable[tuple[str, str, int, bytes]]:
-    with Reader(file) as reader:
-        connections = [
-            connection
-            for connection in reader.connections
-            if connection.msgtype in _READERS and (only is None or connection.topic in only)
-        ]
-        for connection, nanoseconds, data in reader.messages(connections) if connections else ():
-            yield connection.topic, connection.msgtype, nanoseconds, bytes(data)
+    if notes:
+        warnings.warn(f"{path}: {'; '.join(notes)}", stacklevel=3)
 
 
 def _series(name: str, rows: list[tuple[float, NDArray]]) -> Series:
@@ -110,19 +100,6 @@ def _imu(message: Any, frames: Frames, topic: str) -> dict[str, NDArray]:
         "/rates": vector(message.angular_velocity),
         "/specific_force": vector(message.linear_acceleration),
     }
-
-
-@functools.cache
-def _typestore() -> Any:
-    return get_typestore(Stores.ROS2_JAZZY)
-
-
-def _decoded(kind: str, data: bytes, topic: str) -> Any:
-    try:
-        return _typestore().deserialize_cdr(data, kind)
-    except Exception as error:  # of struct, NumPy, UTF-8 and rosbags
-        got = f"{len(data)} bytes that do not hold one ({type(error).__name__}: {error})"
-        raise BadInput(topic, f"have messages of type {kind}", got) from None
 
 
 # Type -> what its messages hold, by the end of the name.

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import sqlite3
+import struct
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +25,6 @@ from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
 from undertow.logs.frames import quaternions
 from undertow.logs.run_log import read_dataset
-from undertow.logs.unfinished_bag import END_WITHOUT_INDEX
 from undertow.outside.ros2 import messages as ros
 from undertow.outside.ros2.frames import body_velocity_of_rates
 from undertow.outside.ros2.from_messages import SECOND, Frames, PoseAndVelocity, thruster_label
@@ -33,6 +33,11 @@ from undertow.outside.ros2.to_messages import odometry_of, stamp_of, target_mess
 STORAGES = ("mcap", "sqlite3")
 
 _VERSION = 9  # of the format
+_HEAD = struct.Struct("<BQ")  # of a record of MCAP: its kind, and the bytes that follow
+_DATA_END, _FOOTER = 0x0F, 0x02
+# The end of an MCAP file without an index: readers look through the whole file instead.
+_END_WITHOUT_INDEX = _HEAD.pack(_DATA_END, 4) + bytes(4) + _HEAD.pack(_FOOTER, 20) + bytes(20) + b"\x89MCAP0\r\n"
+
 _BUFFER = 2**23  # bytes, more than a chunk: what `flush` writes is written at once
 
 
@@ -93,7 +98,7 @@ class BagWriter:
             self._continue()
             if storage.chunk.bio.tell():
                 storage.close_chunk()
-            storage.bio.write(END_WITHOUT_INDEX)
+            storage.bio.write(_END_WITHOUT_INDEX)
             storage.bio.flush()
             os.fsync(storage.bio.fileno())
             self._ended = True
@@ -119,7 +124,7 @@ class BagWriter:
     def _continue(self) -> None:
         """Go back to before the end of the file, where there is one."""
         if self._ended and isinstance(storage := self._writer.storage, McapWriter):
-            storage.bio.seek(-len(END_WITHOUT_INDEX), os.SEEK_CUR)
+            storage.bio.seek(-len(_END_WITHOUT_INDEX), os.SEEK_CUR)
         self._ended = False
 
 

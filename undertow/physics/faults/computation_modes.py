@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from undertow.core.numerics.number import Number
+from undertow.physics.faults.memory_faults import flipped, with_entry
 from undertow.physics.faults.mode import (
     NO_SEVERITY,
     AbstractComputationFault,
@@ -13,7 +14,6 @@ from undertow.physics.faults.mode import (
     Severity,
     execution_mode,
 )
-from undertow.physics.faults.numbers_of_state import flipped, with_entry
 
 # Multiples of the golden section, modulo one, fill (0, 1) evenly: H. Weyl, Math. Ann. 77 (1916).
 _GOLDEN = 0.6180339887498949
