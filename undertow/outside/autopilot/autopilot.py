@@ -17,7 +17,6 @@ from undertow.control.supervision.transition_log import SupervisorTransition, tr
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
 from undertow.core.authority import authority_of
-from undertow.core.checks import numbers
 from undertow.core.contracts import Target, starting_at
 from undertow.core.errors import BadInput
 from undertow.core.signals import Signal
@@ -26,6 +25,7 @@ from undertow.outside.autopilot.functions import Functions
 from undertow.outside.autopilot.measured_motion import Format, MeasuredMotion
 from undertow.outside.autopilot.output import output_of
 from undertow.outside.autopilot.saved_state import packed, restore_arrays
+from undertow.outside.autopilot.step_arguments import StepArguments, is_no_rotation
 from undertow.outside.autopilot.step_log import ReceivedStep, StepLog, law_signals, received_signals
 from undertow.physics.power.esc import ESC
 from undertow.scenario.build import Built, build
@@ -33,8 +33,6 @@ from undertow.scenario.link_scenario import at_sampling_time, text_of
 from undertow.scenario.reading import Text
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.stepped import Uncopied, compile_step, copy_into
-
-_NO_ROTATION = 1e-6  # largest entry of a quaternion that is none
 
 
 class Autopilot(Uncopied):
@@ -169,8 +167,7 @@ class Autopilot(Uncopied):
         # What every step needs, looked up once. The arrays of the state are those of every step.
         self._supervisor = state_in(self._go_on.state)
         self._takes_raw_readings = self._loop.controller.takes_raw_readings
-        self._shapes = [leaf.shape for leaf in self._begin.inputs.motion]
-        self._no_report = jax.tree.map(lambda leaf: np.full(leaf.shape, np.nan), self._begin.inputs.actuator)
+        self._arguments = StepArguments(self._begin.inputs, len(self._convert.inputs))
 
     def start(
         self,
@@ -203,19 +200,22 @@ class Autopilot(Uncopied):
         Raises:
             BadInput: a shape is wrong, or a number is not finite, or the law's command is not: then call `start` again.
         """
-        motion = self._motion(position, velocity, attitude)
+        arguments = self._arguments
+        motion = arguments.motion(position, velocity, attitude)
         for name, value in zip(MeasuredMotion._fields, motion, strict=True):
             checks.finite(name, value)
-        if _is_no_rotation(motion.attitude):
+        if is_no_rotation(motion.attitude):
             raise BadInput(
                 "attitude", "be a quaternion of some length", f"of length {np.hypot.reduce(motion.attitude):.3g}"
             )
-        before = np.zeros_like(self._command) if applied is None else self._input(applied)
-        report = self._report(propellers, 0.0)
+        before = np.zeros_like(self._command) if applied is None else arguments.input(applied)
+        report = arguments.report(propellers, missing=0.0)
         for value in jax.tree.leaves(report):
             checks.finite("propellers", value)
         applied_input = np.full_like(before, np.nan) if applied is None else before.copy()  # the caller's may change
-        self._received = ReceivedStep(motion, report, self._target(target), self._health(health), applied_input, 0.0)
+        self._received = ReceivedStep(
+            motion, report, self._target(target), arguments.health(health), applied_input, 0.0
+        )
         copy_into(self._begin.inputs, self._received[:4])
         self._begin()
         self._clock.begin()
@@ -270,13 +270,14 @@ class Autopilot(Uncopied):
             BadInput: a shape is wrong, a target is not finite, or `start` was not called.
         """
         self._check_started("step")
-        motion = self._motion(position, velocity, attitude)
-        if _is_no_rotation(motion.attitude):
+        arguments = self._arguments
+        motion = arguments.motion(position, velocity, attitude)
+        if is_no_rotation(motion.attitude):
             motion = motion._replace(attitude=np.full(4, np.nan))  # so drivers say that they have none yet
-        applied_input = self._command.copy() if applied is None else self._reported(applied)
-        report = self._no_report if propellers is None else self._report(propellers, np.nan)
-        new_target = None if target is None else self._target(target)  # before anything changes
-        healthy = self._health(health)
+        applied_input = self._command.copy() if applied is None else arguments.reported(applied, self._command)
+        report = arguments.no_report if propellers is None else arguments.report(propellers, missing=np.nan)
+        new_target = None if target is None else arguments.target(target)  # before anything changes
+        healthy = arguments.health(health)
         passed = self._clock.passed(dt)
         elapsed = self.sampling_time if dt is None else float(dt)
         if self._takes_raw_readings:
@@ -423,63 +424,18 @@ class Autopilot(Uncopied):
         command = Signal(("actuator",), self._loop.plant.input_unit, "input that the law commands")
         return {"command": command} | self._loop.controller.signals()
 
-    def _motion(self, position: Any, velocity: Any, attitude: Any) -> MeasuredMotion:
-        parts = zip(MeasuredMotion._fields, (position, attitude, velocity), self._shapes, strict=True)
-        return MeasuredMotion(*(numbers(name, value, shape) for name, value, shape in parts))
-
-    def _report(self, propellers: Any, missing: float) -> Any:
-        """What the propellers report, of the form that the plant has; `missing` stands for everything not given."""
-        leaves, form = jax.tree.flatten(self._begin.inputs.actuator)
-        if propellers is None:
-            return jax.tree.unflatten(form, [np.full(leaf.shape, missing) for leaf in leaves])
-        parts = propellers if isinstance(propellers, tuple) else (propellers,)
-        if not leaves:
-            raise BadInput("propellers", "be left out: the actuators of this plant report nothing", "given")
-        if len(parts) != len(leaves):
-            must = "be the speeds alone" if len(leaves) == 1 else "be (speeds, accelerations)"
-            raise BadInput("propellers", must, f"{len(parts)} parts")
-        values = [numbers("propellers", part, leaf.shape) for part, leaf in zip(parts, leaves, strict=True)]
-        return jax.tree.unflatten(form, values)
-
-    def _health(self, health: Any) -> Any:
-        """Health of the actuators, of the form that the loop has; all work unless it is given."""
-        like = self._begin.inputs.health
-        if like is None and health is not None:
-            raise BadInput("health", "be left out: no actuator of this scenario announces a failure", "given")
-        if like is None:
-            return None
-        return np.ones(like.shape) if health is None else numbers("health", health, like.shape)
-
     def _target(self, target: Any) -> Target:
         """The target as given, or of the scenario's reference now."""
-        if target is None:
-            self._at.inputs[...] = self._clock.time
-            self._at()
-            return self._at.outputs
-        shape = np.shape(self._begin.inputs.target.position)
-        has_parts = isinstance(target, tuple | list) and len(target) and np.ndim(target[0]) > 0
-        parts = target if has_parts or np.ndim(target) == 2 else (target,)
-        if len(parts) > 3:
-            raise BadInput("target", "be outputs, or (outputs, rates, accelerations)", f"{len(parts)} parts")
-        values: list[Any] = [numbers("target", part, shape) for part in parts]
-        for part in values:
-            checks.finite("target", part)
-        return Target(*values, *[np.zeros(shape)] * (3 - len(values)))
+        if target is not None:
+            return self._arguments.target(target)
+        self._at.inputs[...] = self._clock.time
+        self._at()
+        return self._at.outputs
 
     def _place_reference(self, position: np.ndarray) -> None:
         with runtime.on_processor(), runtime.in_precision(self.precision):
             placed = in_present_precision(starting_at(self._loop.reference, jnp.asarray(position)))
         copy_into(self._at.numbers, eqx.filter(placed, eqx.is_array))
-
-    def _input(self, applied: Any) -> np.ndarray:
-        values = numbers("applied", applied, self._command.shape)
-        checks.finite("applied", values)
-        return values
-
-    def _reported(self, applied: Any) -> np.ndarray:
-        """The applied input; for entries that are not finite the commanded one."""
-        values = numbers("applied", applied, self._command.shape)
-        return np.where(np.isfinite(values), values, self._command)
 
     def _turn_from(self, applied: np.ndarray, supervised: SupervisedState) -> None:
         """Begin at an input: the supervisor turns it into that of the law, no faster than its `slew`."""
@@ -541,8 +497,3 @@ def _largest_estimate(loop: ClosedLoop) -> Any:
     """Largest plausible estimate of the uncertainty; without limit where the law has no nominal model."""
     model = getattr(loop.controller, "model", None)
     return np.inf if model is None else np.asarray(largest_estimate(authority_of(model, loop.plant)))
-
-
-def _is_no_rotation(attitude: np.ndarray) -> bool:
-    """Whether it is a quaternion of no length, or of one that no rounding gives."""
-    return attitude.shape == (4,) and not _NO_ROTATION <= np.abs(attitude).max() <= 1 / _NO_ROTATION
