@@ -42,8 +42,9 @@ from undertow.scenario.reading import from_data, read
 from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.run_result import MetricsSettings, Origin, RunResult, make_result
 from undertow.scenario.results.run_scenario import run_loop, run_scenario
-from undertow.scenario.schema import ClosedLoopSettings, Fault, Initial, Window, complaint
+from undertow.scenario.schema import ClosedLoopSettings, Fault, Initial, Window
 from undertow.scenario.step_size import step_failure
+from undertow.scenario.validation import complaint
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.outcome import Outcome
 

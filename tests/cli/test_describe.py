@@ -9,7 +9,7 @@ from undertow.analysis.metrics import MEANINGS
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
 from undertow.scenario import describing
-from undertow.scenario.schema import keys
+from undertow.scenario.schema_keys import keys
 from undertow.simulation.loop.recorded_signals import RECORDED
 from undertow.studies.campaign.campaign_schema import Campaign, CampaignRequirement, Distribution, RecordedSignals
 

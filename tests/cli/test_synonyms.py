@@ -1,7 +1,7 @@
 """The words that stand for keys: each of the table leads to a key that exists, and is none itself."""
 
 from undertow.scenario import vehicle_schema
-from undertow.scenario.schema import keys
+from undertow.scenario.schema_keys import keys
 from undertow.scenario.synonyms import WORDS, hint_for
 from undertow.studies.campaign.campaign_schema import Campaign, CampaignRequirement, Distribution
 

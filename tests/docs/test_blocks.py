@@ -25,7 +25,7 @@ from undertow.cli.main import run
 from undertow.report import run_page
 from undertow.report.figures import writing
 from undertow.scenario.reading import read
-from undertow.scenario.schema import validate
+from undertow.scenario.validation import validate
 from undertow.studies.campaign.prepare import prepare
 from undertow.studies.comparison.prepare import prepare_comparison
 

@@ -15,7 +15,7 @@ from undertow.paper.robust_variant import fidelity
 from undertow.paper.robust_variant.conclusions import conclusions
 from undertow.report.page import Html
 from undertow.scenario.reading import from_data
-from undertow.scenario.schema import validate
+from undertow.scenario.validation import validate
 
 pytestmark = pytest.mark.full
 

@@ -3,7 +3,7 @@
 import pytest
 
 from undertow.scenario.reading import from_data
-from undertow.scenario.schema import validate
+from undertow.scenario.validation import validate
 from undertow.studies.speed.waiting import CASES
 from undertow.studies.speed.workload import W1, W2
 

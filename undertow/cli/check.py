@@ -12,7 +12,7 @@ from undertow.cli.tables import titled, wide_console
 from undertow.core.errors import BadInput
 from undertow.scenario.checks import check as checks
 from undertow.scenario.reading import read
-from undertow.scenario.schema import kind_of
+from undertow.scenario.validation import kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file
 from undertow.scenario.yaml_text import load
 from undertow.studies.campaign.prepare import prepare

@@ -17,7 +17,8 @@ from undertow.physics.faults.kinds import list_kinds, severity_cells
 from undertow.scenario import describing
 from undertow.scenario.describing import text_of
 from undertow.scenario.json_schema import scenario_schema
-from undertow.scenario.schema import Scenario, keys
+from undertow.scenario.schema import Scenario
+from undertow.scenario.schema_keys import keys
 from undertow.simulation.loop.recorded_signals import RECORDED
 from undertow.studies.campaign.campaign_schema import SECTIONS, Campaign, campaign_json_schema
 

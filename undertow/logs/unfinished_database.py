@@ -1,4 +1,4 @@
-"""Databases of bags of ROS 2 whose recording was killed within a commit: their journal stands beside them.
+"""Databases of bags of ROS 2 whose recording was killed within a commit: SQLite's rollback file stands beside them.
 
 Nothing in the bag is changed: SQLite takes back in a copy what was not committed.
 """
@@ -19,15 +19,15 @@ def consistent_database(path: Path, notes: list[str]) -> Iterator[Path]:
         path: of the file.
         notes: gets a sentence if it ends early.
     """
-    journal = path.with_name(f"{path.name}-journal")
-    if not journal.exists():
+    rollback = path.with_name(f"{path.name}-journal")
+    if not rollback.exists():
         yield path
         return
     notes.append(f"{path.name} ends early, as after `kill -9`")
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
         shutil.copyfile(path, copy)
-        shutil.copyfile(journal, copy.with_name(journal.name))
+        shutil.copyfile(rollback, copy.with_name(rollback.name))
         with contextlib.closing(sqlite3.connect(copy)) as connection:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         yield copy

@@ -50,8 +50,9 @@ from undertow.scenario.foreign_code import code_hashes
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import Text, from_data
-from undertow.scenario.schema import Part, Scenario, validate
+from undertow.scenario.schema import Part, Scenario
 from undertow.scenario.step_size import step_advice
+from undertow.scenario.validation import validate
 from undertow.simulation.loop import continuous
 from undertow.simulation.loop.closed_loop import ClosedLoop
 

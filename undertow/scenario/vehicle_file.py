@@ -8,7 +8,7 @@ from undertow.core.errors import BadInput, error_location
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
-from undertow.scenario.schema import kind_of
+from undertow.scenario.validation import kind_of
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
 
 _FROM = {"weight": "mass", "buoyancy": "volume"}  # where the key itself is not given

@@ -24,7 +24,8 @@ from undertow.scenario.checks.plant_check import derived_of_plant
 from undertow.scenario.checks.thruster_check import derived_of_thruster
 from undertow.scenario.checks.vehicle_lint import Facts, derived, facts_of, lint, vehicle_facts
 from undertow.scenario.reading import Text, nearest_file, no_file, read
-from undertow.scenario.schema import Scenario, kind_of
+from undertow.scenario.schema import Scenario
+from undertow.scenario.validation import kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle, vehicle_location
 from undertow.scenario.vehicle_schema import KEYS
 

@@ -10,7 +10,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from undertow.core.errors import BadInput
 from undertow.scenario.json_schema import scenario_schema
 from undertow.scenario.reading import Text, dump, parse, read
-from undertow.scenario.schema import RunRequirement, Scenario, Strict, complaint, kind_of
+from undertow.scenario.schema import RunRequirement, Scenario, Strict
+from undertow.scenario.validation import complaint, kind_of
 from undertow.studies.campaign.labels import by_name, words
 
 # List entries in brackets only: each key has one spelling, so that duplicates are noticed.

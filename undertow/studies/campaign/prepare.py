@@ -12,7 +12,7 @@ from undertow.scenario.checks.vehicle_lint import vehicle_advice
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.reading import Text
 from undertow.scenario.results.run_result import law_of, rules
-from undertow.scenario.schema import check_kind
+from undertow.scenario.validation import check_kind
 from undertow.simulation.loop.simd_batch import unavailable
 from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.build_trials import build_trial

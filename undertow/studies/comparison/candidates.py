@@ -10,7 +10,8 @@ from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario import factory
 from undertow.scenario.build import build
 from undertow.scenario.reading import Text, from_data, read
-from undertow.scenario.schema import Part, named_law, validate
+from undertow.scenario.schema import Part, named_law
+from undertow.scenario.validation import validate
 from undertow.studies.campaign.labels import words
 
 OWN = "scenario"  # stands for the controller of the scenario itself

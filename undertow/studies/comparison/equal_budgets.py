@@ -18,7 +18,7 @@ from undertow.core.json_text import to_json
 from undertow.scenario.build import build
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.reading import Text, dump
-from undertow.scenario.schema import validate
+from undertow.scenario.validation import validate
 from undertow.studies.comparison.candidates import Candidate, file_stem, part_of
 from undertow.studies.tuning.problem import is_tunable
 from undertow.studies.tuning.stability import NoCertificate

@@ -9,10 +9,11 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.core.numerics.random_keys import key_of_seed
-from undertow.scenario import schema
+from undertow.scenario import validation
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.reading import Text, from_data, read
+from undertow.scenario.schema import named_law
 from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.campaign_schema import Campaign, validate
 from undertow.studies.campaign.prepare import Prepared, prepare_campaign
@@ -187,7 +188,7 @@ def _note(prepared: Prepared, number: int, built: Built, source: Path | None) ->
     """How the gains of a candidate came about."""
     controller = prepared.trials.data(number).get("controller", {})
     return tuning_note(
-        schema.named_law(controller), built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source
+        named_law(controller), built.closed_loop.controller, built.scenario.loop.dt, prepared.folder, source
     )
 
 
@@ -203,7 +204,7 @@ def _prepared(campaign: Campaign, source: Text, allow_code: bool) -> tuple[Prepa
 
 def _recorded(campaign: Campaign, source: Text, allow_code: bool) -> Campaign:
     """The campaign with a record of errors and positions."""
-    loop = schema.validate(trials_of(campaign, source, allow_code).scenario).loop
+    loop = validation.validate(trials_of(campaign, source, allow_code).scenario).loop
     record_period = loop.dt * max(1, round(loop.duration / loop.dt / _RECORDS))
     series = campaign.series
     if series is not None and whole_steps(series.every, loop.dt):
