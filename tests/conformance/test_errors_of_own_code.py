@@ -55,6 +55,9 @@ class Mine(eqx.Module):
     def long(self, t):
         raise ValueError("much " * 40)
 
+    def calls(self, t):
+        return self.long(t)
+
     def dumb(self, t):
         raise Dumb
 
@@ -139,6 +142,13 @@ def test_long_messages_are_cut_and_missing_ones_named(folder):
     text = fault_of(failure(mine, "long")).says
     assert "ValueError: much much" in text and "... (mine.py" in text and len(text) < 180
     assert "Dumb: its message cannot be read" in fault_of(failure(mine, "dumb")).says
+
+
+def test_the_innermost_function_is_named(folder):
+    mine = find("references", "mine.py:mine", folder)()
+    line = OWN[: OWN.index("def long(")].count("\n") + 2
+    says = fault_of(failure(mine, "calls")).says
+    assert says.startswith("cannot run `Mine.long`: ") and says.endswith(f"(mine.py, line {line})")
 
 
 def test_a_class_that_lacks_methods(folder):

@@ -169,7 +169,8 @@ def test_a_correction_is_that_of_the_textbook():
     slopes[:, VELOCITY] = w.T
     reading = w.T @ velocity + np.array([0.02, -0.01, 0.015])
     noise = 5e-3**2 + 1e-3**2 / 12
-    gain = p @ slopes.T @ np.linalg.inv(slopes @ p @ slopes.T + noise * np.eye(3))
+    spread = slopes @ p @ slopes.T + noise * np.eye(3)
+    gain = p @ slopes.T @ np.linalg.inv(spread)
     correction, after = gain @ (reading - w.T @ velocity), (np.eye(15) - gain @ slopes) @ p
     is_as_recorded("kalman: half a second by an IMU", state._replace(monitor=None))
     # What one beam does not give changes nothing: as with a reading of the others alone.
@@ -180,6 +181,8 @@ def test_a_correction_is_that_of_the_textbook():
     np.testing.assert_allclose(read(own, partial)[2], expected, atol=1e-9 * np.abs(p).max())
     state = updated(own, state, np.zeros(()), with_reading(quiet, 1, reading))
     np.testing.assert_allclose(read(own, state)[2], after, atol=1e-9 * np.abs(p).max())
+    innovation = np.linalg.solve(np.linalg.cholesky(spread), reading - w.T @ velocity)
+    np.testing.assert_allclose(state.monitor.last[1], innovation, rtol=1e-6)
     turned = Rotation.from_rotvec(np.array(correction[ATTITUDE])).as_matrix()
     np.testing.assert_allclose(state.velocity, turned @ (velocity + correction[VELOCITY]), atol=1e-10)
     for name, part in (("position", POSITION), ("gyro_bias", GYRO_BIAS), ("force_bias", FORCE_BIAS)):

@@ -149,3 +149,10 @@ def test_memoryless_models_go_through_the_static_motor_at_ten_volts():
 def test_impossible_limits_are_refused(limits):
     with pytest.raises(BadInput, match=f"`{next(iter(limits))}` must be"):
         fidelity("shaft", **limits)
+
+
+def test_a_winding_needs_an_inductance():
+    with pytest.raises(BadInput, match="`inductance` must be positive"):
+        fidelity("electromechanical", with_constants(inductance=0.0))
+    for level in ("ideal", "static", "shaft"):
+        fidelity(level, with_constants(inductance=0.0))
