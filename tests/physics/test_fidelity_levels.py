@@ -9,7 +9,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import rk4
 from undertow.physics.thrusters import linear_voltage, paper_table3, quadratic_voltage
-from undertow.physics.thrusters.motor_dynamics import FIDELITIES, with_fidelity
+from undertow.physics.thrusters.fidelity_levels import FIDELITIES, with_fidelity
 
 MOTOR = paper_table3("shaft").motor
 VOLTS = jnp.array([-24.0, -6.0, 0.5, 3.0, 12.0])

@@ -23,7 +23,7 @@ from undertow.physics.power import battery, esc
 from undertow.physics.power.esc import ESC
 from undertow.physics.power.ledger import closure
 from undertow.physics.thrusters import first_order, linear_voltage, paper_table3, t200
-from undertow.physics.thrusters.motor_dynamics import FIDELITIES
+from undertow.physics.thrusters.fidelity_levels import FIDELITIES
 from undertow.physics.vehicles import odin
 from undertow.simulation.loop import continuous, sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop

@@ -22,7 +22,7 @@ from undertow.physics.thrusters import (
     t200,
     t500,
 )
-from undertow.physics.thrusters.motor_dynamics import FIDELITIES, with_fidelity
+from undertow.physics.thrusters.fidelity_levels import FIDELITIES, with_fidelity
 
 # A motor with everything: friction, and a propeller that is another one in reverse.
 UNEVEN = DCMotor(

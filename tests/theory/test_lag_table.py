@@ -18,7 +18,7 @@ from undertow.core.contracts import Load, Target
 from undertow.core.numerics.integrators import rk4
 from undertow.core.status import Status
 from undertow.physics.disturbances.sinusoid import sinusoid
-from undertow.physics.thrusters.motor_dynamics import ElectromechanicalState
+from undertow.physics.thrusters.fidelity_levels import ElectromechanicalState
 from undertow.physics.thrusters.paper_table3 import paper_table3
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop

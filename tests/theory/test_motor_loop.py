@@ -17,7 +17,7 @@ from undertow.control.navigation.perfect import perfect
 from undertow.control.references.setpoint import setpoint
 from undertow.physics.disturbances.sinusoid import sinusoid
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
-from undertow.physics.thrusters.motor_dynamics import ElectromechanicalState
+from undertow.physics.thrusters.fidelity_levels import ElectromechanicalState
 from undertow.physics.thrusters.paper_table3 import paper_table3
 from undertow.physics.vehicles.odin import odin
 from undertow.simulation.loop.closed_loop import ClosedLoop

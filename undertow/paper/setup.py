@@ -10,8 +10,8 @@ from undertow.core.runtime import in_precision
 from undertow.paper.running import BatchedRun
 from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.thrusters.fidelity_levels import ElectromechanicalThruster
 from undertow.physics.thrusters.motor import DCMotor
-from undertow.physics.thrusters.motor_dynamics import ElectromechanicalThruster
 from undertow.scenario.results.run_result import ScenarioResult
 
 GOAL = [2.0, 3.0, 4.0, math.pi / 3, math.pi / 4, 2 * math.pi / 5]  # m, rad; Section 5

@@ -15,7 +15,7 @@ from undertow.core.measurement import measurement_of_outputs
 from undertow.core.runtime import double_outside_runs
 from undertow.core.status import Status
 from undertow.outside.mujoco_engine.submerged import Submerged
-from undertow.physics.thrusters.motor_dynamics import ShaftThruster
+from undertow.physics.thrusters.fidelity_levels import ShaftThruster
 from undertow.physics.thrusters.motor_thruster import StaticThruster
 from undertow.physics.thrusters.thruster import AbstractThruster, PropellerReport
 

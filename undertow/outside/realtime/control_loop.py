@@ -131,7 +131,7 @@ class RealTimeLoop:
                 return Reason.LINK_LOST
 
     def _count(self, response_time: float, missed: int, fresh: bool) -> None:
-        """Count a step whose command came `answered` (s) after its planned beginning."""
+        """Count a step whose command came `response_time` (s) after its planned beginning."""
         statistics = self.statistics
         statistics.steps += 1
         statistics.overruns += response_time >= self._deadline

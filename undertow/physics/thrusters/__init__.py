@@ -1,6 +1,6 @@
 """Thrusters: volts in, thrust out. One file per thruster.
 
-The fidelity levels of a DC motor are in `motor_thruster.py` (without dynamics) and `motor_dynamics.py`.
+The fidelity levels of a DC motor are in `motor_thruster.py` (without dynamics) and `fidelity_levels.py`.
 """
 
 from undertow.core.catalogue import publish

@@ -2,8 +2,8 @@
 
 import math
 
+from undertow.physics.thrusters.fidelity_levels import with_fidelity
 from undertow.physics.thrusters.motor import DCMotor
-from undertow.physics.thrusters.motor_dynamics import with_fidelity
 from undertow.physics.thrusters.thruster import AbstractThruster
 
 

@@ -1,8 +1,8 @@
 """Blue Robotics T200: one brushed DC motor fitted to all of the manufacturer's table, 10-20 V."""
 
 from undertow.core import checks
+from undertow.physics.thrusters.fidelity_levels import with_fidelity
 from undertow.physics.thrusters.motor import DCMotor
-from undertow.physics.thrusters.motor_dynamics import with_fidelity
 from undertow.physics.thrusters.thruster import DEAD_ZONES, AbstractThruster
 
 _TABLE = "fit to the manufacturer's table of September 2019, 10-20 V, 1206 rows (benchmarks/fit_t200.py)"

@@ -1,8 +1,8 @@
 """Blue Robotics T500: one brushed DC motor fitted to the manufacturer's plot data at 16 V and 24 V."""
 
 from undertow.core import checks
+from undertow.physics.thrusters.fidelity_levels import with_fidelity
 from undertow.physics.thrusters.motor import DCMotor
-from undertow.physics.thrusters.motor_dynamics import with_fidelity
 from undertow.physics.thrusters.thruster import DEAD_ZONES, AbstractThruster
 
 _TABLE = "fit to the manufacturer's plot data, 16 V and 24 V, 402 rows (benchmarks/fit_t200.py t500)"
