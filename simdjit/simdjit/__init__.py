@@ -24,6 +24,7 @@ import numpy as np
 
 from simdjit import c99 as c99
 from simdjit.batch_step import BatchStep as BatchStep
+from simdjit.cache import cached as cached
 from simdjit.cache import default_folder as default_folder
 from simdjit.cpu import simd_width as simd_width
 from simdjit.cuda import Driver as Driver

@@ -16,6 +16,7 @@ from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rotations import attitude_error, quaternion_from_euler
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
+from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recorded_signals import Signals
@@ -321,7 +322,7 @@ def measure(
     return results(gathered, _over_series(gathered, outcome.time, signals))
 
 
-@eqx.filter_jit
+@kept_program
 def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any, ...]:
     first = jax.tree.map(lambda series: series[0], signals)
     step = lambda states, at: (

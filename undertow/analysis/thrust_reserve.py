@@ -6,15 +6,16 @@ Host side: linear programmes by SciPy, nothing of the loop.
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from undertow.control.supervision.reduced_model import VEHICLE_PRIORITY, attained_share
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
 from undertow.core.runtime import double_outside_runs
+from undertow.simulation.kept_programs import kept_program
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
 _CONTROLLED = 0.85
@@ -82,7 +83,7 @@ def controlled_axes(matrix: Any, lost: Sequence[int] = ()) -> tuple[int, ...]:
     used = np.ones(matrix.shape[1])
     used[list(lost)] = 0.0
     priority = VEHICLE_PRIORITY if len(matrix) == len(VEHICLE_PRIORITY) else (1.0,) * len(matrix)
-    share = attained_share(jnp.asarray(matrix), jnp.asarray(used), jnp.asarray(priority))
+    share = _attained_share(as_array(matrix), as_array(used), as_array(priority))
     return tuple(int(axis) for axis in np.flatnonzero(np.asarray(share) > _CONTROLLED))
 
 
@@ -112,12 +113,9 @@ def reference_reserve(
     Raises:
         BadInput: an actuator that does not exist.
     """
-    body_model = model.in_body_axes()
     times = np.linspace(0.0, duration, samples)
-    demands_and_gains = _demands(body_model, reference, jnp.asarray(times), jnp.asarray(water))
-    demands, gains = (np.asarray(value) for value in demands_and_gains)
-    held = body_model.actuators.quasi_static()
-    least, largest = held.range(held.init(), jnp.ones(()))
+    demands_and_limits = _demands(model, reference, as_array(times), as_array(water))
+    demands, gains, least, largest = (np.asarray(value) for value in demands_and_limits)
     _, low, high = _checked(gains[0], least, largest, lost)
     controlled = controlled_axes(gains[0], lost)
     share = lambda required, effect: _share(effect, required, low, high, lost, controlled)
@@ -125,10 +123,11 @@ def reference_reserve(
     return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(controlled))))
 
 
-@eqx.filter_jit
+@kept_program
 def _demands(model: Model, reference: AbstractReference, times, water):
-    """Acceleration that the actuators have to give, and the gain, at each time."""
-    dynamics, coordinates, _ = model
+    """Acceleration that the actuators have to give and the gain, at each time; least and largest steady forces."""
+    dynamics, coordinates, actuators = model.in_body_axes()
+    held = actuators.quasi_static()
 
     def demand(t):
         target = reference.at(t)
@@ -139,7 +138,10 @@ def _demands(model: Model, reference: AbstractReference, times, water):
         required = coordinates.tracking_error(ground, target).acceleration - dynamics.drift(relative_measurement)
         return required, dynamics.gain(ground)
 
-    return jax.vmap(demand)(times)
+    return *jax.vmap(demand)(times), *held.range(held.init(), jnp.ones(()))
+
+
+_attained_share = kept_program(attained_share)
 
 
 def _share(effect, required, low, high, lost, axes) -> float:

@@ -32,7 +32,7 @@ def as_array(value: Any) -> Any:
 @functools.lru_cache(_MOST)
 def _made(content: bytes, shape: tuple[int, ...], settings: tuple[Any, ...]) -> jax.Array:
     with jax.ensure_compile_time_eval():  # an array made during tracing would belong to that trace
-        return jnp.asarray(np.frombuffer(content).reshape(shape))
+        return jax.device_put(np.frombuffer(content).reshape(shape))  # `asarray` would compile a program for each shape
 
 
 def in_present_precision(tree: Any) -> Any:

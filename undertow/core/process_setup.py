@@ -73,7 +73,7 @@ def _keep_xla_code() -> None:
     user, and XLA asks nobody whose it is: where others may write there, nothing is kept. Nor does it notice damage.
     """
     try:
-        folder = _private_folder(f"xla-{_processor()}")
+        folder = _private_folder(f"xla-{processor()}")
         remove_damaged(folder)
     except OSError:
         return
@@ -154,7 +154,8 @@ def _private_folder(name: str) -> Path:
     return folder
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of the kind of this processor, by its instructions."""
     try:
         features = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags"))
     except (OSError, StopIteration):

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -53,6 +52,7 @@ from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario
 from undertow.scenario.step_size import step_advice
 from undertow.scenario.validation import validate
+from undertow.simulation.kept_programs import kept_check, kept_program
 from undertow.simulation.loop import continuous
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
@@ -265,7 +265,8 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
         check_window(scenario.steady, scenario.loop)
     with error_location("initial"):
         check_start(loop, scenario.initial)
-    part_cache.check_once(loop, lambda: check_fit(loop, own_parts(scenario, text.folder)))
+    fits = lambda: check_fit(loop, own_parts(scenario, text.folder))
+    part_cache.check_once(loop, lambda: kept_check(fits, loop))
     described_metrics = [make_part("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
     if described_metrics:
         resolved["metrics"] = [description for _, description in described_metrics]
@@ -311,7 +312,7 @@ def _authority(plant: AbstractPlant, model: Model) -> Any:
     return acceleration if checks.traced(acceleration) else [float(f"{value:.3g}") for value in acceleration.tolist()]
 
 
-@eqx.filter_jit
+@kept_program
 def _largest_acceleration(plant: AbstractPlant, model: Model):
     start = plant.output(jnp.zeros(()), plant.initial_state())
     if start.body is None:
@@ -325,6 +326,6 @@ def velocity_noise_of(navigation: AbstractNavigation, dt: float) -> Any:
     return _velocity_noise(navigation, as_array(dt)) if isinstance(navigation, AbstractInformedNavigation) else 0.0
 
 
-@eqx.filter_jit
+@kept_program
 def _velocity_noise(navigation: AbstractInformedNavigation, dt):
     return navigation.velocity_noise(dt)

@@ -6,13 +6,13 @@ current with the one that the thrusters can balance.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from undertow.analysis.thrust_reserve import reference_reserve
+from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
 from undertow.physics.disturbances.current import Current
@@ -21,6 +21,7 @@ from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.surface import stated_depths
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
+from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SAMPLES = 201  # instants at which a reference is looked at
@@ -136,7 +137,7 @@ def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.nd
     return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
 
 
-@eqx.filter_jit
+@kept_program
 def _steady_range(plant: HybridVehicle):
     actuators = plant.thruster.actuator_model(plant.inputs(), False)
     if actuators.time_constant() is None:  # the steady force is unknown, too
@@ -220,9 +221,7 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
     """A vehicle that starts higher in the water than it floats."""
     plant = loop.plant
     assert isinstance(plant, HybridVehicle)
-    x = plant.initial_state(jnp.asarray(start))
-    surface = FreeSurface(jnp.asarray(depth), jnp.zeros(()))
-    submerged = 1 - float(plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry)
+    submerged = 1 - float(_dry_share(plant, as_array(start), as_array(depth)))
     floats = min(1.0, float(plant.body.weight) / float(plant.body.buoyancy))
     if submerged < floats - _HIGHER:
         message = (
@@ -230,6 +229,14 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
             f"floats with {100 * floats:.0f} %: it falls into the water"
         )
         yield advice("initial.position", message, _SURFACE)
+
+
+@kept_program
+def _dry_share(plant: HybridVehicle, start, depth):
+    """Share of the hull above still water, at the start; `depth` is that of the world's origin, m."""
+    x = plant.initial_state(start)
+    surface = FreeSurface(depth, jnp.zeros(()))
+    return plant.hull.cut(surface, x.position, plant.pose(x).rotation[2], plant.body).dry
 
 
 def _too_fast(loop: ClosedLoop, plant: HybridVehicle, desired: ReferenceSamples):
@@ -339,7 +346,7 @@ def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) 
     return ReferenceSamples(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
 
 
-@eqx.filter_jit
+@kept_program
 def _targets(reference: AbstractReference, times):
     return jax.lax.map(reference.at, times)
 

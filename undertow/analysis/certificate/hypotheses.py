@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 import xarray as xr
@@ -13,6 +12,7 @@ from undertow.control.controllers.composite_law import RCAF
 from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
+from undertow.simulation.kept_programs import kept_program
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
 ROUNDING = 1e-9
@@ -85,6 +85,6 @@ def _full_rank(model: Model, run: xr.Dataset) -> np.ndarray | None:
     return np.broadcast_to(np.linalg.matrix_rank(gains) == gains.shape[1], run.sizes["time"])
 
 
-@eqx.filter_jit
+@kept_program
 def _gains(model: Model, position, velocity):
     return jax.vmap(lambda x, v: model.dynamics.gain(model.coordinates.measurement(x, v)))(position, velocity)

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +10,7 @@ from jaxtyping import Array, PRNGKeyArray
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.core.contracts import Load, Pose
 from undertow.core.numerics.linear_algebra import matvec
+from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow
@@ -74,7 +74,7 @@ def disturbance_profile(
     return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow)
 
 
-@eqx.filter_jit
+@kept_program
 def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     realization = loop.realize(key)
     plant = loop.plant

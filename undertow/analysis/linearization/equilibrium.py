@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +12,7 @@ from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement, Model
 from undertow.physics.plants.reachability import lost_directions
+from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
@@ -153,7 +153,7 @@ def equilibrium(
     return at_full_load
 
 
-@eqx.filter_jit
+@kept_program
 def _output(parts: Parts, state: Array) -> Measurement:
     return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(state))
 

@@ -66,6 +66,18 @@ def simd_width(bits: int) -> int:
     return simdjit.simd_width(bits)
 
 
+def kept_code(key: object, make: Callable[[], bytes]) -> bytes:
+    """What `make` gives, or gave in an earlier process: machine code of XLA, beside that of the batch compiler.
+
+    Args:
+        key: everything that it depends on; by its `repr`.
+        make: computes it.
+    """
+    if unavailable():
+        return make()
+    return simdjit.cached(key, ".xla", make, cache_folder() / "native")
+
+
 # Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
 # number is the same for a campaign and for a trial that is repeated alone, so that both have the same bits.
 _PLANNED = 1_000_000

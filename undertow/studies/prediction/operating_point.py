@@ -3,7 +3,6 @@
 import dataclasses
 from typing import NamedTuple
 
-import equinox as eqx
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PRNGKeyArray
@@ -18,6 +17,7 @@ from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractController, AbstractReference, Outputs, Time
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
+from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _MAX_STEPS = 200_000  # largest number of predicted steps
@@ -56,7 +56,7 @@ def operating_point(built: Built) -> OperatingPoint:
     return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
 
 
-@eqx.filter_jit
+@kept_program
 def _desired(reference: AbstractReference, t: Time) -> Outputs:
     return reference.at(t).position
 
@@ -133,6 +133,6 @@ def _start(op_point: OperatingPoint) -> list[np.ndarray]:
     return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(op_point.built.scenario.seed), *outputs)]
 
 
-@eqx.filter_jit
+@kept_program
 def _states_at_start(loop: ClosedLoop, key: PRNGKeyArray, position: Outputs, velocity: Outputs) -> list[Array]:
     return [ravel_pytree(state)[0] for state in loop.realize(key).start(position, velocity)]

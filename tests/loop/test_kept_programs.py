@@ -1,0 +1,134 @@
+"""Programs of XLA that are kept: found by their structure without tracing, and never those of another one."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from undertow.control.controllers.bandwidths import largest_forces
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.core.numerics.linear_algebra import matvec
+from undertow.physics.thrusters import t200
+from undertow.physics.vehicles import bluerov2, odin, remus100
+from undertow.simulation import kept_programs
+from undertow.simulation.kept_programs import kept_check, kept_program
+
+MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A cache of its own, in a process without code of others, which the tests themselves are."""
+    monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
+    monkeypatch.setattr(kept_programs, "foreign_modules", list)
+    return tmp_path / "native"
+
+
+@pytest.fixture
+def untraced(monkeypatch):
+    """Fails where a program is made anew."""
+
+    def forbid():
+        monkeypatch.setattr(kept_programs, "_made", lambda *arguments: pytest.fail("a program was traced"))
+
+    return forbid
+
+
+def entries(folder):
+    return sorted(folder.glob("*.xla"))
+
+
+def test_a_later_process_finds_it_without_tracing(folder, untraced):
+    expected = kept_program(matvec)(MATRIX, VECTOR)
+    np.testing.assert_array_equal(expected, jax.jit(matvec)(MATRIX, VECTOR))
+    assert len(entries(folder)) == 1
+    untraced()
+    again = kept_program(matvec)
+    np.testing.assert_array_equal(again(MATRIX, VECTOR), expected)
+    np.testing.assert_array_equal(again(2 * MATRIX, VECTOR), 2 * expected)
+
+
+def test_another_structure_is_another_program(folder):
+    run = kept_program(matvec)
+    run(MATRIX, VECTOR)
+    run(jnp.ones((3, 2)), VECTOR)
+    with jax.enable_x64(False):
+        assert run(MATRIX.astype("float32"), VECTOR.astype("float32")).dtype == "float32"
+    assert len(entries(folder)) == 3
+    assert run(jnp.ones((3, 2)), VECTOR).shape == (3,)
+
+
+@pytest.mark.parametrize("change", ["sources", "flags"])
+def test_other_code_and_settings_are_another_program(folder, monkeypatch, change):
+    kept_program(matvec)(MATRIX, VECTOR)
+    if change == "sources":
+        monkeypatch.setattr(kept_programs, "_installation", lambda: ("other sources",))
+    else:
+        monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
+    kept_program(matvec)(MATRIX, VECTOR)
+    assert len(entries(folder)) == 2
+
+
+@pytest.mark.parametrize("damage", ["cut off", "one bit", "empty", "another's", "of no use"])
+def test_damaged_entries_are_made_again(folder, monkeypatch, damage):
+    expected = kept_program(matvec)(MATRIX, VECTOR)
+    kept_program(matvec)(jnp.ones((3, 2)), VECTOR)
+    first, other = entries(folder)
+    contents = first.read_bytes()
+    if damage == "one bit":
+        first.write_bytes(contents[:200] + bytes([contents[200] ^ 1]) + contents[201:])
+    elif damage == "another's":
+        first.write_bytes(other.read_bytes())
+    elif damage == "of no use":  # whole, but no program
+        monkeypatch.setattr(kept_programs.simd_batch, "kept_code", lambda key, make: b"no program")
+    else:
+        first.write_bytes(contents[: len(contents) // 2] if damage == "cut off" else b"")
+    for matrix in (MATRIX, jnp.ones((3, 2))):
+        np.testing.assert_array_equal(kept_program(matvec)(matrix, VECTOR), jax.jit(matvec)(matrix, VECTOR))
+    np.testing.assert_array_equal(kept_program(matvec)(MATRIX, VECTOR), expected)
+
+
+def test_nothing_is_kept_beside_code_of_others(tmp_path, monkeypatch):
+    """As here, where the tests are loaded: their modules may have changed anything."""
+    monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
+    assert __name__ in kept_programs.foreign_modules()
+    kept_program(matvec)(MATRIX, VECTOR)
+    assert not entries(tmp_path / "native")
+
+
+def test_functions_of_others_are_compiled_and_not_kept(folder):
+    double = kept_program(lambda x: 2 * x)
+    np.testing.assert_array_equal(double(VECTOR), 2 * VECTOR)
+    assert not entries(folder)
+
+
+def test_inside_a_trace_it_is_a_part_of_it(folder):
+    run = kept_program(matvec)
+    np.testing.assert_allclose(jax.jacfwd(lambda v: run(MATRIX, v))(VECTOR), MATRIX)
+    assert not entries(folder)
+
+
+def test_parts_are_arguments(folder):
+    """A fidelity level is another program, another supply is not."""
+    kept = kept_program(largest_forces)
+    for thruster in (t200(supply=16), t200(supply=12), t200(supply=12, fidelity="static")):
+        model = thruster.actuator_model(8, False)
+        np.testing.assert_allclose(kept(model, 8), largest_forces(model, 8), rtol=1e-12)
+    assert len(entries(folder)) == 2
+
+
+def test_a_check_that_passed_is_not_repeated(folder):
+    calls = []
+    for vehicle in (odin(), odin(), bluerov2()):
+        kept_check(lambda vehicle=vehicle: calls.append(vehicle), vehicle)
+    assert len(calls) == 2
+
+    def refuse():
+        calls.append("refused")
+        checks.positive("mass", -1.0)
+
+    for _ in range(2):
+        with pytest.raises(BadInput, match="`mass` must be positive"):
+            kept_check(refuse, remus100())
+    assert calls[2:] == ["refused", "refused"]
