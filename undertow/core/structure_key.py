@@ -1,7 +1,7 @@
 """A key of what decides a compiled program: types, static values and shapes, without the numbers of arrays.
 
-Two values with the same key give the same program, in any process. What cannot be told apart for certain has no key:
-code of anybody but undertow and the libraries it names, and objects whose contents are hidden.
+Two values with the same key give the same program, in any process. What may differ without a trace has no key: code of
+anybody but undertow and the libraries it names, and objects whose contents are hidden.
 """
 
 import dataclasses
