@@ -67,6 +67,29 @@ def test_what_a_tree_is_made_from_again():
     assert structure_key(of_two) == structure_key(same) != structure_key(other)
 
 
+def test_functions_of_one_line_and_name(monkeypatch):
+    """As if this module were one of undertow."""
+    monkeypatch.setattr("undertow.core.structure_key._KNOWN", {__name__.partition(".")[0], "builtins"})
+    one, other, nested = lambda x: x + 1, lambda x: x - 1, lambda x: lambda y: y * x
+    changed, kept = lambda x: lambda y: y / x, lambda x, gain=2.0: x * gain
+    keys = [structure_key(function) for function in (one, other, nested, changed, kept)]
+    assert len(set(keys)) == len(keys)
+
+    def closing(gain):
+        return lambda x: gain * x
+
+    assert structure_key(closing(2)) == structure_key(closing(2)) != structure_key(closing(3))
+
+    def before():
+        inner = lambda: later
+        with pytest.raises(NoKey):
+            structure_key(inner)
+        later = 1
+        return inner, later
+
+    before()
+
+
 class Own(eqx.Module):
     gain: float = 1.0
 

@@ -49,7 +49,7 @@ class _Description:
 
     def add(self, value: Any, static: bool) -> None:
         """Describe a value; `static` where the numbers of arrays count."""
-        if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+        if value is None or value is ... or isinstance(value, bool | int | float | complex | str | bytes | slice):
             self._text(type(value).__name__, repr(value))
         elif isinstance(value, jax.Array):
             self._array(value, static)
@@ -120,11 +120,20 @@ class _Description:
                 self.add(getattr(value, name), static or always_static)
 
     def _function(self, function: types.FunctionType, static: bool) -> None:
-        """By its name, what it closes over, and its defaults; the sources of its module are part of every program."""
-        self._text("function", f"{_known(function)}.{function.__qualname__} {function.__code__.co_firstlineno}")
-        cells = [cell.cell_contents for cell in function.__closure__ or ()]
-        self._entries("closure", tuple(cells), static)
+        self._text("function", f"{_known(function)}.{function.__qualname__}")
+        self._code(function.__code__)
+        try:
+            cells = tuple(cell.cell_contents for cell in function.__closure__ or ())
+        except ValueError:
+            raise NoKey(f"{function.__qualname__} closes over what is not there yet") from None
+        self._entries("closure", cells, static)
         self._entries("defaults", (function.__defaults__, function.__kwdefaults__), static)
+
+    def _code(self, code: types.CodeType) -> None:
+        """Instructions and constants: two functions may have the same name and line."""
+        self._text("code", f"{code.co_firstlineno} {code.co_code.hex()} {code.co_names}")
+        for constant in code.co_consts:
+            self._code(constant) if isinstance(constant, types.CodeType) else self.add(constant, static=True)
 
     def _reference(self, kind: type) -> None:
         self._text("class", f"{_known(kind)}.{kind.__qualname__}")
