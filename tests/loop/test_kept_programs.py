@@ -1,5 +1,8 @@
 """Programs of XLA that are kept: found by their structure without tracing, and never those of another one."""
 
+import subprocess
+import sys
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -95,6 +98,22 @@ def test_nothing_is_kept_beside_code_of_others(tmp_path, monkeypatch):
     assert __name__ in kept_programs.foreign_modules()
     kept_program(matvec)(MATRIX, VECTOR)
     assert not entries(tmp_path / "native")
+
+
+def test_a_command_has_no_code_of_others_until_a_scenario_names_some(tmp_path):
+    """In a process of its own, as here the tests are loaded."""
+    (tmp_path / "mine.py").write_text("def mine():\n    return None\n")
+    code = [
+        "import undertow.cli.simulate",
+        "from undertow.core.catalogue import find",
+        "from undertow.simulation.kept_programs import foreign_modules",
+        "print(foreign_modules())",
+        "find('controllers', 'mine.py:mine')",
+        "print(len(foreign_modules()))",
+    ]
+    command = [sys.executable, "-c", f"import sys; sys.modules.pop('__main__'); {'; '.join(code)}"]
+    shown = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert shown.splitlines() == ["[]", "1"]
 
 
 def test_functions_of_others_are_compiled_and_not_kept(folder):

@@ -28,6 +28,7 @@ from jax.core import Tracer
 from jax.experimental import serialize_executable
 
 from undertow.core.process_setup import processor
+from undertow.core.runtime import current_precision
 from undertow.core.structure_key import NoKey, arrays_of, joined, structure_key
 from undertow.simulation.loop import simd_batch
 
@@ -48,7 +49,7 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
         if not _may_keep(arguments):
             return compiled(*arguments)
         try:
-            key = structure_key(function, arguments)
+            key = structure_key(function, arguments, current_precision())
         except NoKey:
             return compiled(*arguments)
         if key not in programs:
@@ -72,7 +73,7 @@ def kept_check(check: Callable[[], None], subject: Any) -> None:
         return b"passed"
 
     try:
-        key = structure_key(subject) if _may_keep(subject) else ""
+        key = structure_key(subject, current_precision()) if _may_keep(subject) else ""
     except NoKey:
         key = ""
     if key:
@@ -156,8 +157,10 @@ def _is_foreign(name: str) -> bool:
 def _trusted_folders() -> tuple[str, ...]:
     """Where undertow, simdjit, Python, installed packages and the commands of packages are."""
     package = Path(__file__).parents[1]
-    folders = {str(package), str(package.parent / "simdjit" / "simdjit"), *sysconfig.get_paths().values()}
-    folders |= {*site.getsitepackages(), site.getusersitepackages()}
+    # Not the folder in which Python was installed: an environment may be made in the folder of a user's own code.
+    paths = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")]
+    folders = {str(package), str(package.parent / "simdjit" / "simdjit"), *paths, *site.getsitepackages()}
+    folders |= {site.getusersitepackages()}
     return tuple(f"{folder}{os.sep}" for folder in folders if folder)
 
 
@@ -168,8 +171,7 @@ def _process() -> tuple[Any, ...]:
         for name, value in jax.config.values.items()  # pyright: ignore[reportAttributeAccessIssue]
         if "cache" not in name and "log" not in name
     }
-    precision = jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue] - of this thread
-    return (*_installation(), os.environ.get("XLA_FLAGS", ""), precision, sorted(settings.items(), key=repr))
+    return (*_installation(), os.environ.get("XLA_FLAGS", ""), sorted(settings.items(), key=repr))
 
 
 @functools.cache
