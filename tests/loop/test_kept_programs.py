@@ -100,6 +100,7 @@ def test_nothing_is_kept_beside_code_of_others(tmp_path, monkeypatch):
     assert not entries(tmp_path / "native")
 
 
+@pytest.mark.full
 def test_a_command_has_no_code_of_others_until_a_scenario_names_some(tmp_path):
     """In a process of its own, as here the tests are loaded."""
     (tmp_path / "mine.py").write_text("def mine():\n    return None\n")
