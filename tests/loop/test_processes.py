@@ -64,7 +64,7 @@ def test_progress_counts_the_tasks_that_are_done():
     with worker_processes(1) as pool:
         held = threading.Event()
         tasks = Tasks(pool, lambda words, share: said.append((words, share)))
-        begun = [tasks.submit("waited", held.wait, 60), tasks.begin("a root", math.sqrt, 4.0)]
+        begun = [tasks.submit("waited", held.wait, 60), tasks.submit("a root", math.sqrt, 4.0)]
         begun.append(tasks.submit("refused", refuse))
         held.set()
         assert begun[1].result(60) == 2.0
