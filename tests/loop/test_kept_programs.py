@@ -11,7 +11,7 @@ import pytest
 from undertow.control.controllers.bandwidths import largest_forces
 from undertow.core import checks
 from undertow.core.errors import BadInput
-from undertow.core.numerics.linear_algebra import matvec
+from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
 from undertow.simulation import kept_programs
@@ -121,6 +121,16 @@ def test_functions_of_others_are_compiled_and_not_kept(folder):
     double = kept_program(lambda x: 2 * x)
     np.testing.assert_array_equal(double(VECTOR), 2 * VECTOR)
     assert not entries(folder)
+
+
+@pytest.mark.parametrize("function", [pseudo_inverse, printed_inverse])
+def test_programs_that_call_lapack_are_not_kept(folder, function):
+    """A process that finds one, and has lowered none, would end with a segmentation fault."""
+    matrix = jnp.asarray([[2.0, 0.5], [0.5, 1.0]])
+    for _ in range(2):
+        np.testing.assert_allclose(kept_program(function)(matrix) @ matrix, np.eye(2), atol=1e-12)
+    (entry,) = entries(folder)
+    assert entry.stat().st_size < 100
 
 
 def test_inside_a_trace_it_is_a_part_of_it(folder):

@@ -105,7 +105,7 @@ class _Program:
 
 
 def _made(function: Callable[..., Any], arguments: Any) -> bytes:
-    """The program and the form of its result, to be kept; empty where its result is more than arrays."""
+    """The program and the form of its result, to be kept; empty where its result is more than arrays, or it calls others."""
     arrays, rest = arrays_of(arguments)
     forms = []
 
@@ -117,10 +117,13 @@ def _made(function: Callable[..., Any], arguments: Any) -> bytes:
 
     # XLA's own cache gives programs that cannot be kept once more: under a new name it has none.
     of_arrays.__name__ = f"{function.__name__}_{secrets.token_hex(8)}"
-    executable = jax.jit(of_arrays).lower(arrays).compile()
+    lowered = jax.jit(of_arrays).lower(arrays)
     (form,) = forms
-    if form is None:
+    # JAX gets LAPACK and other code outside of XLA ready when it lowers a call of it: found again without that, a program
+    # would jump to nowhere.
+    if form is None or "custom_call" in lowered.as_text():
         return b""
+    executable = lowered.compile()
     try:
         return pickle.dumps((serialize_executable.serialize(executable)[0], len(arrays), form))
     except Exception:  # constants of a program, or a form that has no name, cannot be kept
