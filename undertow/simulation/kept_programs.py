@@ -105,7 +105,7 @@ class _Program:
 
 
 def _made(function: Callable[..., Any], arguments: Any) -> bytes:
-    """The program and the form of its result, to be kept; empty where its result is more than arrays, or it calls others."""
+    """The program and the form of its result; empty where its result is more than arrays, or it calls LAPACK."""
     arrays, rest = arrays_of(arguments)
     forms = []
 
@@ -119,8 +119,8 @@ def _made(function: Callable[..., Any], arguments: Any) -> bytes:
     of_arrays.__name__ = f"{function.__name__}_{secrets.token_hex(8)}"
     lowered = jax.jit(of_arrays).lower(arrays)
     (form,) = forms
-    # JAX gets LAPACK and other code outside of XLA ready when it lowers a call of it: found again without that, a program
-    # would jump to nowhere.
+    # JAX gets LAPACK and other code outside of XLA ready when it lowers a call of it: a program that is found again
+    # without that would jump to nowhere.
     if form is None or "custom_call" in lowered.as_text():
         return b""
     executable = lowered.compile()
