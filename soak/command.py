@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from soak import soak as soaking
+from soak.input_runner import write_files
 from soak.inputs import BUILD
 from soak.kept_commands import kept
 from soak.options import SoakCommand
@@ -75,13 +76,7 @@ def _soak(parts: Sequence[str], amounts: Any, seed: int, minutes: float, out: Pa
 
 def _keep(folder: Path, message: str, hostile_input: Any) -> None:
     """The files of a hostile input, and command.txt with its command line and what happened."""
-    for name, data in hostile_input.files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if data is None:
-            path.mkdir(exist_ok=True)
-        else:
-            path.write_bytes(data)
+    write_files(hostile_input.files, folder)
     folder.mkdir(parents=True, exist_ok=True)
     words = json.dumps(list(hostile_input.arguments))
     (folder / "command.txt").write_text(

@@ -37,7 +37,7 @@ def try_in_process(run: Run, hostile_input: Attack, folder: Path) -> Done:
         hostile_input: the input.
         folder: empty, and empty again afterwards.
     """
-    _write(hostile_input.files, folder)
+    write_files(hostile_input.files, folder)
     before = _state(folder)
     out, err = _stream("strict"), _stream("backslashreplace")
     began = time.process_time(), time.monotonic()
@@ -88,7 +88,8 @@ def work(run: Run, seed: int, material: Mapping[str, bytes], folder: str, pipe: 
             pipe.send((hostile_input, outcome))
 
 
-def _write(files: Mapping[str, bytes | None], folder: Path) -> None:
+def write_files(files: Mapping[str, bytes | None], folder: Path) -> None:
+    """Write the files of a hostile input into a folder; None stands for a folder."""
     for name, data in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

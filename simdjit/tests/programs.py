@@ -13,7 +13,7 @@ FLOATS, WHOLES = ("float64", "float32"), ("int32", "int64", "uint32")
 SIZE = 3  # entries of every value
 
 
-class Operation(NamedTuple):
+class OperationCase(NamedTuple):
     """What a step does to values of SIZE entries.
 
     Attributes:
@@ -69,87 +69,92 @@ _NUMPY = {
 _ONE = "negative abs sign floor ceil trunc rint square isnan isfinite signbit reciprocal nan_to_num".split()
 _TWO = "add subtract multiply divide maximum minimum less less_equal greater equal not_equal copysign fmax fmin".split()
 
-STEPS: dict[str, Operation] = {
-    **{name: Operation(getattr(jnp, name), "f", getattr(np, name), units) for name, units in _NUMPY.items()},
-    **{name: Operation(getattr(jnp, name), "f") for name in _ONE},
-    **{name: Operation(getattr(jnp, name), "ff") for name in _TWO},
-    "power": Operation(jnp.power, "ff", np.power, 2),
-    "power_of_whole": Operation(lax.pow, "fi", np.power, 2),
-    "arctan2": Operation(jnp.arctan2, "ff", np.arctan2, 3),
-    "erf_inv": Operation(jax.scipy.special.erfinv, "f", lambda x: scipy.special.erfinv(x.astype(float)), 14),
-    "sigmoid": Operation(jax.nn.sigmoid, "f", lambda x: scipy.special.expit(x.astype(float)), 6),
-    "rsqrt": Operation(lax.rsqrt, "f", units=2),
-    "round_away": Operation(lax.round, "f"),
-    "fmod": Operation(jnp.fmod, "ff"),
-    "remainder": Operation(jnp.remainder, "ff"),
-    "hypot": Operation(jnp.hypot, "ff", units=6),
-    "clip": Operation(lambda x, a, b: lax.clamp(a, x, b), "fff"),
-    "where": Operation(jnp.where, "bff"),
-    "where_whole": Operation(jnp.where, "bii"),
-    **{f"cube_{n}": Operation(lambda x, n=n: x**n, "f", units=4) for n in (0, 3, -1, -3)},
-    **{f"to_{name}": Operation(lambda x, name=name: x.astype(name), "f") for name in (*FLOATS, *WHOLES, "bool")},
-    **{f"whole_to_{name}": Operation(lambda x, name=name: x.astype(name), "i") for name in (*FLOATS, *WHOLES, "bool")},
-    **{f"truth_to_{name}": Operation(lambda x, name=name: x.astype(name), "b") for name in ("float32", "int64")},
+STEPS: dict[str, OperationCase] = {
+    **{name: OperationCase(getattr(jnp, name), "f", getattr(np, name), units) for name, units in _NUMPY.items()},
+    **{name: OperationCase(getattr(jnp, name), "f") for name in _ONE},
+    **{name: OperationCase(getattr(jnp, name), "ff") for name in _TWO},
+    "power": OperationCase(jnp.power, "ff", np.power, 2),
+    "power_of_whole": OperationCase(lax.pow, "fi", np.power, 2),
+    "arctan2": OperationCase(jnp.arctan2, "ff", np.arctan2, 3),
+    "erf_inv": OperationCase(jax.scipy.special.erfinv, "f", lambda x: scipy.special.erfinv(x.astype(float)), 14),
+    "sigmoid": OperationCase(jax.nn.sigmoid, "f", lambda x: scipy.special.expit(x.astype(float)), 6),
+    "rsqrt": OperationCase(lax.rsqrt, "f", units=2),
+    "round_away": OperationCase(lax.round, "f"),
+    "fmod": OperationCase(jnp.fmod, "ff"),
+    "remainder": OperationCase(jnp.remainder, "ff"),
+    "hypot": OperationCase(jnp.hypot, "ff", units=6),
+    "clip": OperationCase(lambda x, a, b: lax.clamp(a, x, b), "fff"),
+    "where": OperationCase(jnp.where, "bff"),
+    "where_whole": OperationCase(jnp.where, "bii"),
+    **{f"cube_{n}": OperationCase(lambda x, n=n: x**n, "f", units=4) for n in (0, 3, -1, -3)},
+    **{f"to_{name}": OperationCase(lambda x, name=name: x.astype(name), "f") for name in (*FLOATS, *WHOLES, "bool")},
     **{
-        f"whole_{name}": Operation(getattr(jnp, name), "ii")
+        f"whole_to_{name}": OperationCase(lambda x, name=name: x.astype(name), "i")
+        for name in (*FLOATS, *WHOLES, "bool")
+    },
+    **{f"truth_to_{name}": OperationCase(lambda x, name=name: x.astype(name), "b") for name in ("float32", "int64")},
+    **{
+        f"whole_{name}": OperationCase(getattr(jnp, name), "ii")
         for name in "add subtract multiply maximum minimum less".split()
     },
-    **{f"bits_{name}": Operation(getattr(jnp, f"bitwise_{name}"), "ii") for name in ("and", "or", "xor")},
-    **{f"truth_{name}": Operation(getattr(jnp, f"logical_{name}"), "bb") for name in ("and", "or", "xor")},
-    "not": Operation(jnp.logical_not, "b"),
-    "bits_not": Operation(jnp.bitwise_not, "i"),
-    "whole_negative": Operation(jnp.negative, "i"),
-    "whole_abs": Operation(jnp.abs, "i"),
-    "whole_sign": Operation(jnp.sign, "i"),
-    "quotient": Operation(lax.div, "ii"),
-    "rest": Operation(lax.rem, "ii"),
-    "floor_quotient": Operation(jnp.floor_divide, "ii"),
-    "floor_rest": Operation(jnp.remainder, "ii"),
-    "guarded": Operation(lambda a, b: jnp.where(b == 0, 0, a // b), "ii"),
-    "gcd": Operation(lambda a, b: jnp.gcd(a % 97, b % 12), "ii"),  # of the least number JAX does not end
-    "whole_power": Operation(lambda x: x**3, "i"),
-    "left": Operation(lax.shift_left, "ii"),
-    "right": Operation(lax.shift_right_logical, "ii"),
-    "right_signed": Operation(lax.shift_right_arithmetic, "ii"),
-    "sum": Operation(lambda x: jnp.full(SIZE, x.sum()), "f", units=4, scale=_total),
-    "running": Operation(jnp.cumsum, "f", units=4, scale=_total),
-    "product": Operation(lambda x: jnp.full(SIZE, jnp.prod(jnp.clip(x, -1e3, 1e3))), "f", units=4),
-    "extremes": Operation(lambda x: jnp.stack([x.max(), x.min(), lax.cummax(x)[1]]), "f", _extremes),
-    "where_extreme": Operation(lambda x: jnp.stack([jnp.argmax(x), jnp.argmin(x), jnp.argmax(x[1:])]), "f"),
-    "whole_sum": Operation(lambda x: jnp.full(SIZE, x.sum()), "i"),
-    "any": Operation(lambda x: jnp.stack([x.any(), x.all(), x[0]]), "b"),
-    "dot": Operation(lambda x, y: jnp.full(SIZE, x @ y), "ff", units=4, scale=lambda x, y: _total(x * y)),
-    "sort": Operation(jnp.sort, "f"),
-    "whole_sort": Operation(jnp.sort, "i"),
-    "argsort": Operation(jnp.argsort, "f"),
-    "sorted_by": Operation(lambda k, x: lax.sort_key_val(k, x)[1], "if"),
-    "median": Operation(lambda x: jnp.full(SIZE, jnp.median(x)), "f", units=1),
-    "take": Operation(lambda x, k: x[_places(k)], "fi"),
-    "take_beyond": Operation(lambda x, k: x.at[k].get(mode="fill", fill_value=7.0), "fi"),
-    "take_of_many": Operation(lambda x, k: jnp.concatenate([x] * 20)[_places(k) * 19], "fi"),
-    "put": Operation(lambda x, k: x.at[_places(k)[0]].set(x[1] * 2), "fi"),
-    "add_at": Operation(lambda x, k: x.at[_places(k)].add(x), "fi", units=2, scale=_total),
-    "multiply_at": Operation(lambda x, k: x.at[_places(k)[:2]].multiply(x[1:]), "fi", units=4),
-    "largest_at": Operation(lambda x, k: x.at[_places(k)].max(x[::-1]).at[_places(k)].min(x), "fi"),
-    "window": Operation(lambda x, k: lax.dynamic_slice(jnp.concatenate([x, x]), (_places(k)[0],), (SIZE,)), "fi"),
-    "pad": Operation(lambda x: lax.pad(x, x[0], [(-1, 2, 1)])[:SIZE], "f"),
-    "sought": Operation(lambda x, y: jnp.searchsorted(jnp.sort(x), y), "ff"),
-    "interpolated": Operation(
+    **{f"bits_{name}": OperationCase(getattr(jnp, f"bitwise_{name}"), "ii") for name in ("and", "or", "xor")},
+    **{f"truth_{name}": OperationCase(getattr(jnp, f"logical_{name}"), "bb") for name in ("and", "or", "xor")},
+    "not": OperationCase(jnp.logical_not, "b"),
+    "bits_not": OperationCase(jnp.bitwise_not, "i"),
+    "whole_negative": OperationCase(jnp.negative, "i"),
+    "whole_abs": OperationCase(jnp.abs, "i"),
+    "whole_sign": OperationCase(jnp.sign, "i"),
+    "quotient": OperationCase(lax.div, "ii"),
+    "rest": OperationCase(lax.rem, "ii"),
+    "floor_quotient": OperationCase(jnp.floor_divide, "ii"),
+    "floor_rest": OperationCase(jnp.remainder, "ii"),
+    "guarded": OperationCase(lambda a, b: jnp.where(b == 0, 0, a // b), "ii"),
+    "gcd": OperationCase(lambda a, b: jnp.gcd(a % 97, b % 12), "ii"),  # of the least number JAX does not end
+    "whole_power": OperationCase(lambda x: x**3, "i"),
+    "left": OperationCase(lax.shift_left, "ii"),
+    "right": OperationCase(lax.shift_right_logical, "ii"),
+    "right_signed": OperationCase(lax.shift_right_arithmetic, "ii"),
+    "sum": OperationCase(lambda x: jnp.full(SIZE, x.sum()), "f", units=4, scale=_total),
+    "running": OperationCase(jnp.cumsum, "f", units=4, scale=_total),
+    "product": OperationCase(lambda x: jnp.full(SIZE, jnp.prod(jnp.clip(x, -1e3, 1e3))), "f", units=4),
+    "extremes": OperationCase(lambda x: jnp.stack([x.max(), x.min(), lax.cummax(x)[1]]), "f", _extremes),
+    "where_extreme": OperationCase(lambda x: jnp.stack([jnp.argmax(x), jnp.argmin(x), jnp.argmax(x[1:])]), "f"),
+    "whole_sum": OperationCase(lambda x: jnp.full(SIZE, x.sum()), "i"),
+    "any": OperationCase(lambda x: jnp.stack([x.any(), x.all(), x[0]]), "b"),
+    "dot": OperationCase(lambda x, y: jnp.full(SIZE, x @ y), "ff", units=4, scale=lambda x, y: _total(x * y)),
+    "sort": OperationCase(jnp.sort, "f"),
+    "whole_sort": OperationCase(jnp.sort, "i"),
+    "argsort": OperationCase(jnp.argsort, "f"),
+    "sorted_by": OperationCase(lambda k, x: lax.sort_key_val(k, x)[1], "if"),
+    "median": OperationCase(lambda x: jnp.full(SIZE, jnp.median(x)), "f", units=1),
+    "take": OperationCase(lambda x, k: x[_places(k)], "fi"),
+    "take_beyond": OperationCase(lambda x, k: x.at[k].get(mode="fill", fill_value=7.0), "fi"),
+    "take_of_many": OperationCase(lambda x, k: jnp.concatenate([x] * 20)[_places(k) * 19], "fi"),
+    "put": OperationCase(lambda x, k: x.at[_places(k)[0]].set(x[1] * 2), "fi"),
+    "add_at": OperationCase(lambda x, k: x.at[_places(k)].add(x), "fi", units=2, scale=_total),
+    "multiply_at": OperationCase(lambda x, k: x.at[_places(k)[:2]].multiply(x[1:]), "fi", units=4),
+    "largest_at": OperationCase(lambda x, k: x.at[_places(k)].max(x[::-1]).at[_places(k)].min(x), "fi"),
+    "window": OperationCase(lambda x, k: lax.dynamic_slice(jnp.concatenate([x, x]), (_places(k)[0],), (SIZE,)), "fi"),
+    "pad": OperationCase(lambda x: lax.pad(x, x[0], [(-1, 2, 1)])[:SIZE], "f"),
+    "sought": OperationCase(lambda x, y: jnp.searchsorted(jnp.sort(x), y), "ff"),
+    "interpolated": OperationCase(
         lambda x: jnp.interp(x, jnp.linspace(-2, 2, 50, dtype=x.dtype), jnp.linspace(0, 9, 50, dtype=x.dtype) ** 2),
         "f",
         units=200,
         scale=lambda x: 81.0,
     ),
-    "branch": Operation(lambda b, x: lax.cond(b[0], lambda: x[::-1], lambda: jnp.sin(x) * 0.5), "bf", units=4),
-    "switch": Operation(lambda k, x: lax.switch(_places(k)[0], [lambda: x, lambda: -x, lambda: x[::-1]]), "if"),
-    "scan": Operation(lambda x: lax.scan(lambda c, e: (jnp.maximum(c, e), c - e), x[0], x)[1], "f"),
-    "loop": Operation(_turned, "fi"),
-    "solve": Operation(lambda x, y: jnp.linalg.solve(_matrix(x), jnp.tanh(y)), "ff", units=200, scale=lambda x, y: 1.0),
-    "inverse": Operation(lambda x: jnp.linalg.inv(_matrix(x))[0], "f", units=200, scale=lambda x: 1.0),
-    "determinant": Operation(
+    "branch": OperationCase(lambda b, x: lax.cond(b[0], lambda: x[::-1], lambda: jnp.sin(x) * 0.5), "bf", units=4),
+    "switch": OperationCase(lambda k, x: lax.switch(_places(k)[0], [lambda: x, lambda: -x, lambda: x[::-1]]), "if"),
+    "scan": OperationCase(lambda x: lax.scan(lambda c, e: (jnp.maximum(c, e), c - e), x[0], x)[1], "f"),
+    "loop": OperationCase(_turned, "fi"),
+    "solve": OperationCase(
+        lambda x, y: jnp.linalg.solve(_matrix(x), jnp.tanh(y)), "ff", units=200, scale=lambda x, y: 1.0
+    ),
+    "inverse": OperationCase(lambda x: jnp.linalg.inv(_matrix(x))[0], "f", units=200, scale=lambda x: 1.0),
+    "determinant": OperationCase(
         lambda x: jnp.full(SIZE, jnp.linalg.det(_matrix(x))), "f", units=200, scale=lambda x: 30.0
     ),
-    "cholesky": Operation(lambda x: jnp.linalg.cholesky(_positive(x))[2], "f", units=200, scale=lambda x: 1.0),
+    "cholesky": OperationCase(lambda x: jnp.linalg.cholesky(_positive(x))[2], "f", units=200, scale=lambda x: 1.0),
 }
 
 # What overflows in one order of additions and not in another is not compared.

@@ -13,8 +13,13 @@ from undertow.analysis.certify import certify
 from undertow.analysis.metrics import Gathered, meanings, measure, results
 from undertow.analysis.navigation_consistency import navigation_consistency
 from undertow.analysis.success import Success, evaluate_success
-from undertow.analysis.temporal.requirements import Requirement, Verdict, contiguous, needed_signals
-from undertow.analysis.temporal.requirements import evaluate_requirements as verdicts
+from undertow.analysis.temporal.requirements import (
+    Requirement,
+    Verdict,
+    contiguous,
+    evaluate_requirements,
+    needed_signals,
+)
 from undertow.control.supervision.supervised_controller import state_in, unsupervised
 from undertow.control.supervision.transition_log import transitions
 from undertow.core.contracts import AbstractController
@@ -206,7 +211,7 @@ def _verdicts(outcome: Outcome, settings: MetricsSettings, steady: Mapping[str, 
         return {}
     signals = contiguous(outcome.signals, needed_signals(settings.requirements))
     ending = int(outcome.status), float(outcome.ended), settings.duration
-    return verdicts(settings.requirements, signals, settings.record, steady, *ending)
+    return evaluate_requirements(settings.requirements, signals, settings.record, steady, *ending)
 
 
 def lost_thrusters(series: xr.Dataset) -> list[tuple[str, float]] | None:
