@@ -94,7 +94,12 @@ class Own(eqx.Module):
     gain: float = 1.0
 
 
-@pytest.mark.parametrize("value", [Own(), Own, lambda x: x, object(), iter(())], ids=str)
+# Named here, not by `str`: workers that run tests in parallel must agree on the names, and
+# an address in memory differs between them.
+OF_OTHERS = {"instance": Own(), "class": Own, "function": lambda x: x, "object": object(), "iterator": iter(())}
+
+
+@pytest.mark.parametrize("value", OF_OTHERS.values(), ids=OF_OTHERS)
 def test_code_of_others_has_no_key(value):
     with pytest.raises(NoKey):
         structure_key(double_integrator(), value)
