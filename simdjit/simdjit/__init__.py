@@ -31,6 +31,7 @@ from simdjit.cuda import Driver as Driver
 from simdjit.graph import Unsupported as Unsupported
 from simdjit.loop import Loop as Loop
 from simdjit.nvidia import gpu as gpu
+from simdjit.portable import PortableProgram as PortableProgram
 from simdjit.step import Step as Step
 
 

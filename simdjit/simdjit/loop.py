@@ -1,6 +1,7 @@
 """A loop over steps, written for one run and compiled for any number of them at once."""
 
 import json
+import pickle
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,8 +21,8 @@ from simdjit.fingerprint import fingerprint
 from simdjit.graph import I64, Unsupported, flat
 from simdjit.layout import Layout
 from simdjit.lowering import TooLong, evaluate
-from simdjit.prologue import Prologue, inputs
-from simdjit.tracing import Traced
+from simdjit.prologue import Prologue, RunInputs, inputs
+from simdjit.tracing import Form, Traced
 
 # Operations; machine code of a longer program would take minutes to make, whatever the estimate for XLA is.
 _MOST = 200_000
@@ -41,6 +42,7 @@ class Loop:
         driver: of the GPU that runs it, as `gpu` finds it; None for this processor. No result depends on it.
         cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
         planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
+        portable: whether it will be `written`.
 
     Raises:
         Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the
@@ -60,6 +62,7 @@ class Loop:
         driver: Driver | None = None,
         cache: Path | None = None,
         planned: int = 0,
+        portable: bool = False,
     ):
         prepared = Traced(prepare, numbers)
         constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
@@ -67,30 +70,56 @@ class Loop:
         begun = Traced(of_arrays(start), prepared.shapes)
         number = jax.ShapeDtypeStruct((), jnp.asarray(0).dtype)
         carried = lambda function: lambda known, carry, k: function(known, eqx.combine(carry, begun.still), k)
-        self._step, self._record = (
+        stepped, recorded = (
             Traced(of_arrays(carried(function)), prepared.shapes, begun.shapes, number) for function in (step, record)
         )
-        if self._step.types != begun.types:
+        if stepped.types != begun.types:
             raise Unsupported("a carry that changes its type")
-        self._prologue = Prologue(prepared, numbers, constant)
+        prologue = Prologue(prepared, numbers, constant, portable)
         lanes = nvidia.LANES if driver else lanes or simd_width(8 * np.dtype(number.dtype).itemsize)
         head = nvidia.THREADS if driver else VECTORS
-        traced = (prepared, begun, self._step, self._record)
+        traced = (prepared, begun, stepped, recorded)
         beside = simd_width(64) if lanes == 1 and not driver else 1
-        made = lambda: _lowered(self._prologue, traced, number.dtype, lanes, head, beside, planned)
+        made = lambda: _lowered(prologue, traced, number.dtype, lanes, head, beside, planned)
         name = fingerprint(
-            [function.closed for function in traced], self._prologue.constants, lanes, beside, bool(driver), planned
+            [function.closed for function in traced], prologue.constants, lanes, beside, bool(driver), planned
         )
         program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
-        if program.prologue_lacks and not self._prologue.lacking:
-            self._prologue.leave_to_xla(program.prologue_lacks)
-        self.operations = program.operations
-        self._code = (
-            nvidia.Kernel(program.assembly, driver, cache) if driver else Code(program.assembly, cache, lanes > 1)
-        )
-        trees = (self._prologue.inputs, begun.leaves, self._record.leaves)
-        self._lanes = lanes
-        self._numbers_layout, self._carry_layout, self._record_layout = (Layout(leaves, lanes) for leaves in trees)
+        if program.prologue_lacks and not prologue.lacking:
+            prologue.leave_to_xla(program.prologue_lacks)
+        read, carry, series = (Layout(leaves, lanes) for leaves in (prologue.inputs, begun.leaves, recorded.leaves))
+        forms = stepped.form, recorded.form
+        self._load(_Parts(program, lanes, prologue.of_runs(), read, carry, series, *forms), driver, cache)
+
+    def _load(self, parts: "_Parts", driver: Driver | None, cache: Path | None) -> None:
+        self._parts, self.operations = parts, parts.program.operations
+        assembly = parts.program.assembly
+        self._code = nvidia.Kernel(assembly, driver, cache) if driver else Code(assembly, cache, parts.lanes > 1)
+
+    def written(self) -> bytes:
+        """For a file: what `Loop.read` makes the loop of, in another process and without its functions.
+
+        Raises:
+            Unsupported: it is for a GPU, or results of its functions hold something that cannot be written.
+        """
+        if not isinstance(self._code, Code):
+            raise Unsupported("a loop of a GPU cannot be written")
+        try:
+            return zlib.compress(pickle.dumps(self._parts), level=1)
+        except Exception as error:  # whatever pickle, or the code of a part, says of what it cannot write
+            raise Unsupported(f"a loop that cannot be written ({error})") from error
+
+    @classmethod
+    def read(cls, written: bytes, cache: Path | None = None) -> "Loop":
+        """The loop that was `written`, on a processor of the same kind and with the same versions of libraries.
+
+        Args:
+            written: by the user's own process: it is trusted as code is.
+            cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
+        """
+        loop = cls.__new__(cls)
+        loop._load(pickle.loads(zlib.decompress(written)), None, cache)
+        return loop
 
     def run(self, numbers: Any, steps: int, every: int = 0) -> tuple[Any, Any]:
         """Run the loop for a batch.
@@ -105,12 +134,13 @@ class Loop:
             over runs.
         """
         runs = len(jax.tree.leaves(numbers)[0])
-        memory = self._numbers_layout.packed(self._prologue.packed(numbers), runs)
-        carry = self._carry_layout.memory(len(memory))
-        series = self._record_layout.memory(len(memory), steps // every + 1 if every else 0)
+        parts = self._parts
+        memory = parts.numbers.packed(parts.inputs.packed(numbers), runs)
+        carry = parts.carry.memory(len(memory))
+        series = parts.record.memory(len(memory), steps // every + 1 if every else 0)
         self._code.run(memory, carry, series, steps, every)
-        final = [leaf[:, 0] for leaf in self._carry_layout.unpacked(carry, runs)]
-        return self._step.whole(final), self._record.whole(self._record_layout.unpacked(series, runs))
+        final = [leaf[:, 0] for leaf in parts.carry.unpacked(carry, runs)]
+        return parts.carry_form.whole(final), parts.record_form.whole(parts.record.unpacked(series, runs))
 
     def kept(self) -> "Kept":
         """What records one instant of one run again and again, in memory that is kept.
@@ -119,19 +149,20 @@ class Loop:
             Unsupported: XLA computes what comes before the first step, or a GPU the steps.
         """
         call, memory, series = self._kept(1)
-        views = self._numbers_layout.views(memory), self._record_layout.views(series)
+        views = self._parts.numbers.views(memory), self._parts.record.views(series)
         return Kept(call, *views, memory[0, 0], series[0, 0])
 
     def kept_runs(self, runs: int) -> tuple[Callable[[], None], list[np.ndarray], list[np.ndarray]]:
         """`kept` of many runs: arrays of shape (groups, runs of a group, ...), the last runs of which may be idle."""
-        call, memory, series = self._kept(-(-runs // self._lanes))
-        return call, self._numbers_layout.views_of_groups(memory), self._record_layout.views_of_groups(series)
+        call, memory, series = self._kept(-(-runs // self._parts.lanes))
+        parts = self._parts
+        return call, parts.numbers.views_of_groups(memory), parts.record.views_of_groups(series)
 
     def _kept(self, groups: int) -> tuple[Callable[[], None], np.ndarray, np.ndarray]:
-        if self._prologue.lacking or not isinstance(self._code, Code):
-            raise Unsupported(self._prologue.lacking or "a GPU that computes one step at a time")
-        layouts = self._numbers_layout, self._carry_layout, self._record_layout
-        memory, carry, series = (layout.memory(groups) for layout in layouts)
+        parts, lacking = self._parts, self._parts.program.prologue_lacks
+        if lacking or not isinstance(self._code, Code):
+            raise Unsupported(lacking or "a GPU that computes one step at a time")
+        memory, carry, series = (layout.memory(groups) for layout in (parts.numbers, parts.carry, parts.record))
         return self._code.repeated(memory, carry, series), memory, series
 
 
@@ -172,6 +203,27 @@ class Program(NamedTuple):
     def read(cls, written: bytes) -> "Program":
         """From a file."""
         return cls(*json.loads(zlib.decompress(written)))
+
+
+class _Parts(NamedTuple):
+    """A compiled loop without its functions.
+
+    Attributes:
+        program: its code.
+        lanes: runs at once.
+        inputs: what it takes of the numbers of its runs.
+        numbers, carry, record: memory of what it reads, hands on from step to step, and records.
+        carry_form, record_form: how results are put together.
+    """
+
+    program: Program
+    lanes: int
+    inputs: RunInputs
+    numbers: Layout
+    carry: Layout
+    record: Layout
+    carry_form: Form
+    record_form: Form
 
 
 def _lowered(

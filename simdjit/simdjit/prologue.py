@@ -1,6 +1,6 @@
 """The prologue of a loop: the numbers of each run, and what is computed from them before the first step."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -10,14 +10,10 @@ from simdjit.fingerprint import fingerprint_of_part
 from simdjit.graph import Graph, Nodes, Unsupported, filled
 from simdjit.lowering import evaluate, nodes_of
 from simdjit.tracing import Traced
+from simdjit.xla_program import XlaProgram
 
 # Operations; what needs more of them (a spectrum of random waves) is left to XLA.
 _MOST = 15_000
-
-
-# The width of a program decides about the last bits of a result, what is in the other places does not: every program
-# has this width, however few runs there are, so that no result depends on how they are cut into tasks.
-_WIDTH = 64
 
 
 # What is left to XLA, by what it computes: different laws share a disturbance that is sampled before the first step.
@@ -30,33 +26,31 @@ class _Left(NamedTuple):
 
     Attributes:
         lacking: why.
-        run: from the arguments that it uses to its results, with a leading axis over runs.
+        program: from the arguments that it uses to its results.
     """
 
     lacking: str
-    run: Callable[[list[np.ndarray]], list[np.ndarray]]
+    program: XlaProgram
 
 
-def _by_vmap(function: Callable[[list[Any]], list[Any]], example: list[Any]) -> Callable[[Any], Any]:
-    """The function with a leading axis over runs, by `jax.vmap`: for what has no rule.
+class RunInputs(NamedTuple):
+    """What a compiled loop takes of the numbers of its runs.
 
-    Args:
-        function: of a list of arrays.
-        example: of these.
+    Attributes:
+        varying: which leaves every run brings along.
+        used: which leaves the prologue reads.
+        before: what XLA computes of those; None where the program does.
     """
-    width = _WIDTH
-    stacked = [jax.ShapeDtypeStruct((width, *np.shape(leaf)), leaf.dtype) for leaf in example]
-    program = jax.jit(jax.vmap(function)).lower(stacked).compile()
 
-    def run(leaves: list[np.ndarray]) -> list[np.ndarray]:
-        runs, pieces = len(leaves[0]), []
-        for first in range(0, runs, width):
-            which = np.minimum(np.arange(first, first + width), runs - 1)
-            results = program([np.asarray(leaf)[which] for leaf in leaves])
-            pieces.append([np.asarray(result) for result in results])
-        return [np.concatenate(parts)[:runs] for parts in zip(*pieces, strict=True)]
+    varying: list[int]
+    used: list[int]
+    before: XlaProgram | None
 
-    return run
+    def packed(self, numbers: Any) -> list[np.ndarray]:
+        """Arrays of the inputs of a program, with a leading axis over runs, from those of `numbers`."""
+        leaves = jax.tree.leaves(numbers)
+        computed = self.before.run([leaves[i] for i in self.used]) if self.before else []
+        return [*(leaves[i] for i in self.varying), *computed]
 
 
 class Prologue:
@@ -66,19 +60,21 @@ class Prologue:
         prepare: the function, of `numbers`.
         numbers: of one run; a tree of arrays.
         constant: which of its leaves are the same in every run.
+        portable: whether the loop will be written for another process.
 
     Attributes:
         constants: the numbers that are the same in every run.
         inputs: shapes and types of what every lane brings along, in the order of its slots.
     """
 
-    def __init__(self, prepare: Traced, numbers: Any, constant: Sequence[bool]):
+    def __init__(self, prepare: Traced, numbers: Any, constant: Sequence[bool], portable: bool = False):
         given = zip(jax.tree.leaves(numbers), prepare.closed.in_avals, strict=True)
         leaves = [np.asarray(leaf, dtype=kind.dtype) for leaf, kind in given]  # as JAX takes them, doubles or not
         self._prepare, self._tree, self._leaves = prepare, jax.tree.structure(numbers), leaves
         self._used = prepare.used() or [0]  # one at least, whose leading axis counts the runs
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._left: _Left | None = None
+        self._portable = portable
         self.constants = [leaf if same else None for leaf, same in zip(leaves, constant, strict=True)]
         self.inputs = [leaves[i] for i in self._varying]
 
@@ -105,7 +101,7 @@ class Prologue:
         left = _LEFT.get(name)
         if left is None:
             try:
-                left = _Left(lacking, _by_vmap(function, [self._leaves[i] for i in self._used]))
+                left = _Left(lacking, XlaProgram(function, [self._leaves[i] for i in self._used], self._portable))
             except Exception as error:  # whatever JAX raises for what it cannot do for several at once
                 raise Unsupported(f"{lacking}; nor can JAX compute it for several runs ({error})") from error
             if len(_LEFT) >= _KEPT:
@@ -133,11 +129,9 @@ class Prologue:
         further = iter(given[len(self._leaves) :])
         return graph, [next(further) if place is None else given[place] for place in self._prepare.passed_on()]
 
-    def packed(self, numbers: Any) -> list[np.ndarray]:
-        """Arrays of `inputs`, with a leading axis over runs, from those of `numbers`."""
-        leaves = jax.tree.leaves(numbers)
-        before = self._left.run([leaves[i] for i in self._used]) if self._left else []
-        return [*(leaves[i] for i in self._varying), *before]
+    def of_runs(self) -> RunInputs:
+        """What the program takes of the numbers of its runs."""
+        return RunInputs(self._varying, self._used, self._left.program if self._left else None)
 
     def _name(self) -> str:
         """Of what is computed before the first step; of this prologue alone where that has no name."""

@@ -1,12 +1,28 @@
 """A function as JAX traces it, beside what its results hold that is no array."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import numpy as np
 from jax.extend.core import Literal
+
+
+class Form(NamedTuple):
+    """How results are put together again.
+
+    Attributes:
+        structure: of the tree of their arrays.
+        still: the rest of them; a tree.
+    """
+
+    structure: Any
+    still: Any
+
+    def whole(self, leaves: list[Any]) -> Any:
+        """The tree of results, of its arrays."""
+        return eqx.combine(jax.tree.unflatten(self.structure, leaves), self.still)
 
 
 class Traced:
@@ -34,9 +50,10 @@ class Traced:
         self.closed, self.shapes = jax.make_jaxpr(arrays_only, return_shape=True)(*arguments)
         self.still = static_parts[0]
 
-    def whole(self, leaves: list[Any]) -> Any:
-        """The tree of results, of its arrays."""
-        return eqx.combine(jax.tree.unflatten(jax.tree.structure(self.shapes), leaves), self.still)
+    @property
+    def form(self) -> Form:
+        """Of its results."""
+        return Form(jax.tree.structure(self.shapes), self.still)
 
     def passed_on(self) -> list[int | None]:
         """Which results are just arguments: their places among all arguments, None for others."""

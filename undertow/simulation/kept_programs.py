@@ -10,29 +10,16 @@ part of one's own has: it may have changed what a program computes.
 """
 
 import functools
-import hashlib
-import importlib.metadata
-import os
 import pickle
-import secrets
-import site
-import sys
-import sysconfig
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
 import jax
-from jax.core import Tracer
-from jax.experimental import serialize_executable
 
-from undertow.core.process_setup import processor
-from undertow.core.runtime import current_precision
-from undertow.core.structure_key import NoKey, arrays_of, joined, structure_key
+from undertow.core.structure_key import arrays_of, joined
 from undertow.simulation.loop import simd_batch
-
-_LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "scipy", "jaxtyping")
+from undertow.simulation.program_key import kept_key, program_key
 
 
 def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -46,14 +33,11 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def run(*arguments: Any) -> Any:
-        if not _may_keep(arguments):
-            return compiled(*arguments)
-        try:
-            key = structure_key(function, arguments, current_precision())
-        except NoKey:
+        key = None if simd_batch.unavailable() else program_key(function, arguments)
+        if key is None:
             return compiled(*arguments)
         if key not in programs:
-            programs[key] = _Program.of(function, arguments, key)
+            programs[key] = _program(function, arguments, key)
         program = programs[key]
         return compiled(*arguments) if program is None else program(arguments)
 
@@ -72,118 +56,51 @@ def kept_check(check: Callable[[], None], subject: Any) -> None:
         check()
         return b"passed"
 
-    try:
-        key = structure_key(subject, current_precision()) if _may_keep(subject) else ""
-    except NoKey:
-        key = ""
-    if key:
-        simd_batch.kept_code(("check", key, *_process()), passed)
-    else:
+    key = program_key("check", subject)
+    if key is None:
         check()
+    else:
+        simd_batch.kept_code(kept_key(key), passed)
 
 
 class _Program:
-    """A compiled program: a list of arrays in, a list of arrays out, and the form of its result."""
+    """A compiled program and the form of its result."""
 
-    def __init__(self, executable: bytes, arguments: int, form: Any):
-        takes = jax.tree.structure((([0] * arguments,), {}))
-        gives = jax.tree.structure([0] * form.num_leaves)
-        self._run = serialize_executable.deserialize_and_load(executable, takes, gives, "cpu")
-        self._form = form
+    def __init__(self, function: Callable[..., Any], arguments: Any):
+        arrays, rest = arrays_of(arguments)
+        forms = []
 
-    @classmethod
-    def of(cls, function: Callable[..., Any], arguments: Any, key: str) -> "_Program | None":
-        """The program of a function for arguments of this structure; None where it cannot be kept."""
-        contents = simd_batch.kept_code((key, *_process()), lambda: _made(function, arguments))
-        try:
-            return cls(*pickle.loads(contents)) if contents else None
-        except Exception:  # whatever XLA, or another version of JAX, says of machine code that it does not take
-            return None
+        def of_arrays(arrays: list[Any]) -> list[Any]:
+            results, further = eqx.partition(function(*joined(arrays, rest)), eqx.is_array)
+            if jax.tree.leaves(further):
+                raise simd_batch.Unsupported("a result that is more than arrays")
+            leaves, form = jax.tree.flatten(results)
+            forms.append(form)
+            return leaves
+
+        self._program = simd_batch.portable(of_arrays, arrays, function.__name__)
+        (self._form,) = forms
 
     def __call__(self, arguments: Any) -> Any:
-        return jax.tree.unflatten(self._form, self._run(arrays_of(arguments)[0]))
+        return jax.tree.unflatten(self._form, self._program(arrays_of(arguments)[0]))
+
+
+def _program(function: Callable[..., Any], arguments: Any, key: str) -> _Program | None:
+    """The program of a function for arguments of this structure; None where it cannot be kept."""
+    contents = simd_batch.kept_code(kept_key(key), lambda: _made(function, arguments))
+    try:
+        return pickle.loads(contents) if contents else None
+    except Exception:  # whatever XLA, or another version of JAX, says of machine code that it does not take
+        return None
 
 
 def _made(function: Callable[..., Any], arguments: Any) -> bytes:
-    """The program and the form of its result; empty where its result is more than arrays, or it calls LAPACK."""
-    arrays, rest = arrays_of(arguments)
-    forms = []
-
-    def of_arrays(arrays: list[Any]) -> list[Any]:
-        results, further = eqx.partition(function(*joined(arrays, rest)), eqx.is_array)
-        leaves, form = jax.tree.flatten(results)
-        forms.append(None if jax.tree.leaves(further) else form)
-        return leaves
-
-    # XLA's own cache gives programs that cannot be kept once more: under a new name it has none.
-    of_arrays.__name__ = f"{function.__name__}_{secrets.token_hex(8)}"
-    lowered = jax.jit(of_arrays).lower(arrays)
-    (form,) = forms
-    # JAX gets LAPACK and other code outside of XLA ready when it lowers a call of it: a program that is found again
-    # without that would jump to nowhere.
-    if form is None or "custom_call" in lowered.as_text():
-        return b""
-    executable = lowered.compile()
+    """A program for a file; empty where it cannot be kept."""
     try:
-        return pickle.dumps((serialize_executable.serialize(executable)[0], len(arrays), form))
+        program = _Program(function, arguments)
+    except simd_batch.Unsupported:
+        return b""
+    try:
+        return pickle.dumps(program)
     except Exception:  # constants of a program, or a form that has no name, cannot be kept
         return b""
-
-
-def _may_keep(arguments: Any) -> bool:
-    """Whether a program for these arguments may be kept: not for traced ones, nor beside code of others."""
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments)):
-        return False
-    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
-    platform = jax.default_backend() if device is None else getattr(device, "platform", "")
-    return platform == "cpu" and not simd_batch.unavailable() and not foreign_modules()
-
-
-def foreign_modules() -> list[str]:
-    """Names of the loaded modules that are neither undertow's, nor Python's, nor of an installed package."""
-    return _foreign_among(tuple(sys.modules))
-
-
-@functools.lru_cache(1)
-def _foreign_among(names: tuple[str, ...]) -> list[str]:
-    return [name for name in names if _is_foreign(name)]
-
-
-def _is_foreign(name: str) -> bool:
-    file = getattr(sys.modules.get(name), "__file__", None)
-    if file is None:
-        return name == "__main__"  # of a terminal or a notebook; others are part of Python, or namespaces
-    return not str(file).startswith(_trusted_folders())
-
-
-@functools.cache
-def _trusted_folders() -> tuple[str, ...]:
-    """Where undertow, simdjit, Python, installed packages and the commands of packages are."""
-    package = Path(__file__).parents[1]
-    # Not the folder in which Python was installed: an environment may be made in the folder of a user's own code.
-    paths = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")]
-    folders = {str(package), str(package.parent / "simdjit" / "simdjit"), *paths, *site.getsitepackages()}
-    folders |= {site.getusersitepackages()}
-    return tuple(f"{folder}{os.sep}" for folder in folders if folder)
-
-
-def _process() -> tuple[Any, ...]:
-    """What a program depends on beside its arguments."""
-    settings = {
-        name: value
-        for name, value in jax.config.values.items()  # pyright: ignore[reportAttributeAccessIssue]
-        if "cache" not in name and "log" not in name
-    }
-    return (*_installation(), os.environ.get("XLA_FLAGS", ""), sorted(settings.items(), key=repr))
-
-
-@functools.cache
-def _installation() -> tuple[str, ...]:
-    """The sources of undertow, versions of Python and of libraries, and the kind of processor."""
-    sources = hashlib.sha256()
-    package = Path(__file__).parents[1]
-    for path in sorted(package.rglob("*.py")):
-        contents = path.read_bytes()
-        sources.update(f"{path.relative_to(package)} {len(contents)}\n".encode() + contents)
-    versions = [f"{library} {importlib.metadata.version(library)}" for library in _LIBRARIES]
-    return sources.hexdigest(), sys.version, *versions, processor()

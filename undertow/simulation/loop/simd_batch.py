@@ -26,6 +26,7 @@ from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
 from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recording import instant
+from undertow.simulation.program_key import kept_key, program_key
 
 if TYPE_CHECKING:
     import simdjit
@@ -76,6 +77,45 @@ def kept_code(key: object, make: Callable[[], bytes]) -> bytes:
     if unavailable():
         return make()
     return simdjit.cached(key, ".xla", make, cache_folder() / "native")
+
+
+def portable(function: Callable, example: list[Any], name: str) -> "simdjit.PortableProgram":
+    """`simdjit.PortableProgram`: a program of XLA that can be kept.
+
+    Raises:
+        Unsupported: it cannot, or there is no batch compiler.
+    """
+    if unavailable():
+        raise Unsupported(unavailable())
+    return simdjit.PortableProgram(function, example, name)
+
+
+def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
+    """The loop of a structure, without tracing where an earlier process has made it.
+
+    Args:
+        structure: all that its code depends on.
+        make: compiles it; whether it is to be written for later processes.
+    """
+    key = program_key(*structure)
+    if key is None:
+        return make(False)
+    made: list[simdjit.Loop] = []
+
+    def written() -> bytes:
+        made.append(make(True))
+        try:
+            return made[0].written()
+        except Unsupported:
+            return b""
+
+    contents = kept_code(kept_key(key), written)
+    if made:
+        return made[0]
+    try:
+        return simdjit.Loop.read(contents, cache_folder() / "native")
+    except Exception:  # of one that cannot be written there is nothing; and whatever is said of code that does not fit
+        return make(False)
 
 
 # Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
@@ -196,7 +236,15 @@ class SimdBatchRunner:
 
         cache = cache_folder() / "native"
         functions = realize, start, control_step, record
-        self._program = simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED)
+
+        def make(portable: bool) -> simdjit.Loop:
+            return simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED, portable)
+
+        # Constants count with their numbers, which arrays of NumPy do in a key.
+        leaves = zip(jax.tree.leaves(numbers), constant, strict=True)
+        constants = [np.asarray(leaf) if same else None for leaf, same in leaves]
+        structure = ("runs", run, plan._replace(steps=0), constants, width, compact)
+        self._program = make(False) if driver else _kept_loop(structure, make)
 
     @property
     def operations(self) -> int:

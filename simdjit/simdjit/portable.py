@@ -1,0 +1,67 @@
+"""Programs of XLA that a later process can run without tracing their functions."""
+
+import functools
+import re
+import secrets
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax.experimental import serialize_executable
+
+from simdjit.graph import Unsupported
+
+Arrays = list[Any]
+
+# Code outside of XLA that a program may call: JAX puts it in place in every process that has lowered one such call.
+_LAPACK = "lapack_"
+
+
+class PortableProgram:
+    """A function of arrays, compiled for this processor by XLA; it can be pickled.
+
+    XLA's own cache is not asked: what it gives cannot be written.
+
+    Args:
+        function: of a list of arrays, giving a list of arrays.
+        example: arguments, or their shapes and types.
+        name: of the program, for profilers.
+
+    Raises:
+        Unsupported: it calls code that a later process may not have.
+    """
+
+    def __init__(self, function: Callable[[Arrays], Arrays], example: Arrays, name: str = "program"):
+        def named(arrays: Arrays) -> Arrays:
+            return function(arrays)
+
+        named.__name__ = f"{name}_{secrets.token_hex(8)}"  # under a new name XLA's cache has none
+        lowered = jax.jit(named).lower(example)
+        calls = re.findall(r"custom_call[ @\"]+(\w+)", lowered.as_text())
+        if further := [call for call in calls if not call.startswith(_LAPACK)]:
+            raise Unsupported(f"a program that calls {further[0]}")
+        self._calls_lapack = bool(calls)
+        self._counts = len(example), len(jax.tree.leaves(lowered.out_info))
+        self._run = lowered.compile()
+
+    def __call__(self, arrays: Arrays) -> Arrays:
+        """Results, arrays of JAX."""
+        return self._run(arrays)
+
+    def __getstate__(self) -> tuple[bytes, tuple[int, int], bool]:
+        return serialize_executable.serialize(self._run)[0], self._counts, self._calls_lapack
+
+    def __setstate__(self, state: tuple[bytes, tuple[int, int], bool]) -> None:
+        executable, self._counts, self._calls_lapack = state
+        if self._calls_lapack:
+            _load_lapack()
+        takes, gives = self._counts
+        forms = jax.tree.structure((([0] * takes,), {})), jax.tree.structure([0] * gives)
+        self._run = serialize_executable.deserialize_and_load(executable, *forms, "cpu")
+
+
+@functools.cache
+def _load_lapack() -> None:
+    """Let JAX put LAPACK in place. A program that called it before would jump to nowhere."""
+    jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
