@@ -10,6 +10,7 @@ import functools
 import hashlib
 import sys
 import types
+import weakref
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,6 +21,16 @@ import numpy as np
 
 # Packages whose code is known by their versions, or by the hash of their sources.
 _KNOWN = {"undertow", "simdjit", "jax", "jaxlib", "numpy", "equinox", "diffrax", "builtins", "functools", "operator"}
+
+
+# Descriptions of modules that live, by identity and by whether the numbers of arrays count.
+_DESCRIBED: dict[tuple[int, bool], str] = {}
+
+
+def _keep(module: eqx.Module, static: bool, description: str) -> None:
+    key = id(module), static
+    _DESCRIBED[key] = description
+    weakref.finalize(module, _DESCRIBED.pop, key, None).atexit = False
 
 
 class NoKey(Exception):
@@ -46,6 +57,7 @@ class _Description:
     def __init__(self) -> None:
         self.parts: list[str] = []
         self._inside: list[int] = []  # identities of what is being described
+        self._circular = False
 
     def add(self, value: Any, static: bool) -> None:
         """Describe a value; `static` where the numbers of arrays count."""
@@ -56,11 +68,27 @@ class _Description:
         elif isinstance(value, np.ndarray | np.generic):
             self._array(np.asarray(value), static=True)
         elif id(value) in self._inside:
+            self._circular = True
             self._text("again", str(self._inside.index(id(value))))
+        elif isinstance(value, eqx.Module):
+            self._module(value, static)
         else:
             self._inside.append(id(value))
             self._compound(value, static)
             self._inside.pop()
+
+    def _module(self, module: eqx.Module, static: bool) -> None:
+        """A module cannot be changed, so its description is kept as long as it lives."""
+        known = _DESCRIBED.get((id(module), static))
+        if known is not None:
+            self.parts.append(known)
+            return
+        first = len(self.parts)
+        self._inside.append(id(module))
+        self._dataclass(module, static)
+        self._inside.pop()
+        if not self._circular:
+            _keep(module, static, "".join(self.parts[first:]))
 
     def _text(self, kind: str, text: str) -> None:
         self.parts.append(f"{kind} {len(text)} {text}\n")

@@ -1,5 +1,6 @@
 """Provenance of a result: versions, machine class, code files; and checksums that reveal changes."""
 
+import functools
 import hashlib
 import importlib.metadata
 import json
@@ -24,12 +25,16 @@ _PART = 2**22  # bytes that are read and hashed at once
 
 def versions() -> dict[str, str]:
     """Versions of the software, and the class of the machine."""
-    packages = {f"version_{name}": importlib.metadata.version(name) for name in _PACKAGES}
     device = jax.devices()[0]
-    return packages | {
+    return _packages() | {
         "version_python": ".".join(map(str, sys.version_info[:3])),
         "machine": f"{platform.system()} {platform.machine()}, {device.platform} ({device.device_kind})",
     }
+
+
+@functools.cache
+def _packages() -> dict[str, str]:
+    return {f"version_{name}": importlib.metadata.version(name) for name in _PACKAGES}
 
 
 def text_hash(text: str) -> str:

@@ -16,10 +16,12 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import numpy as np
 
+from undertow.core.arrays import as_array
 from undertow.core.structure_key import arrays_of, joined
 from undertow.simulation.loop import simd_batch
-from undertow.simulation.program_key import kept_key, program_key
+from undertow.simulation.program_key import foreign_modules, kept_key, program_key
 
 
 def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -27,13 +29,16 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Args:
         function: of positional arguments; its result is a tree of arrays. It may read nothing that changes but them.
+            Arrays of NumPy among them count as arrays of JAX do.
     """
     compiled = eqx.filter_jit(function)
     programs: dict[str, _Program | None] = {}
 
     @functools.wraps(function)
     def run(*arguments: Any) -> Any:
-        key = None if simd_batch.unavailable() else program_key(function, arguments)
+        # In a key the numbers of arrays of NumPy count, and no other run would find the program.
+        arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
+        key = None if simd_batch.unavailable() or foreign_modules() else program_key(function, arguments)
         if key is None:
             return compiled(*arguments)
         if key not in programs:
@@ -57,10 +62,11 @@ def kept_check(check: Callable[[], None], subject: Any) -> None:
         return b"passed"
 
     key = program_key("check", subject)
-    if key is None:
+    kept = None if key is None else kept_key(key)
+    if kept is None:
         check()
     else:
-        simd_batch.kept_code(kept_key(key), passed)
+        simd_batch.kept_code(kept, passed)
 
 
 class _Program:

@@ -3,8 +3,8 @@
 Its key is the structure of its arguments (`structure_key`), and with it the sources of undertow, the versions of all
 libraries, the settings of JAX and the kind of processor.
 
-Nothing has a key in a process that has loaded code of anybody else, as a script, a notebook or a scenario with a part
-of one's own has: it may have changed what a program computes.
+Nothing is kept for later processes by one that has loaded code of anybody else, as a script, a notebook or a scenario
+with a part of one's own has: it may have changed what a program computes.
 """
 
 import functools
@@ -27,16 +27,21 @@ from undertow.core.structure_key import NoKey, structure_key
 
 _LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "scipy", "jaxtyping")
 
-# What two processes share that may use each other's programs, and then what a program computes.
-ProgramKey = tuple[Any, ...]
+# Two processes with the same one may use each other's programs.
+KeptKey = tuple[Any, ...]
 
 
 def program_key(*values: Any) -> str | None:
-    """Key, in this process, of the program that trees of parts need; None where it may not be kept.
+    """Key, in this process, of the program that trees of parts need.
 
-    That is so for traced values, beside code of others, and where the contents of a value are hidden.
+    None where nothing tells: for traced values, for a program that is not for this processor, and for values whose
+    contents are hidden.
     """
-    if not _may_keep(values):
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values)):
+        return None
+    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
+    platform = jax.default_backend() if device is None else getattr(device, "platform", "")
+    if platform != "cpu":
         return None
     try:
         return structure_key(*values, current_precision())
@@ -44,23 +49,19 @@ def program_key(*values: Any) -> str | None:
         return None
 
 
-def kept_key(key: str) -> ProgramKey:
-    """A key of this process with what programs depend on beside their arguments: for all processes."""
+def kept_key(key: str) -> KeptKey | None:
+    """A key of this process with what programs depend on beside their arguments: for all processes.
+
+    None beside code of others.
+    """
+    if foreign_modules():
+        return None
     settings = {
         name: value
         for name, value in jax.config.values.items()  # pyright: ignore[reportAttributeAccessIssue]
         if "cache" not in name and "log" not in name
     }
     return (key, *_installation(), os.environ.get("XLA_FLAGS", ""), sorted(settings.items(), key=repr))
-
-
-def _may_keep(arguments: Any) -> bool:
-    """Whether a program for these arguments may be kept: not for traced ones, nor beside code of others."""
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments)):
-        return False
-    device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
-    platform = jax.default_backend() if device is None else getattr(device, "platform", "")
-    return platform == "cpu" and not foreign_modules()
 
 
 def foreign_modules() -> list[str]:

@@ -9,6 +9,7 @@ back for a run, `batch_runner` for many.
 """
 
 import math
+import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -90,6 +91,12 @@ def portable(function: Callable, example: list[Any], name: str) -> "simdjit.Port
     return simdjit.PortableProgram(function, example, name)
 
 
+# Loops of this process by key, in the order in which they were first used.
+_LOOPS: dict[str, "simdjit.Loop"] = {}
+_LOOPS_LOCK = threading.Lock()
+_MOST_LOOPS = 64
+
+
 def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
     """The loop of a structure, without tracing where an earlier process has made it.
 
@@ -100,6 +107,21 @@ def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"
     key = program_key(*structure)
     if key is None:
         return make(False)
+    with _LOOPS_LOCK:
+        if key in _LOOPS:
+            return _LOOPS[key]
+    loop = _stored_loop(key, make)
+    with _LOOPS_LOCK:
+        if len(_LOOPS) >= _MOST_LOOPS:
+            _LOOPS.pop(next(iter(_LOOPS)))
+        return _LOOPS.setdefault(key, loop)
+
+
+def _stored_loop(key: str, make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
+    """A loop that this process has not used: of an earlier one, or made."""
+    kept = kept_key(key)
+    if kept is None:
+        return make(False)
     made: list[simdjit.Loop] = []
 
     def written() -> bytes:
@@ -109,7 +131,7 @@ def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"
         except Unsupported:
             return b""
 
-    contents = kept_code(kept_key(key), written)
+    contents = kept_code(kept, written)
     if made:
         return made[0]
     try:

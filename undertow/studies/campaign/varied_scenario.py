@@ -1,14 +1,11 @@
 """A scenario with other values at some key paths. The controller knows the nominal plant, not that of the trial."""
 
 import copy
-import itertools
-from collections.abc import Container, Iterator, Mapping
-from difflib import get_close_matches
+from collections.abc import Container, Mapping
 from typing import Any
 
-from undertow.core.errors import BadInput, nearest
+from undertow.scenario.changed_values import put_value
 from undertow.scenario.reading import key_path
-from undertow.scenario.schema import Scenario
 from undertow.studies.campaign.labels import is_number
 
 # A published parameter set is a set of numbers, too.
@@ -66,56 +63,3 @@ def _is_number_of_plant(key: str, value: Any) -> bool:
     section, *path = key_path(key)
     numbers = value if isinstance(value, list) else [value]
     return section == "plant" and bool(path) and (path[-1] == _SETS or all(map(is_number, numbers)))
-
-
-def put_value(data: dict[str, Any], key: str, put: Any) -> None:
-    """Set the value at a key path; a part given by its name alone becomes a mapping."""
-    path = key_path(key)
-    node: Any = data
-    for step, following in itertools.pairwise(path):
-        inner = _entry(node, step, key)
-        if isinstance(inner, str):
-            inner = {"kind": inner}
-        elif inner is None and isinstance(following, int):
-            elsewhere = _elsewhere(str(step), data) if node is data else ""
-            hint = nearest(str(step), node) or elsewhere or f"Give `{step}` there, with all its entries"
-            raise BadInput(key, f"name an entry of a list of the scenario, which has no `{step}` there", hint=hint)
-        elif inner is None:
-            inner = {}
-        node[step] = inner
-        node = inner
-    _entry(node, path[-1], key)
-    node[path[-1]] = put
-
-
-def _elsewhere(word: str, data: dict[str, Any]) -> str:
-    """Sentence that names the list whose key is nearest to a word that is no key at the top of a scenario."""
-    if word in Scenario.model_fields:
-        return ""
-    paths = {path.rpartition(".")[2]: path for path in _lists(data, "")}
-    matches = get_close_matches(word, list(paths), n=1)
-    return f"Did you mean `{paths[matches[0]]}`?" if matches else ""
-
-
-def _lists(node: Any, path: str) -> Iterator[str]:
-    """Key paths of all lists below a node."""
-    pairs = node.items() if isinstance(node, dict) else ()
-    if isinstance(node, list):
-        pairs = ((i, child) for i, child in enumerate(node) if isinstance(child, dict))
-    for step, child in pairs:
-        inner = f"{path}[{step}]" if isinstance(step, int) else f"{path}.{step}".lstrip(".")
-        if isinstance(child, list):
-            yield inner
-        yield from _lists(child, inner)
-
-
-def _entry(node: Any, step: str | int, key: str) -> Any:
-    if isinstance(node, list):
-        if isinstance(step, int) and 0 <= step < len(node):
-            return node[step]
-        raise BadInput(key, f"name one of the {len(node)} entries, 0 to {len(node) - 1}", f"[{step}]")
-    if not isinstance(node, dict):
-        raise BadInput(key, "lead to a key of the scenario", f"past {node!r}")
-    if isinstance(step, int):
-        raise BadInput(key, "name an entry of a list only where there is a list", f"[{step}] of {', '.join(node)}")
-    return node.get(step)
