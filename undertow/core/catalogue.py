@@ -50,19 +50,52 @@ Part = Callable[..., Any]
 FILE = "file"
 
 
+class PartPackage(ModuleType):
+    """A package whose attributes are its parts, where Python would put the modules of the same names."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if isinstance(value, ModuleType) and value.__name__ == f"{self.__name__}.{name}":
+            vars(self).update(_parts_in(value))
+            if name in _parts_in(value):
+                return
+        super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*vars(self), *collect(self)})
+
+
+@functools.cache
+def _parts_in(module: ModuleType) -> dict[str, Part]:
+    """Parts that a module defines, by name; outside of a run they are made in double precision."""
+    by_name = {part.__name__: part for part in getattr(module, "PARTS", ())}
+    own_name = module.__name__.rpartition(".")[2]
+    if callable(part := getattr(module, own_name, None)):
+        by_name[own_name] = part
+    parts = {name: double_outside_runs(_of_a_model(part)) for name, part in by_name.items()}
+    vars(module).update(parts)
+    return parts
+
+
+@functools.cache
+def _module_names(package: ModuleType) -> tuple[str, ...]:
+    return tuple(info.name for info in pkgutil.iter_modules(package.__path__))
+
+
 @functools.cache
 def collect(package: ModuleType) -> dict[str, Part]:
-    """Parts that the modules of a package define, by name; outside of a run they are made in double precision."""
-    parts = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
-        by_name = {part.__name__: part for part in getattr(module, "PARTS", ())}
-        if callable(part := getattr(module, info.name, None)):
-            by_name[info.name] = part
-        for name, part in by_name.items():
-            parts[name] = double_outside_runs(_of_a_model(part))
-            setattr(module, name, parts[name])
-    return parts
+    """Parts that the modules of a package define, by name, in the order of the modules."""
+    modules = [importlib.import_module(f"{package.__name__}.{name}") for name in _module_names(package)]
+    return {name: part for module in modules for name, part in _parts_in(module).items()}
+
+
+def _shipped(kind: str, name: str) -> Part | None:
+    """The part that has a file of its name; the other files are not loaded. None where there is none."""
+    if kind not in PACKAGE_OF or name in {entry.name for entry in _entry_points(f"undertow.{kind}")}:
+        return None
+    package = importlib.import_module(PACKAGE_OF[kind])
+    if name not in _module_names(package):
+        return None
+    return _parts_in(importlib.import_module(f"{package.__name__}.{name}")).get(name)
 
 
 def _of_a_model(part: Part) -> Part:
@@ -81,21 +114,36 @@ def _of_a_model(part: Part) -> Part:
 
 
 def publish(package_name: str) -> Callable[[str], Any]:
-    """Make every part an attribute of its package; returns the package's `__getattr__`."""
-    package = importlib.import_module(package_name)
-    parts = collect(package)
-    vars(package).update(parts)
+    """Make every part an attribute of its package, loaded when it is first used; returns the package's `__getattr__`.
 
-    def missing(name: str) -> Any:
-        raise AttributeError(f"{package_name} has no part `{name}`. {did_you_mean(name, parts)}")
+    In the `__init__` of a package, `WITH_PRESETS` names the parts that have presets, if any have.
+    """
+    package = sys.modules[package_name]
+    package.__class__ = PartPackage
 
-    return missing
+    def part(name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(f"{package_name} has no `{name}`")
+        if name in _module_names(package):
+            module = importlib.import_module(f"{package_name}.{name}")
+            return _parts_in(module).get(name, module)
+        parts = collect(package)
+        if name not in parts:
+            raise AttributeError(f"{package_name} has no part `{name}`. {did_you_mean(name, parts)}")
+        return parts[name]
+
+    return part
 
 
 def names(kind: str) -> dict[str, Part]:
     """All parts of a kind: shipped ones and those of installed entry points."""
     parts = collect(importlib.import_module(PACKAGE_OF[kind])) if kind in PACKAGE_OF else {}
-    return parts | {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
+    return parts | _from_elsewhere(kind)
+
+
+def _from_elsewhere(kind: str) -> dict[str, Part]:
+    """Parts of other packages, by name."""
+    return {entry.name: entry.load() for entry in _entry_points(f"undertow.{kind}")}
 
 
 def presets_of(part: Part) -> Mapping[str, Part]:
@@ -110,7 +158,9 @@ def usual_preset(part: Part) -> str:
 
 def presets(kind: str) -> dict[str, str]:
     """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
-    return {preset: name for name, part in names(kind).items() for preset in presets_of(part)}
+    package = importlib.import_module(PACKAGE_OF[kind]) if kind in PACKAGE_OF else None
+    with_presets = {name: getattr(package, name) for name in getattr(package, "WITH_PRESETS", ())}
+    return {preset: name for name, part in (with_presets | _from_elsewhere(kind)).items() for preset in presets_of(part)}
 
 
 def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Mapping[str, Any]) -> Any:
@@ -154,9 +204,13 @@ def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @functools.cache
-def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
+def _all_entry_points() -> importlib.metadata.EntryPoints:
     # Cached, because it reads a file of every installed package: too slow for each trial of a campaign.
-    return tuple(importlib.metadata.entry_points(group=group))
+    return importlib.metadata.entry_points()
+
+
+def _entry_points(group: str) -> importlib.metadata.EntryPoints:
+    return _all_entry_points().select(group=group)
 
 
 def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -> Part:
@@ -176,6 +230,9 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     if name.endswith(".py"):
         hint = maker_in((folder or Path()) / name, name)
         raise BadInput(what, "name a file and a function in it", "a file alone" if what == name else name, hint=hint)
+    part = _shipped(kind, name)
+    if part is not None:
+        return part
     parts = names(kind)
     if name not in parts:
         hint = did_you_mean(name, [*presets(kind), *parts]) if parts else "Name a file of your own: ./file.py:function"

@@ -37,7 +37,8 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def run(*arguments: Any) -> Any:
         # In a key the numbers of arrays of NumPy count, and no other run would find the program.
-        arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
+        if any(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves(arguments)):
+            arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
         key = None if simd_batch.unavailable() or foreign_modules() else program_key(function, arguments)
         if key is None:
             return compiled(*arguments)
@@ -88,7 +89,8 @@ class _Program:
         (self._form,) = forms
 
     def __call__(self, arguments: Any) -> Any:
-        return jax.tree.unflatten(self._form, self._program(arrays_of(arguments)[0]))
+        arrays = [leaf for leaf in jax.tree.leaves(arguments) if eqx.is_array(leaf)]  # in the order of `arrays_of`
+        return jax.tree.unflatten(self._form, self._program(arrays))
 
 
 def _program(function: Callable[..., Any], arguments: Any, key: str) -> _Program | None:

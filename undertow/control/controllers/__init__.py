@@ -4,3 +4,5 @@ from undertow.control.controllers.composite_law import RCAF as RCAF
 from undertow.core.catalogue import publish
 
 __getattr__ = publish(__name__)
+
+WITH_PRESETS = ("rcaf", "cascade")
