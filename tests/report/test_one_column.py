@@ -80,6 +80,6 @@ def test_files_and_their_bytes(make_run, tmp_path):
     assert sorted(path.name for path in tmp_path.glob("*.pdf")) == ["column.pdf", "wide.pdf"]
     assert (tmp_path / "wide.svg").read_bytes() == (tmp_path / "column.svg").read_bytes()
     wide, column = (tmp_path / f"{name}.pdf" for name in ("wide", "column"))
-    assert wide.read_bytes() == pdf(figures[0]) != column.read_bytes()
+    assert wide.read_bytes() == pdf(figures[0], "wide") != column.read_bytes()
     assert b"CreationDate" not in wide.read_bytes() and b"/Subtype /Type3" not in wide.read_bytes()
     assert b"/MediaBox [ 0 0 252 " in column.read_bytes() or b"/MediaBox [ 0 0 252.0 " in column.read_bytes()

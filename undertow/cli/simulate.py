@@ -48,10 +48,10 @@ def simulate(command: SimulateCommand) -> int:
         if rerun is not None:
             check_rerun(rerun, folder, command.overwrite)
         result = _run(scenario, console, command.allow_code)
+        plotting.plot(result, command.pdf)
         write(result, draft.path)
         repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-        plotting.plot(folder / "run.nc", command.pdf)
         predicting = None if command.prediction is False else thread.submit(predict, result)
         _print_results(result, folder, console)
         code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)

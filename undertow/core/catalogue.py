@@ -160,7 +160,9 @@ def presets(kind: str) -> dict[str, str]:
     """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
     package = importlib.import_module(PACKAGE_OF[kind]) if kind in PACKAGE_OF else None
     with_presets = {name: getattr(package, name) for name in getattr(package, "WITH_PRESETS", ())}
-    return {preset: name for name, part in (with_presets | _from_elsewhere(kind)).items() for preset in presets_of(part)}
+    return {
+        preset: name for name, part in (with_presets | _from_elsewhere(kind)).items() for preset in presets_of(part)
+    }
 
 
 def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Mapping[str, Any]) -> Any:

@@ -10,12 +10,12 @@ class Plotted(NamedTuple):
 
     Attributes:
         files: what the files hold, by their names.
-        pictures: what the page shows: SVG as text or PNG as bytes, by the name of the figure.
+        pictures: what the page shows: PNG, by the name of the figure.
         failures: a sentence for each figure that could not be made.
     """
 
     files: Mapping[str, bytes]
-    pictures: Mapping[str, str | bytes]
+    pictures: Mapping[str, bytes]
     failures: list[str]
 
     def write(self, folder: Path) -> None:

@@ -9,12 +9,12 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 from undertow.report import figures
 from undertow.report.plotted import Plotted
-from undertow.scenario.results.netcdf import read_record
+from undertow.scenario.results.run_result import RunRecord
 
 
 class PlottingProcess:
@@ -26,28 +26,32 @@ class PlottingProcess:
 
     def __init__(self, process: subprocess.Popen[bytes] | None):
         self._process = process
-        self._request: tuple[Path, str | None] | None = None
+        self._request: tuple[RunRecord, str | None] | None = None
+        self._sending: threading.Thread | None = None
 
-    def plot(self, run: Path, width: str | None) -> None:
-        """Begin to plot the run in a file `run.nc`, with PDF files where a width is given."""
-        self._request = run, width
-        if self._process is not None and self._process.stdin is not None:
-            with contextlib.suppress(OSError):  # it has ended; `plotted` then plots here
-                self._process.stdin.write(pickle.dumps(self._request))
-                self._process.stdin.close()
+    def plot(self, run: RunRecord, width: str | None) -> None:
+        """Begin to plot a run, with PDF files where a width is given."""
+        self._request = RunRecord(run.series, run.facts), width
+        if self._process is not None:
+            # The process may still be starting, and a pipe holds little.
+            self._sending = threading.Thread(target=self._send, daemon=True)
+            self._sending.start()
+
+    def _send(self) -> None:
+        assert self._process is not None and self._process.stdin is not None
+        with contextlib.suppress(OSError):  # it has ended; `plotted` then plots here
+            self._process.stdin.write(pickle.dumps(self._request))
+            self._process.stdin.close()
 
     def plotted(self) -> Plotted:
-        """Wait for the figures; plotted here where the process cannot.
-
-        Raises:
-            UnreadableResult: the file of the run cannot be read.
-        """
+        """Wait for the figures; plotted here where the process cannot."""
         assert self._request is not None, "`plot` comes first"
-        if self._process is not None and self._process.stdout is not None:
+        if self._process is not None and self._sending is not None and self._process.stdout is not None:
+            self._sending.join()
             data = self._process.stdout.read()
             if self._process.wait() == 0 and data:
                 return pickle.loads(data)  # written by our own process
-        return _plot(*self._request)
+        return figures.plot_run(*self._request)
 
 
 @contextlib.contextmanager
@@ -57,8 +61,8 @@ def plotting_process() -> Iterator[PlottingProcess]:
         yield PlottingProcess(None)
         return
     # The same search path, but without the current folder in front, where a file may have the name of a module. Ctrl-C
-    # ends this process, which ends the other one.
-    command = f"import sys; sys.path[:] = {sys.path!r}; from undertow.report.plotting import serve; serve()"
+    # ends this process, which ends the other one. It lives for seconds: looking for garbage would be a fifth of them.
+    command = f"import gc, sys; gc.disable(); sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
     pipe = subprocess.PIPE
     try:
         process = subprocess.Popen([sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True)
@@ -73,7 +77,7 @@ def plotting_process() -> Iterator[PlottingProcess]:
 
 
 def serve() -> None:
-    """Plot the run whose file standard input names, and write the figures to standard output.
+    """Plot the run that standard input holds, pickled, and write the figures to standard output.
 
     Whatever else is printed goes to standard error.
     """
@@ -82,9 +86,6 @@ def serve() -> None:
     _ = figures.plot_run  # imports matplotlib before there is anything to do
     request = sys.stdin.buffer.read()
     if request:
-        pickle.dump(_plot(*pickle.loads(request)), answer)
+        pickle.dump(figures.plot_run(*pickle.loads(request)), answer)
         answer.close()
-
-
-def _plot(run: Path, width: str | None) -> Plotted:
-    return figures.plot_run(read_record(run), width)
+    os._exit(0)  # at once: taking everything apart would take as long as two figures
