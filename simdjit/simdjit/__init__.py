@@ -13,61 +13,50 @@ compiler has no rule for raises `Unsupported`; `jax.vmap` still does it.
 How it works: a traced function becomes a graph of scalar operations (`lowering`, `graph`, `simplify`), that becomes
 LLVM's assembly in which every scalar is a vector over lanes (`codegen`, `instructions`), and LLVM makes machine code of
 it, for this processor (`cpu`) or for a GPU where every lane is a thread (`nvidia`, `cuda`). `c99` writes it as C.
+
+Names are loaded when first used: `import simdjit` by itself is quick.
 """
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+import importlib
+from typing import TYPE_CHECKING, Any
 
-import jax
-import numpy as np
+if TYPE_CHECKING:
+    from simdjit import c99 as c99
+    from simdjit.batch_function import compile as compile
+    from simdjit.batch_step import BatchStep as BatchStep
+    from simdjit.cache import cached as cached
+    from simdjit.cache import default_folder as default_folder
+    from simdjit.cpu import simd_width as simd_width
+    from simdjit.cuda import Driver as Driver
+    from simdjit.graph import Unsupported as Unsupported
+    from simdjit.loop import Loop as Loop
+    from simdjit.nvidia import gpu as gpu
+    from simdjit.portable import PortableProgram as PortableProgram
+    from simdjit.step import Step as Step
 
-from simdjit import c99 as c99
-from simdjit.batch_step import BatchStep as BatchStep
-from simdjit.cache import cached as cached
-from simdjit.cache import default_folder as default_folder
-from simdjit.cpu import simd_width as simd_width
-from simdjit.cuda import Driver as Driver
-from simdjit.graph import Unsupported as Unsupported
-from simdjit.loop import Loop as Loop
-from simdjit.nvidia import gpu as gpu
-from simdjit.portable import PortableProgram as PortableProgram
-from simdjit.step import Step as Step
+# Public name -> module.
+_HOMES = {
+    "BatchStep": "simdjit.batch_step",
+    "Driver": "simdjit.cuda",
+    "Loop": "simdjit.loop",
+    "PortableProgram": "simdjit.portable",
+    "Step": "simdjit.step",
+    "Unsupported": "simdjit.graph",
+    "cached": "simdjit.cache",
+    "compile": "simdjit.batch_function",
+    "default_folder": "simdjit.cache",
+    "gpu": "simdjit.nvidia",
+    "simd_width": "simdjit.cpu",
+}
 
 
-def compile(
-    function: Callable[..., Any], *example: Any, lanes: int = 0, driver: Driver | None = None, cache: Path | None = None
-) -> Callable[..., Any]:
-    """A function of one run, compiled for batches.
+def __getattr__(name: str) -> Any:
+    if name == "c99":
+        return importlib.import_module("simdjit.c99")
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    raise AttributeError(f"simdjit has no `{name}`. It has: {', '.join(__dir__())}")
 
-    Args:
-        function: of trees of arrays; anything that JAX can trace.
-        example: its arguments for one run; shapes and types count.
-        lanes: runs in one vector; as many as fit a register unless given. No result depends on it.
-        driver: of the GPU that computes it, as `gpu` finds it; None for this processor.
-        cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
 
-    Returns:
-        The function of the same trees with a leading axis over runs on every array, giving arrays of NumPy.
-
-    Raises:
-        Unsupported: the function needs something that the compiler has no rule for.
-        OSError: the GPU's driver fails.
-    """
-    nothing = np.zeros(())
-    loop = Loop(
-        lambda arguments: arguments,
-        lambda arguments: nothing,
-        lambda arguments, carry, step: carry,
-        lambda arguments, carry, step: function(*arguments),
-        example,
-        lanes=lanes,
-        driver=driver,
-        cache=cache,
-    )
-
-    def run(*arguments: Any) -> Any:
-        _, recorded = loop.run(arguments, steps=0, every=1)
-        return jax.tree.map(lambda leaf: leaf[:, 0], recorded)
-
-    return run
+def __dir__() -> list[str]:
+    return sorted(("c99", *_HOMES))

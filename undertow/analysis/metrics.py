@@ -12,11 +12,11 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_program
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rotations import attitude_error, quaternion_from_euler
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recorded_signals import Signals

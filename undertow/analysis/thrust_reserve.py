@@ -14,8 +14,8 @@ from undertow.control.supervision.reduced_model import VEHICLE_PRIORITY, attaine
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_program
 from undertow.core.runtime import double_outside_runs
-from undertow.simulation.kept_programs import kept_program
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
 _CONTROLLED = 0.85

@@ -206,13 +206,13 @@ def spelled_out(kind: str, description: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @functools.cache
-def _all_entry_points() -> importlib.metadata.EntryPoints:
+def _all_entry_points() -> Any:
     # Cached, because it reads a file of every installed package: too slow for each trial of a campaign.
     return importlib.metadata.entry_points()
 
 
-def _entry_points(group: str) -> importlib.metadata.EntryPoints:
-    return _all_entry_points().select(group=group)
+def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
+    return tuple(_all_entry_points().select(group=group))
 
 
 def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -> Part:

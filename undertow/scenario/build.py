@@ -30,6 +30,7 @@ from undertow.core.contracts import (
     Model,
 )
 from undertow.core.errors import Advice, BadInput, advice, error_location
+from undertow.core.kept_programs import kept_check, kept_program
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rounding import three_digits
 from undertow.physics.disturbances.loads import SumOfDisturbances
@@ -52,7 +53,6 @@ from undertow.scenario.reading import Text, from_data
 from undertow.scenario.schema import Part, Scenario
 from undertow.scenario.step_size import step_advice
 from undertow.scenario.validation import validate
-from undertow.simulation.kept_programs import kept_check, kept_program
 from undertow.simulation.loop import continuous
 from undertow.simulation.loop.closed_loop import ClosedLoop
 

@@ -15,13 +15,13 @@ from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
+from undertow.core.kept_programs import kept_program
 from undertow.physics.disturbances.current import Current
 from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurrent
 from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.surface import stated_depths
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SAMPLES = 201  # instants at which a reference is looked at

@@ -12,7 +12,7 @@ from undertow.control.controllers.composite_law import RCAF
 from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
-from undertow.simulation.kept_programs import kept_program
+from undertow.core.kept_programs import kept_program
 
 # Smaller departures are rounding: shares, or m/s^2 and rad/s^2.
 ROUNDING = 1e-9

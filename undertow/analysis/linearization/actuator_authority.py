@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.control.controllers.thruster_allocation import allocate, attained
-from undertow.simulation.kept_programs import kept_program
+from undertow.core.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SETTLING, _STEP = 800, 5e-3  # steps and s that an actuator is given to come to its limit

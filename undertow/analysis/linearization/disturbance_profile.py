@@ -9,8 +9,8 @@ from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.core.contracts import Load, Pose
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.linear_algebra import matvec
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow

@@ -11,8 +11,8 @@ from jaxtyping import Array
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement, Model
+from undertow.core.kept_programs import kept_program
 from undertow.physics.plants.reachability import lost_directions
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _FIRST_SHARE, _SMALLEST_SHARE = 0.25, 0.02  # of a load that is put on little by little
@@ -186,14 +186,14 @@ def _steered(model: Model, y: Measurement) -> np.ndarray:
     return np.eye(len(into_axes)) - np.linalg.pinv(lost) @ lost
 
 
-@jax.jit
+@kept_program
 def _reach(model: Model, y: Measurement):
     """From accelerations of the outputs to the axes of the law; and what the forces give there."""
     into_axes = jax.jacfwd(lambda a: model.coordinates.acceleration(y, a))(jnp.zeros_like(y.position))
     return into_axes, model.dynamics.gain(y)
 
 
-@jax.jit
+@kept_program
 def _settled_input(model: Model, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
     dynamics, coordinates, drive = model

@@ -17,8 +17,8 @@ from jaxtyping import Array, PyTree
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Load, Target, Water
+from undertow.core.kept_programs import kept_program
 from undertow.core.measurement import with_outputs
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 Part = TypeVar("Part")

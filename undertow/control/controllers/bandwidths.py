@@ -13,7 +13,6 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -24,6 +23,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.linear_algebra import matvec
 
 # Largest sensitivity |1 / (1 + L)| allowed with a factor on the nominal lag, an additional lag of the actuator and an
@@ -137,7 +137,7 @@ def axes_of(model: Model, conditions: DesignConditions) -> list[Axis]:
     return [Axis(*common, *row, dead_zone) for row in rows]
 
 
-@eqx.filter_jit
+@kept_program
 def _actuation(
     model: Model, still: Float[Array, " n"], fastest: Float[Array, ""]
 ) -> tuple[Array | None, Array, Float[Array, " n"]]:

@@ -3,7 +3,6 @@
 import functools
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -22,6 +21,7 @@ from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.riccati import regulator_gain
 from undertow.core.option_groups import flat_options
 from undertow.core.param import Param, param
@@ -118,7 +118,7 @@ def lqi_gains(frequency, integral_weight, rate_weight, lag, dt) -> Float[Array, 
     return gain * jnp.asarray([-1.0, -1.0, -1.0, 1.0])
 
 
-@eqx.filter_jit
+@kept_program
 def _gains_of_axes(frequency, integral_weight, rate_weight, lag, dt) -> Float[Array, "k 4"]:
     frequency, integral_weight, rate_weight = jnp.broadcast_arrays(frequency, integral_weight, rate_weight)
     return jax.vmap(lqi_gains, (0, 0, 0, None, None))(frequency, integral_weight, rate_weight, lag, dt)

@@ -3,7 +3,6 @@
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -14,6 +13,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_program
 from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS, measurement_of_pose
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.numerics.number import Number
@@ -243,7 +243,7 @@ def _possible_wrenches(thruster_matrix, rank: int):
     return jnp.asarray(svd(thruster_matrix)[0][:, :rank])
 
 
-@jax.jit
+@kept_program
 def _static(inverse_mass, thruster_matrix, voltage_gain):
     """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""
     per_volt = thruster_matrix * voltage_gain

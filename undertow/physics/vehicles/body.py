@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from undertow.core.contracts import Water
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.numerics.rotations import cross, skew
 from undertow.core.param import Param, param
@@ -67,7 +67,7 @@ def coriolis_force(mass_matrix: Matrix6, nu: Vector6) -> Vector6:
     return jnp.concatenate([cross(nu[3:], linear), cross(nu[:3], linear) + cross(nu[3:], angular)])
 
 
-@jax.jit
+@kept_program
 def rigid_body_mass(mass: Array, r_g: Vector3, inertia: Float[Array, "3 3"]) -> Matrix6:
     """M_RB about the body origin. Fossen (2021), Eq. (3.49).
 

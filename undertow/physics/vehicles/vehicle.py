@@ -3,7 +3,6 @@
 import dataclasses
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -11,6 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_program
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.vehicles.body import Body, rigid_body_mass
@@ -151,6 +151,6 @@ class VehicleModel(eqx.Module):
         )
 
 
-@jax.jit
+@kept_program
 def _columns(positions: Float[Array, "N 3"], directions: Float[Array, "N 3"]) -> Float[Array, "6 N"]:
     return jnp.concatenate([directions, jnp.cross(positions, directions)], axis=1).T

@@ -10,10 +10,10 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PRNGKeyArray
 
 from undertow.core.contracts import AbstractController, Pose
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.physics.thrusters.thruster import AbstractThruster
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 Series = np.ndarray

@@ -3,9 +3,9 @@
 Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixed steps, to rounding; their bits depend
 neither on the machine nor on the other runs.
 
-This is the only module that imports `simdjit`, which is optional: without it every program is `Unsupported`, and
-`unavailable` says why; `outside/export` takes its C from here. What is unsupported runs by XLA: `run_scenario` falls
-back for a run, `batch_runner` for many.
+This is the module that compiles by `simdjit`, which is optional (`core/kept_code` uses its cache): without it every
+program is `Unsupported`, and `unavailable` says why; `outside/export` takes its C from here. What is unsupported runs
+by XLA: `run_scenario` falls back for a run, `batch_runner` for many.
 """
 
 import math
@@ -19,15 +19,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
+from undertow.core.kept_code import kept_code
 from undertow.core.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.core.process_setup import cache_folder
+from undertow.core.program_key import kept_key, program_key
 from undertow.core.status import Status
 from undertow.simulation.loop import continuous, sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
 from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recording import instant
-from undertow.simulation.program_key import kept_key, program_key
 
 if TYPE_CHECKING:
     import simdjit
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 else:
     try:
         import simdjit
+        import simdjit.loop  # and with it LLVM, which may be missing
         from simdjit import Unsupported
     except ImportError as error:
         simdjit = None
@@ -66,29 +68,6 @@ def simd_width(bits: int) -> int:
     if unavailable():
         return 1
     return simdjit.simd_width(bits)
-
-
-def kept_code(key: object, make: Callable[[], bytes]) -> bytes:
-    """What `make` gives, or gave in an earlier process: machine code of XLA, beside that of the batch compiler.
-
-    Args:
-        key: everything that it depends on; by its `repr`.
-        make: computes it.
-    """
-    if unavailable():
-        return make()
-    return simdjit.cached(key, ".xla", make, cache_folder() / "native")
-
-
-def portable(function: Callable, example: list[Any], name: str) -> "simdjit.PortableProgram":
-    """`simdjit.PortableProgram`: a program of XLA that can be kept.
-
-    Raises:
-        Unsupported: it cannot, or there is no batch compiler.
-    """
-    if unavailable():
-        raise Unsupported(unavailable())
-    return simdjit.PortableProgram(function, example, name)
 
 
 # Loops of this process by key, in the order in which they were first used.

@@ -15,9 +15,9 @@ from undertow.analysis.linearization.response import from_start, metrics_of, sig
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractController, AbstractReference, Outputs, Time
+from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
-from undertow.simulation.kept_programs import kept_program
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _MAX_STEPS = 200_000  # largest number of predicted steps

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core import checks
+from undertow.core.kept_programs import kept_program
 from undertow.core.param import Param, param
 
 PerAxis = Float[Array, " n"]
@@ -153,7 +154,7 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
     return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)
 
 
-@eqx.filter_jit
+@kept_program
 def _slope(fuzzy: FuzzySystem) -> Float[Array, ""]:
     """Sum |xi'(0)|."""
     return jnp.abs(jax.jacfwd(lambda x: fuzzy.basis(x[None, None])[0])(jnp.zeros(()))).sum()

@@ -14,8 +14,8 @@ from undertow.core.errors import BadInput
 from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
-from undertow.simulation import kept_programs
-from undertow.simulation.kept_programs import kept_check, kept_program
+from undertow.core import kept_programs
+from undertow.core.kept_programs import kept_check, kept_program
 
 MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
 
@@ -107,7 +107,7 @@ def test_a_command_has_no_code_of_others_until_a_scenario_names_some(tmp_path):
     code = [
         "import undertow.cli.simulate",
         "from undertow.core.catalogue import find",
-        "from undertow.simulation.kept_programs import foreign_modules",
+        "from undertow.core.kept_programs import foreign_modules",
         "print(foreign_modules())",
         "find('controllers', 'mine.py:mine')",
         "print(len(foreign_modules()))",

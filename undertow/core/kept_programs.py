@@ -19,9 +19,9 @@ import jax
 import numpy as np
 
 from undertow.core.arrays import as_array
+from undertow.core.kept_code import KEEPS, PortableProgram, Unsupported, kept_code
+from undertow.core.program_key import foreign_modules, kept_key, program_key
 from undertow.core.structure_key import arrays_of, joined
-from undertow.simulation.loop import simd_batch
-from undertow.simulation.program_key import foreign_modules, kept_key, program_key
 
 
 def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -39,7 +39,7 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
         # In a key the numbers of arrays of NumPy count, and no other run would find the program.
         if any(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves(arguments)):
             arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
-        key = None if simd_batch.unavailable() or foreign_modules() else program_key(function, arguments)
+        key = program_key(function, arguments) if KEEPS and not foreign_modules() else None
         if key is None:
             return compiled(*arguments)
         if key not in programs:
@@ -67,7 +67,7 @@ def kept_check(check: Callable[[], None], subject: Any) -> None:
     if kept is None:
         check()
     else:
-        simd_batch.kept_code(kept, passed)
+        kept_code(kept, passed)
 
 
 class _Program:
@@ -80,12 +80,12 @@ class _Program:
         def of_arrays(arrays: list[Any]) -> list[Any]:
             results, further = eqx.partition(function(*joined(arrays, rest)), eqx.is_array)
             if jax.tree.leaves(further):
-                raise simd_batch.Unsupported("a result that is more than arrays")
+                raise Unsupported("a result that is more than arrays")
             leaves, form = jax.tree.flatten(results)
             forms.append(form)
             return leaves
 
-        self._program = simd_batch.portable(of_arrays, arrays, function.__name__)
+        self._program = PortableProgram(of_arrays, arrays, function.__name__)
         (self._form,) = forms
 
     def __call__(self, arguments: Any) -> Any:
@@ -95,7 +95,7 @@ class _Program:
 
 def _program(function: Callable[..., Any], arguments: Any, key: str) -> _Program | None:
     """The program of a function for arguments of this structure; None where it cannot be kept."""
-    contents = simd_batch.kept_code(kept_key(key), lambda: _made(function, arguments))
+    contents = kept_code(kept_key(key), lambda: _made(function, arguments))
     try:
         return pickle.loads(contents) if contents else None
     except Exception:  # whatever XLA, or another version of JAX, says of machine code that it does not take
@@ -106,7 +106,7 @@ def _made(function: Callable[..., Any], arguments: Any) -> bytes:
     """A program for a file; empty where it cannot be kept."""
     try:
         program = _Program(function, arguments)
-    except simd_batch.Unsupported:
+    except Unsupported:
         return b""
     try:
         return pickle.dumps(program)
