@@ -14,7 +14,7 @@ from undertow.core.errors import BadInput
 from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
-from undertow.core import kept_programs
+from undertow.core import kept_programs, program_key
 from undertow.core.kept_programs import kept_check, kept_program
 
 MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
@@ -24,7 +24,8 @@ MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
 def folder(tmp_path, monkeypatch):
     """A cache of its own, in a process without code of others, which the tests themselves are."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
-    monkeypatch.setattr(kept_programs, "foreign_modules", list)
+    for module in (kept_programs, program_key):
+        monkeypatch.setattr(module, "foreign_modules", list)
     return tmp_path / "native"
 
 
@@ -66,7 +67,7 @@ def test_another_structure_is_another_program(folder):
 def test_other_code_and_settings_are_another_program(folder, monkeypatch, change):
     kept_program(matvec)(MATRIX, VECTOR)
     if change == "sources":
-        monkeypatch.setattr(kept_programs, "_installation", lambda: ("other sources",))
+        monkeypatch.setattr(program_key, "_installation", lambda: ("other sources",))
     else:
         monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
     kept_program(matvec)(MATRIX, VECTOR)
@@ -84,7 +85,7 @@ def test_damaged_entries_are_made_again(folder, monkeypatch, damage):
     elif damage == "another's":
         first.write_bytes(other.read_bytes())
     elif damage == "of no use":  # whole, but no program
-        monkeypatch.setattr(kept_programs.simd_batch, "kept_code", lambda key, make: b"no program")
+        monkeypatch.setattr(kept_programs, "kept_code", lambda key, make: b"no program")
     else:
         first.write_bytes(contents[: len(contents) // 2] if damage == "cut off" else b"")
     for matrix in (MATRIX, jnp.ones((3, 2))):
@@ -95,7 +96,7 @@ def test_damaged_entries_are_made_again(folder, monkeypatch, damage):
 def test_nothing_is_kept_beside_code_of_others(tmp_path, monkeypatch):
     """As here, where the tests are loaded: their modules may have changed anything."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
-    assert __name__ in kept_programs.foreign_modules()
+    assert __name__ in program_key.foreign_modules()
     kept_program(matvec)(MATRIX, VECTOR)
     assert not entries(tmp_path / "native")
 
@@ -107,7 +108,7 @@ def test_a_command_has_no_code_of_others_until_a_scenario_names_some(tmp_path):
     code = [
         "import undertow.cli.simulate",
         "from undertow.core.catalogue import find",
-        "from undertow.core.kept_programs import foreign_modules",
+        "from undertow.core.program_key import foreign_modules",
         "print(foreign_modules())",
         "find('controllers', 'mine.py:mine')",
         "print(len(foreign_modules()))",
@@ -124,13 +125,31 @@ def test_functions_of_others_are_compiled_and_not_kept(folder):
 
 
 @pytest.mark.parametrize("function", [pseudo_inverse, printed_inverse])
-def test_programs_that_call_lapack_are_not_kept(folder, function):
-    """A process that finds one, and has lowered none, would end with a segmentation fault."""
+def test_programs_that_call_lapack_run_where_nothing_has_called_it(folder, function):
+    """In a process of its own: JAX puts LAPACK in place when it lowers such a call, and a kept program lowers nothing."""
     matrix = jnp.asarray([[2.0, 0.5], [0.5, 1.0]])
-    for _ in range(2):
-        np.testing.assert_allclose(kept_program(function)(matrix) @ matrix, np.eye(2), atol=1e-12)
+    expected = kept_program(function)(matrix)
+    np.testing.assert_allclose(expected @ matrix, np.eye(2), atol=1e-12)
     (entry,) = entries(folder)
-    assert entry.stat().st_size < 100
+    code = [
+        "import pickle, pathlib, jax, numpy",
+        "jax.config.update('jax_enable_x64', True)",
+        f"kept = pathlib.Path({str(entry)!r}).read_bytes()[32:]",  # behind the checksum
+        "program = pickle.loads(kept)",
+        "print((program((jax.device_put(numpy.array([[2.0, 0.5], [0.5, 1.0]])),)) + 0).tolist())",
+    ]
+    command = [sys.executable, "-c", "; ".join(code)]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == str(expected.tolist())
+
+
+def test_arrays_of_numpy_are_arguments(folder):
+    """Or every record of a run would be a program of its own."""
+    run = kept_program(matvec)
+    for scale in (1.0, 2.0):
+        matrix, vector = scale * np.asarray(MATRIX), np.asarray(VECTOR)
+        np.testing.assert_allclose(run(matrix, vector), matrix @ vector, rtol=1e-15)
+    assert len(entries(folder)) == 1
 
 
 def test_inside_a_trace_it_is_a_part_of_it(folder):

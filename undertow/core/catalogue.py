@@ -120,6 +120,8 @@ def publish(package_name: str) -> Callable[[str], Any]:
     """
     package = sys.modules[package_name]
     package.__class__ = PartPackage
+    for name, value in list(vars(package).items()):  # modules that its `__init__` has imported before
+        setattr(package, name, value)
 
     def part(name: str) -> Any:
         if name.startswith("_"):

@@ -20,7 +20,7 @@ import numpy as np
 
 from undertow.core.arrays import as_array
 from undertow.core.kept_code import KEEPS, PortableProgram, Unsupported, kept_code
-from undertow.core.program_key import foreign_modules, kept_key, program_key
+from undertow.core.program_key import KeptKey, foreign_modules, kept_key, program_key
 from undertow.core.structure_key import arrays_of, joined
 
 
@@ -43,7 +43,8 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
         if key is None:
             return compiled(*arguments)
         if key not in programs:
-            programs[key] = _program(function, arguments, key)
+            kept = kept_key(key)
+            programs[key] = None if kept is None else _program(function, arguments, kept)
         program = programs[key]
         return compiled(*arguments) if program is None else program(arguments)
 
@@ -93,9 +94,9 @@ class _Program:
         return jax.tree.unflatten(self._form, self._program(arrays))
 
 
-def _program(function: Callable[..., Any], arguments: Any, key: str) -> _Program | None:
+def _program(function: Callable[..., Any], arguments: Any, kept: KeptKey) -> _Program | None:
     """The program of a function for arguments of this structure; None where it cannot be kept."""
-    contents = kept_code(kept_key(key), lambda: _made(function, arguments))
+    contents = kept_code(kept, lambda: _made(function, arguments))
     try:
         return pickle.loads(contents) if contents else None
     except Exception:  # whatever XLA, or another version of JAX, says of machine code that it does not take
