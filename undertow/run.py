@@ -71,8 +71,8 @@ class Run:
 
             run.again(controller__bandwidth=1.2, disturbance__0__velocity=[0.4, 0, 0], seed=3)
 
-        While types, shapes and the switched-on features stay as they are, nothing is compiled: 20 s of a vehicle at sea
-        take some hundredths of a second.
+        While parts and shapes stay as they are, nothing is compiled: 20 s of a vehicle at sea take some hundredths of a
+        second. A number that becomes exactly 0 or 1, or was, may need another program, once.
 
         Args:
             values: by key path, with two underscores for each dot, and entries of lists by their number.

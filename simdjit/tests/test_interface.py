@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -73,6 +74,40 @@ def test_a_loop_for_a_batch(constant):
     np.testing.assert_allclose(rate, wanted_rate, rtol=1e-12)
     np.testing.assert_allclose(recorded, series, rtol=1e-13)
     assert recorded.shape == (5, 5)
+
+
+@pytest.mark.parametrize("left_to_xla", [False, True])
+def test_a_loop_that_was_written_is_the_same_without_its_functions(tmp_path, left_to_xla):
+    """The second prepares by an operation without a rule, so that XLA does it before the first step."""
+    prepare = (lambda n: (n[0] + jnp.fft.fft(n[1]).real.sum(), n[1])) if left_to_xla else (lambda n: n)
+    functions = (
+        prepare,
+        lambda prepared: {"x": prepared[0], "count": jnp.zeros((), int)},
+        lambda prepared, carry, k: {"x": carry["x"] + prepared[1].sum(), "count": carry["count"] + 1},
+        lambda prepared, carry, k: carry["x"],
+    )
+    loop = simdjit.Loop(*functions, (np.zeros(()), np.zeros(4)), portable=True, cache=tmp_path)
+    again = simdjit.Loop.read(loop.written(), cache=tmp_path)
+    numbers = np.linspace(0.0, 1.0, 5), np.random.default_rng(0).normal(size=(5, 4))
+    expected, found = loop.run(numbers, 6, 2), again.run(numbers, 6, 2)
+    assert jax.tree.structure(expected) == jax.tree.structure(found) and again.operations == loop.operations
+    for one, other in zip(jax.tree.leaves(expected), jax.tree.leaves(found), strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(found[0]["count"], 6)
+
+
+def test_a_prologue_of_this_process_alone_is_not_written(tmp_path):
+    functions = (lambda n: jnp.fft.fft(n).real, lambda n: n[0], lambda n, carry, k: carry, lambda n, carry, k: carry)
+    loop = simdjit.Loop(*functions, np.arange(3.0), cache=tmp_path)
+    with pytest.raises(simdjit.Unsupported, match="not made for other processes"):
+        loop.written()
+
+
+def test_names_are_loaded_when_they_are_used():
+    code = "import sys, simdjit; print('llvmlite' in sys.modules, 'jax' in sys.modules, dir(simdjit) == sorted(dir(simdjit)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False False True\n"
+    with pytest.raises(AttributeError, match="It has: BatchStep, Driver"):
+        simdjit.missing  # noqa: B018
 
 
 def test_what_has_no_rule():

@@ -9,6 +9,7 @@ import equinox as eqx
 import pytest
 
 import undertow
+from undertow.core import catalogue
 from undertow.core.part_packages import PACKAGE_OF
 
 NAMES = sorted(info.name for info in pkgutil.walk_packages(undertow.__path__, "undertow."))
@@ -125,3 +126,12 @@ def test_the_check_sees_an_heir_of_a_final_class():
 def test_unknown_part_is_named_in_the_error(name):
     with pytest.raises(AttributeError, match="has no part `nothing_like_it`"):
         _ = importlib.import_module(PACKAGE_OF[name]).nothing_like_it
+
+
+def test_parts_with_presets_are_named_by_their_package():
+    """So that a preset is found without loading every part of its kind."""
+    for kind, package in PACKAGE_OF.items():
+        named = getattr(importlib.import_module(package), "WITH_PRESETS", ())
+        assert sorted(named) == sorted(
+            name for name, part in catalogue.names(kind).items() if catalogue.presets_of(part)
+        )

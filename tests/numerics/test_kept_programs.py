@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from undertow.control.controllers.bandwidths import largest_forces
-from undertow.core import checks
+from undertow.core import checks, kept_programs, program_key
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_check, kept_program
 from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
-from undertow.core import kept_programs, program_key
-from undertow.core.kept_programs import kept_check, kept_program
 
 MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
 
