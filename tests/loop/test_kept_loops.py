@@ -104,7 +104,7 @@ def test_another_structure_is_another_loop(folder, monkeypatch, values):
 def test_other_sources_are_another_loop(folder, monkeypatch):
     simulate_scenario(SCENARIO)
     monkeypatch.setattr(simd_batch, "_LOOPS", {})
-    monkeypatch.setattr(program_key, "_installation", lambda: ("other sources",))
+    monkeypatch.setattr(program_key, "installation", lambda: ("other sources",))
     simulate_scenario(SCENARIO)
     assert len(loops(folder)) == 2
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from undertow.control.controllers.bandwidths import largest_forces
-from undertow.core import checks, kept_programs, program_key
+from undertow.core import checks, installation, kept_programs, program_key
 from undertow.core.errors import BadInput
 from undertow.core.kept_programs import kept_check, kept_program
 from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
@@ -66,7 +66,7 @@ def test_another_structure_is_another_program(folder):
 def test_other_code_and_settings_are_another_program(folder, monkeypatch, change):
     kept_program(matvec)(MATRIX, VECTOR)
     if change == "sources":
-        monkeypatch.setattr(program_key, "_installation", lambda: ("other sources",))
+        monkeypatch.setattr(program_key, "installation", lambda: ("other sources",))
     else:
         monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=false")
     kept_program(matvec)(MATRIX, VECTOR)
@@ -95,7 +95,7 @@ def test_damaged_entries_are_made_again(folder, monkeypatch, damage):
 def test_nothing_is_kept_beside_code_of_others(tmp_path, monkeypatch):
     """As here, where the tests are loaded: their modules may have changed anything."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
-    assert __name__ in program_key.foreign_modules()
+    assert __name__ in installation.foreign_modules()
     kept_program(matvec)(MATRIX, VECTOR)
     assert not entries(tmp_path / "native")
 
@@ -107,7 +107,7 @@ def test_a_command_has_no_code_of_others_until_a_scenario_names_some(tmp_path):
     code = [
         "import undertow.cli.simulate",
         "from undertow.core.catalogue import find",
-        "from undertow.core.program_key import foreign_modules",
+        "from undertow.core.installation import foreign_modules",
         "print(foreign_modules())",
         "find('controllers', 'mine.py:mine')",
         "print(len(foreign_modules()))",

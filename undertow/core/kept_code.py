@@ -1,4 +1,4 @@
-"""Machine code that is kept from one process to the next: by the batch compiler, where that is installed."""
+"""What is kept from one process to the next: by the batch compiler, where that is installed. Imports no JAX."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -6,16 +6,12 @@ from typing import TYPE_CHECKING
 from undertow.core.process_setup import cache_folder
 
 if TYPE_CHECKING:
-    from simdjit import PortableProgram, Unsupported, cached
+    from simdjit import cached
 else:
     try:
-        from simdjit import PortableProgram, Unsupported, cached
+        from simdjit import cached
     except ImportError:
-        PortableProgram = cached = None
-
-        class Unsupported(Exception):
-            """A program cannot be kept; the message says why."""
-
+        cached = None
 
 KEEPS = TYPE_CHECKING or cached is not None
 

@@ -12,16 +12,20 @@ part of one's own has: it may have changed what a program computes.
 import functools
 import pickle
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
 import numpy as np
 
 from undertow.core.arrays import as_array
-from undertow.core.kept_code import KEEPS, PortableProgram, Unsupported, kept_code
-from undertow.core.program_key import KeptKey, foreign_modules, kept_key, program_key
+from undertow.core.installation import foreign_modules
+from undertow.core.kept_code import KEEPS, kept_code
+from undertow.core.program_key import KeptKey, kept_key, program_key
 from undertow.core.structure_key import arrays_of, joined
+
+if TYPE_CHECKING or KEEPS:
+    from simdjit import PortableProgram, Unsupported
 
 
 def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -7,25 +7,15 @@ Nothing is kept for later processes by one that has loaded code of anybody else,
 with a part of one's own has: it may have changed what a program computes.
 """
 
-import functools
-import hashlib
-import importlib.metadata
-import importlib.util
 import os
-import site
-import sys
-import sysconfig
-from pathlib import Path
 from typing import Any
 
 import jax
 from jax.core import Tracer
 
-from undertow.core.process_setup import processor
+from undertow.core.installation import foreign_modules, installation
 from undertow.core.runtime import current_precision
 from undertow.core.structure_key import NoKey, structure_key
-
-_LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "scipy", "jaxtyping")
 
 # Two processes with the same one may use each other's programs.
 KeptKey = tuple[Any, ...]
@@ -61,45 +51,4 @@ def kept_key(key: str) -> KeptKey | None:
         for name, value in jax.config.values.items()  # pyright: ignore[reportAttributeAccessIssue]
         if "cache" not in name and "log" not in name
     }
-    return (key, *_installation(), os.environ.get("XLA_FLAGS", ""), sorted(settings.items(), key=repr))
-
-
-def foreign_modules() -> list[str]:
-    """Names of the loaded modules that are neither undertow's, nor Python's, nor of an installed package."""
-    return _foreign_among(tuple(sys.modules))
-
-
-@functools.lru_cache(1)
-def _foreign_among(names: tuple[str, ...]) -> list[str]:
-    return [name for name in names if _is_foreign(name)]
-
-
-def _is_foreign(name: str) -> bool:
-    file = getattr(sys.modules.get(name), "__file__", None)
-    if file is None:
-        return name == "__main__"  # of a terminal or a notebook; others are part of Python, or namespaces
-    return not str(file).startswith(_trusted_folders())
-
-
-@functools.cache
-def _trusted_folders() -> tuple[str, ...]:
-    """Where undertow, simdjit, Python, installed packages and the commands of packages are."""
-    package = Path(__file__).parents[1]
-    # Not the folder in which Python was installed: an environment may be made in the folder of a user's own code.
-    paths = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")]
-    folders = {str(package), str(package.parent / "simdjit" / "simdjit"), *paths, *site.getsitepackages()}
-    folders |= {site.getusersitepackages()}
-    return tuple(f"{folder}{os.sep}" for folder in folders if folder)
-
-
-@functools.cache
-def _installation() -> tuple[str, ...]:
-    """The sources of undertow and of its compiler, versions of Python and of libraries, and the kind of processor."""
-    sources = hashlib.sha256()
-    compiler = importlib.util.find_spec("simdjit")
-    for package in (Path(__file__).parents[1], *(compiler.submodule_search_locations or () if compiler else ())):
-        for path in sorted(Path(package).rglob("*.py")):
-            contents = path.read_bytes()
-            sources.update(f"{path.relative_to(package)} {len(contents)}\n".encode() + contents)
-    versions = [f"{library} {importlib.metadata.version(library)}" for library in _LIBRARIES]
-    return sources.hexdigest(), sys.version, *versions, processor()
+    return (key, *installation(), os.environ.get("XLA_FLAGS", ""), sorted(settings.items(), key=repr))

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, ClassVar, get_type_hints
 
+from undertow.cli.kept_answer import print_kept
 from undertow.core.errors import BadInput
 from undertow.core.option_groups import set_signature
 
@@ -40,6 +41,10 @@ class Command:
         """What the command does."""
         return (cls.__doc__ or "").partition("\n")[0]
 
+    def keeps_answer(self) -> bool:
+        """Whether what it prints depends on what is installed alone, so that it is kept for the next time."""
+        return False
+
     def target(self) -> str:
         """`module:function` of what was given: that of `runs`, unless a word chooses another one."""
         return self.runs
@@ -50,14 +55,19 @@ class Command:
 
         def run(**options: Any) -> int | None:
             command = cls(**options)
+            if command.keeps_answer():
+                return print_kept((cls.word(), options), lambda: imported(command))
+            return imported(command)
+
+        def imported(command: Command) -> int | None:
             module, _, function = command.target().partition(":")
             try:
-                imported = importlib.import_module(module)
+                home = importlib.import_module(module)
             except ModuleNotFoundError as error:
                 if error.name not in cls.needs:
                     raise
                 raise BadInput("", "", str(error)) from None
-            return getattr(imported, function)(command)
+            return getattr(home, function)(command)
 
         hints = get_type_hints(cls, include_extras=True)
         fields = [field for field in dataclasses.fields(cls) if field.init]

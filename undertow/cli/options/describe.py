@@ -1,6 +1,7 @@
 """Options of `undertow list` and `undertow describe`."""
 
 import dataclasses
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import typer
@@ -22,6 +23,9 @@ class ListCommand(Command):
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON instead of a table: with faults every target and mode.")
     ] = False
+
+    def keeps_answer(self) -> bool:
+        return True
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,3 +50,6 @@ class DescribeCommand(Command):
         bool,
         typer.Option("--json-schema", help="With NAME scenario or campaign: print the JSON schema that editors use."),
     ] = False
+
+    def keeps_answer(self) -> bool:
+        return self.name.isidentifier() and not Path(self.name).exists()
