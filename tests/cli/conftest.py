@@ -6,7 +6,7 @@ import typer
 
 from undertow.cli.main import run
 from undertow.report import run_page
-from undertow.report.figures import writing
+from undertow.report.figures import run_files, writing
 
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>'
 
@@ -40,6 +40,7 @@ def undertow(tmp_path, monkeypatch, capsys, request):
     if "whole_figures" not in request.fixturenames:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_files, "small_png", lambda figure: b"blank")
         monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     monkeypatch.delenv("UNDERTOW_TRACEBACK", raising=False)
 

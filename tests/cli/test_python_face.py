@@ -6,7 +6,7 @@ from good_scenario import SCENARIO
 from messages import named
 
 import undertow as ut
-from undertow.report.figures import writing
+from undertow.report.figures import run_files, writing
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
 
@@ -32,6 +32,7 @@ def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch)
     assert (tmp_path / "run.nc").is_file()
     monkeypatch.setattr(writing, "svg", lambda figure: "<svg/>")
     monkeypatch.setattr(writing, "png", lambda figure: b"")
+    monkeypatch.setattr(run_files, "small_png", lambda figure: b"")
     run.page(tmp_path / "run.html")
     page = (tmp_path / "run.html").read_text()
     assert all(part in page for part in ('class="replay"', 'id="metrics"', 'id="certificate"', 'id="figure-tracking"'))

@@ -23,7 +23,7 @@ import pytest
 
 from undertow.cli.main import run
 from undertow.report import run_page
-from undertow.report.figures import writing
+from undertow.report.figures import run_files, writing
 from undertow.scenario.reading import read
 from undertow.scenario.validation import validate
 from undertow.studies.campaign.prepare import prepare
@@ -134,6 +134,7 @@ def test_blocks_run(page, whole, tmp_path, monkeypatch, capsys):
     if not whole:
         monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
         monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+        monkeypatch.setattr(run_files, "small_png", lambda figure: b"blank")
         monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,7 @@ import pytest
 from undertow.cli.main import run
 from undertow.paper.all_outputs import with_all_outputs
 from undertow.report import run_page
-from undertow.report.figures import writing
+from undertow.report.figures import run_files, writing
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 
@@ -62,6 +62,7 @@ def test_long_scenario_is_built(name):
 def test_scenario(name, tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
     monkeypatch.setattr(writing, "png", lambda figure: b"blank")
+    monkeypatch.setattr(run_files, "small_png", lambda figure: b"blank")
     monkeypatch.setattr(run_page, "replay_of", lambda *_: None)
     assert run(["simulate", str(EXAMPLES / f"{name}.yaml"), "--out", str(tmp_path / "out"), "--no-prediction"]) == 0
     steady = with_all_outputs(json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"])

@@ -14,7 +14,6 @@ from undertow.analysis.metrics import meanings
 from undertow.control.navigation.perfect import perfect
 from undertow.physics.thrusters.first_order import first_order
 from undertow.report import run_page
-from undertow.report.figures.run_files import LARGE
 from undertow.report.plotted import Plotted
 from undertow.report.replay import replay_section, trials_again
 from undertow.report.replay.recomputed import thrust_along, thrust_limits
@@ -156,8 +155,11 @@ def test_several_runs_have_labels_and_colours_of_their_own(two_minutes):
     assert "<" not in page_data([two_minutes._replace(label="</script>")])
 
 
+_PICTURE = 100_000  # bytes of a figure with many panels
+
+
 def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_path):
-    pictures = {f"figure{number}": "x" * LARGE for number in range(6)}
+    pictures = {f"figure{number}": b"x" * _PICTURE for number in range(6)}
     write_run_page(
         tmp_path / "run.html", RunRecord(run, facts_from(run.attrs)), RunPageContents(pictures, two_minutes, [])
     )

@@ -9,7 +9,7 @@ from undertow.scenario.results.run_result import RunRecord
 
 
 def plot_run(record: RunRecord, width: str | None = None) -> Plotted:
-    """Figures of a run, each drawn once. A failed figure affects neither the others nor the results.
+    """Figures of a run, each plotted once. A failed figure affects neither the others nor the results.
 
     Args:
         record: of the run.
