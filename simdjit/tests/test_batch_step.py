@@ -1,5 +1,6 @@
 """A step of many runs whose memory is kept: the bits of `Step`, whatever the other runs are."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -67,3 +68,17 @@ def test_what_it_refuses():
         simdjit.BatchStep(lambda n, s, u: (s.astype(int), u), (), np.zeros(2), np.zeros(2), 3)
     with pytest.raises(simdjit.Unsupported, match=r"no rule for `fft`|complex"):
         simdjit.BatchStep(lambda n, s, u: (s, jnp.fft.fft(u).real), (), np.zeros(2), np.zeros(8), 3)
+
+
+def test_a_step_that_was_written_is_the_same_without_its_function(tmp_path):
+    step = simdjit.Step(function, NUMBERS, STATE, np.zeros(2), cache=tmp_path, portable=True)
+    again = simdjit.Step.read(step.written(), NUMBERS, STATE, np.zeros(2), cache=tmp_path)
+    for inputs in ([1.0, 0.0], [0.0, -2.0], [0.5, 0.5]):
+        for one in (step, again):
+            one.inputs[...] = inputs
+            one()
+        expected, found = jax.tree.leaves((step.state, step.outputs)), jax.tree.leaves((again.state, again.outputs))
+        assert len(expected) == len(found)
+        for value, other in zip(expected, found, strict=True):
+            np.testing.assert_array_equal(value, other)
+    assert jax.tree.structure(step.outputs) == jax.tree.structure(again.outputs)

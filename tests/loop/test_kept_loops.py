@@ -1,12 +1,15 @@
 """Loops that are kept: found by their structure without tracing, and never those of another one."""
 
 import copy
+import dataclasses
 
 import numpy as np
 import pytest
 
 from undertow.core import program_key
 from undertow.core.errors import BadInput
+from undertow.core.process_setup import KEEP_PROGRAMS
+from undertow.outside.autopilot.autopilot import Autopilot
 from undertow.physics.plants import double_integrator
 from undertow.run import Run, simulate, simulate_scenario
 from undertow.simulation.loop import simd_batch
@@ -25,7 +28,7 @@ SCENARIO = {
 def folder(tmp_path, monkeypatch):
     """A cache of its own, in a process that has used no loop, and without code of others, which the tests are."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
-    monkeypatch.setattr(program_key, "foreign_modules", list)
+    monkeypatch.setenv(KEEP_PROGRAMS, "1")
     monkeypatch.setattr(simd_batch, "_LOOPS", {})
     return tmp_path / "native"
 
@@ -96,7 +99,7 @@ def test_another_structure_is_another_loop(folder, monkeypatch, values):
     simulate_scenario(SCENARIO)
     found = position(simulate_scenario(data))
     assert len(loops(folder)) == 2
-    monkeypatch.setattr(program_key, "foreign_modules", lambda: ["others"])
+    monkeypatch.delenv(KEEP_PROGRAMS)
     monkeypatch.setattr(simd_batch, "_LOOPS", {})
     np.testing.assert_array_equal(position(simulate_scenario(data)), found)
 
@@ -125,7 +128,7 @@ def test_a_damaged_entry_is_made_again(folder, monkeypatch, damage):
 
 
 def test_beside_code_of_others_it_is_used_again_in_this_process_alone(folder, monkeypatch):
-    monkeypatch.setattr(program_key, "foreign_modules", lambda: ["others"])
+    monkeypatch.delenv(KEEP_PROGRAMS)
     simulate_scenario(SCENARIO)
     assert not loops(folder)
     untraced(monkeypatch)
@@ -161,3 +164,45 @@ def test_again_says_what_is_wrong():
     with pytest.raises(BadInput, match="run of a scenario"):
         of_objects.again(seed=1)
     assert isinstance(run.loop.plant, type(double_integrator()))
+
+
+def test_steps_of_an_autopilot_are_found_by_a_later_process(folder, monkeypatch):
+    """For other gains, without tracing."""
+
+    def outputs(data):
+        autopilot = Autopilot(data)
+        steps = [autopilot.start([0.0], [0.0], target=[1.0])]
+        return np.array([*steps, *(autopilot.step([0.1 * i], [0.3], target=[1.0]) for i in range(3))])
+
+    expected = outputs(OTHER_NUMBERS)
+    monkeypatch.delenv(KEEP_PROGRAMS)
+    np.testing.assert_array_equal(outputs(OTHER_NUMBERS), expected)
+    monkeypatch.setenv(KEEP_PROGRAMS, "1")
+    untraced(monkeypatch)
+    np.testing.assert_array_equal(outputs(OTHER_NUMBERS), expected)
+    assert (outputs(SCENARIO) != expected).any()
+
+
+def test_arrays_that_a_function_closes_over_count(folder):
+    """They are constants of its program."""
+
+    def doubled(factor):
+        return Doubled(np.asarray(factor)).of
+
+    for factor in (2.0, 3.0):
+        step = simd_batch.kept_step(doubled(factor), np.ones(2), (), np.array([1.0, 2.0]))
+        step()
+        np.testing.assert_array_equal(step.outputs, factor * np.array([1.0, 2.0]))
+
+
+@dataclasses.dataclass(frozen=True)
+class Doubled:
+    factor: np.ndarray
+
+    def of(self, numbers, state, inputs):
+        return (), self.factor * numbers * inputs
+
+
+# As code of undertow, which has a key.
+Doubled.__module__ = "undertow.run"
+Doubled.of.__module__ = "undertow.run"

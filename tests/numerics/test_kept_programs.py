@@ -13,6 +13,7 @@ from undertow.core import checks, installation, kept_programs, program_key
 from undertow.core.errors import BadInput
 from undertow.core.kept_programs import kept_check, kept_program
 from undertow.core.numerics.linear_algebra import matvec, printed_inverse, pseudo_inverse
+from undertow.core.process_setup import KEEP_PROGRAMS
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
 
@@ -23,8 +24,7 @@ MATRIX, VECTOR = jnp.asarray([[1.0, 2.0], [3.0, 5.0]]), jnp.asarray([0.3, -0.7])
 def folder(tmp_path, monkeypatch):
     """A cache of its own, in a process without code of others, which the tests themselves are."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
-    for module in (kept_programs, program_key):
-        monkeypatch.setattr(module, "foreign_modules", list)
+    monkeypatch.setenv(KEEP_PROGRAMS, "1")
     return tmp_path / "native"
 
 

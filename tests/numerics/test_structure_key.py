@@ -11,7 +11,7 @@ import pytest
 from jax.flatten_util import ravel_pytree
 
 from undertow.core.contracts import Measurement, Target
-from undertow.core.structure_key import NoKey, arrays_of, joined, structure_key
+from undertow.core.structure_key import Constant, NoKey, arrays_of, joined, structure_key
 from undertow.physics.plants import double_integrator
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2_heavy, odin
@@ -110,3 +110,13 @@ def test_arrays_are_taken_out_and_put_back():
     vehicle, word, number = joined([array + 1 for array in arrays], rest)
     assert (word, number) == ("word", 2.5)
     np.testing.assert_array_equal(vehicle.mass, VEHICLE.mass + 1)
+
+
+def test_arrays_of_functions_count_where_they_are_constants():
+    """Of a module's method they are arguments, as it is a tree; of a function they are constants of a program."""
+    heavier = dataclasses.replace(VEHICLE, mass=VEHICLE.mass + 1)
+    assert structure_key(VEHICLE.body) == structure_key(heavier.body)
+    assert structure_key(Constant(VEHICLE.body)) != structure_key(Constant(heavier.body))
+    assert structure_key(Constant(VEHICLE.body)) == structure_key(Constant(bluerov2_heavy().body))
+    flat, other = (ravel_pytree({"mass": vehicle.mass, "r_g": vehicle.r_g})[1] for vehicle in (VEHICLE, heavier))
+    assert structure_key(flat) == structure_key(other)

@@ -10,9 +10,17 @@ import sys
 import sysconfig
 from pathlib import Path
 
-from undertow.core.process_setup import processor
+from undertow.core.process_setup import KEEP_PROGRAMS, processor
 
 _LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "diffrax", "scipy", "jaxtyping")
+
+
+def may_keep() -> bool:
+    """Whether compiled programs may be kept for later processes.
+
+    Not beside code of others, which may have changed what a program computes, unless it has said that it does not.
+    """
+    return os.environ.get(KEEP_PROGRAMS) == "1" or not foreign_modules()
 
 
 def foreign_modules() -> list[str]:

@@ -19,10 +19,10 @@ import jax
 import numpy as np
 
 from undertow.core.arrays import as_array
-from undertow.core.installation import foreign_modules
+from undertow.core.installation import may_keep
 from undertow.core.kept_code import KEEPS, kept_code
 from undertow.core.program_key import KeptKey, kept_key, program_key
-from undertow.core.structure_key import arrays_of, joined
+from undertow.core.structure_key import Constant, arrays_of, joined
 
 if TYPE_CHECKING or KEEPS:
     from simdjit import PortableProgram, Unsupported
@@ -43,7 +43,7 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
         # In a key the numbers of arrays of NumPy count, and no other run would find the program.
         if any(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves(arguments)):
             arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
-        key = program_key(function, arguments) if KEEPS and not foreign_modules() else None
+        key = program_key(Constant(function), arguments) if KEEPS and may_keep() else None
         if key is None:
             return compiled(*arguments)
         if key not in programs:

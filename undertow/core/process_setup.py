@@ -35,13 +35,25 @@ _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _YOUNG, _MIDDLE, _OLD = 1_000_000, 20, 100
 
 
-def prepare() -> None:
+# Set for this process and those that it starts where its code changes nothing of undertow.
+KEEP_PROGRAMS = "UNDERTOW_KEEP_PROGRAMS"
+
+
+def prepare(keep_programs: bool = False) -> None:
     """Set this process up as the commands do: double precision, quick compilation, compiled code that is kept.
 
     It sets the environment variables of JAX, XLA and OpenBLAS, and looks for garbage seldom. Call it at the top of a
     script, before anything else imports JAX or SciPy: later, only the precision changes. Whoever calls this decides
     about the whole process, so nothing calls it at import. A caller's own settings stay.
+
+    Args:
+        keep_programs: whether compiled programs are kept and found by this process although it has code of its own, a
+            script or a notebook: it then starts as quickly as a command. For code that changes nothing inside of
+            undertow or JAX: a function of theirs that it replaces could stay what it was. Parts of one's own are
+            compiled anew in any case.
     """
+    if keep_programs:
+        os.environ[KEEP_PROGRAMS] = "1"
     # Or XLA says on the terminal that compiling is slow, and asks for a bug report.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     stated = "JAX_ENABLE_X64" in os.environ

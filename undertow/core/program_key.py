@@ -4,7 +4,7 @@ Its key is the structure of its arguments (`structure_key`), and with it the sou
 libraries, the settings of JAX and the kind of processor.
 
 Nothing is kept for later processes by one that has loaded code of anybody else, as a script, a notebook or a scenario
-with a part of one's own has: it may have changed what a program computes.
+with a part of one's own has, unless that says that it changes nothing of undertow (`prepare`).
 """
 
 import os
@@ -13,7 +13,7 @@ from typing import Any
 import jax
 from jax.core import Tracer
 
-from undertow.core.installation import foreign_modules, installation
+from undertow.core.installation import installation, may_keep
 from undertow.core.runtime import current_precision
 from undertow.core.structure_key import NoKey, structure_key
 
@@ -44,7 +44,7 @@ def kept_key(key: str) -> KeptKey | None:
 
     None beside code of others.
     """
-    if foreign_modules():
+    if not may_keep():
         return None
     settings = {
         name: value

@@ -12,7 +12,7 @@ import sys
 import types
 import weakref
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -35,6 +35,12 @@ def _keep(module: eqx.Module, static: bool, description: str) -> None:
 
 class NoKey(Exception):
     """A value about which nobody can say whether it equals another one."""
+
+
+class Constant(NamedTuple):
+    """A value of which the numbers of arrays count, because they are constants of the program."""
+
+    value: Any
 
 
 def structure_key(*values: Any) -> str:
@@ -112,6 +118,8 @@ class _Description:
             self._reference(value)
         elif isinstance(value, functools.partial):
             self._entries("partial", (value.func, value.args, dict(value.keywords)), static)
+        elif isinstance(value, Constant):
+            self._entries("constant", tuple(value), static=True)
         elif isinstance(value, tuple | list):
             self._reference(type(value))
             self._entries("entries", tuple(value), static)
@@ -122,12 +130,12 @@ class _Description:
             self._entries("set", tuple(sorted(value, key=repr)), static)
         elif dataclasses.is_dataclass(value):
             self._dataclass(value, static)
-        elif isinstance(value, types.MethodType):
-            self._entries("method", (value.__func__, value.__self__), static)
+        elif isinstance(value, types.MethodType):  # no tree: what it is bound to becomes a constant of a program
+            self._entries("method", (value.__func__, value.__self__), static=True)
         elif isinstance(value, types.FunctionType):
-            self._function(value, static)
+            self._function(value)
         elif type(value).__name__ == "HashablePartial":  # what `ravel_pytree` gives; it has no public name
-            self._entries("partial", (value.f, value.args, value.kwargs), static)
+            self._entries("partial", (value.f, value.args, value.kwargs), static=True)
         elif isinstance(value, np.dtype):
             self._text("dtype", str(value))
         elif isinstance(value, jax.tree_util.PyTreeDef):
@@ -147,15 +155,16 @@ class _Description:
             if hasattr(value, name):
                 self.add(getattr(value, name), static or always_static)
 
-    def _function(self, function: types.FunctionType, static: bool) -> None:
+    def _function(self, function: types.FunctionType) -> None:
+        """Arrays that a function closes over are constants of a program that calls it."""
         self._text("function", f"{_known(function)}.{function.__qualname__}")
         self._code(function.__code__)
         try:
             cells = tuple(cell.cell_contents for cell in function.__closure__ or ())
         except ValueError:
             raise NoKey(f"{function.__qualname__} closes over what is not there yet") from None
-        self._entries("closure", cells, static)
-        self._entries("defaults", (function.__defaults__, function.__kwdefaults__), static)
+        self._entries("closure", cells, static=True)
+        self._entries("defaults", (function.__defaults__, function.__kwdefaults__), static=True)
 
     def _code(self, code: types.CodeType) -> None:
         """Instructions and constants: two functions may have the same name and line."""

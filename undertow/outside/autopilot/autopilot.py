@@ -148,16 +148,14 @@ class Autopilot(Uncopied):
 
     def _compile(self, functions: Functions) -> None:
         self._form, zero = functions.form, jnp.zeros(len(self._loop.plant.outputs))
+        steps = functions.steps
         self._begin = compile_step(
-            lambda law, _, received: ((), functions.first(law, received)), functions.controller, (), functions.given
+            lambda law, _, received: ((), steps.first(law, received)), functions.controller, (), functions.given
         )
         memory = self._begin.outputs[0]
         inputs = (functions.given, functions.applied, functions.time + self.sampling_time)
         self._go_on = compile_step(
-            lambda law, memory, received: functions.following(law, memory, *received),
-            functions.controller,
-            memory,
-            inputs,
+            lambda law, memory, received: steps.following(law, memory, *received), functions.controller, memory, inputs
         )
         self._convert = compile_step(lambda output, _, u: ((), output.of(u)), functions.output, (), functions.applied)
         self._at = compile_step(

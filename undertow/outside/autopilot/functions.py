@@ -1,5 +1,6 @@
 """The functions of a controller that is stepped: its first step, the following ones, its output, the reference."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax
@@ -30,36 +31,11 @@ class StepInputs(NamedTuple):
     health: Any = None
 
 
-class Functions:
-    """Functions of parts and arrays that JAX can trace, and examples of their arguments in the present precision.
+@dataclasses.dataclass(frozen=True)
+class ControllerSteps:
+    """Steps of a controller that gets measured motions in a format; None for a plant that is no vehicle."""
 
-    Args:
-        loop: with the controller.
-        form: of measured motions; for a plant that is no vehicle it does not matter.
-        output: conversion of the command.
-
-    Attributes:
-        form: None for a plant that is no vehicle.
-        given, applied, time: examples.
-    """
-
-    def __init__(self, loop: ClosedLoop, form: Format, output: Output):
-        self.controller = loop.controller
-        self.output = output
-        self.reference = loop.reference
-        truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
-        self.form = None if truth.body is None else form
-        kind = jax.dtypes.canonicalize_dtype(float)
-        number = lambda shape: np.zeros(shape, dtype=kind)
-        zero: Any = number(len(loop.plant.outputs))
-        motion = MeasuredMotion(zero, number(0), zero)
-        if self.form is not None:
-            names = form.columns()
-            upright = np.array([float(name == "w") for name in names.attitude], dtype=kind)
-            motion = MeasuredMotion(number(3), upright, number(len(names.velocity)))
-        actuator = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), truth.actuator)
-        self.given = StepInputs(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
-        self.applied, self.time = number(loop.plant.inputs()), number(())
+    form: Format | None
 
     def first(self, law: AbstractController, inputs: StepInputs) -> tuple[ControllerMemory, Answer]:
         """The step with which control begins."""
@@ -72,6 +48,40 @@ class Functions:
     def _measured(self, law: AbstractController, inputs: StepInputs):
         measured = inputs.motion.measurement(law.model.coordinates, self.form, inputs.actuator)
         return measured._replace(health=inputs.health)
+
+
+class Functions:
+    """Functions of parts and arrays that JAX can trace, and examples of their arguments in the present precision.
+
+    Args:
+        loop: with the controller.
+        form: of measured motions; for a plant that is no vehicle it does not matter.
+        output: conversion of the command.
+
+    Attributes:
+        form: None for a plant that is no vehicle.
+        steps: of the controller.
+        given, applied, time: examples.
+    """
+
+    def __init__(self, loop: ClosedLoop, form: Format, output: Output):
+        self.controller = loop.controller
+        self.output = output
+        self.reference = loop.reference
+        truth = loop.plant.output(jnp.zeros(()), loop.plant.initial_state())
+        self.form = None if truth.body is None else form
+        self.steps = ControllerSteps(self.form)
+        kind = jax.dtypes.canonicalize_dtype(float)
+        number = lambda shape: np.zeros(shape, dtype=kind)
+        zero: Any = number(len(loop.plant.outputs))
+        motion = MeasuredMotion(zero, number(0), zero)
+        if self.form is not None:
+            names = form.columns()
+            upright = np.array([float(name == "w") for name in names.attitude], dtype=kind)
+            motion = MeasuredMotion(number(3), upright, number(len(names.velocity)))
+        actuator = jax.tree.map(lambda leaf: np.asarray(leaf, dtype=kind), truth.actuator)
+        self.given = StepInputs(motion, actuator, Target(zero, zero, zero), _healthy(loop, truth))
+        self.applied, self.time = number(loop.plant.inputs()), number(())
 
 
 def _healthy(loop: ClosedLoop, truth: Measurement) -> Any:

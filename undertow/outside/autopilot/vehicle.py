@@ -1,6 +1,7 @@
 """The vehicle of a scenario, stepped by another program."""
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -85,6 +86,51 @@ class _Shown(NamedTuple):
     specific_force: Any
 
 
+@dataclasses.dataclass(frozen=True)
+class _VehicleSteps:
+    """Steps of the vehicle of a closed loop.
+
+    Attributes:
+        form: of the motions that it shows; None for a plant that is no vehicle.
+        integrate: one of `METHODS`.
+        substeps: of each step.
+    """
+
+    form: Format | None
+    integrate: Callable
+    substeps: int
+
+    def first(self, part: Realization, start: Any) -> tuple[PlantState, _Shown]:
+        state, observation = plant_step.begin(part, start)
+        return state, self._shown(observation, observation.truth, jnp.zeros(()))
+
+    def following(self, realization_and_esc: tuple[Realization, ESC | None], state: PlantState, step_inputs: _Given):
+        realization, speed_controllers = realization_and_esc
+        plant = realization.loop.plant
+        t = step_inputs.t
+        if speed_controllers is None:
+            applied = plant.admissible(state.plant, step_inputs.command)
+        else:
+            assert isinstance(plant, HybridVehicle)
+            applied = applied_voltage(plant, speed_controllers, state.plant, step_inputs.command)
+        new = plant_step.hold(realization, state, t, step_inputs.dt, applied, self.integrate, self.substeps)
+        status = status_of(realization.loop, new.plant, ())
+        going_on = jnp.stack([status == int(good) for good in _GOING_ON]).any()
+        # The last valid state is kept.
+        new = new._replace(plant=jax.tree.map(lambda n, o: jnp.where(going_on, n, o), new.plant, state.plant))
+        new, observation = plant_step.observe(realization, new, step_inputs.end, applied)
+        before = plant.output(t, state.plant)
+        return new, self._shown(observation._replace(status=status), before, step_inputs.dt)
+
+    def _shown(self, observation: PlantObservation, before: Measurement, dt: Any) -> _Shown:
+        truth = observation.truth
+        force = ()
+        if self.form is not None:
+            force = motion_of(truth, before.velocity[:3], dt).specific_force
+        measured, true = (motion_in(self.form, motion) for motion in (observation.measurement, truth))
+        return _Shown(observation, measured, true, force)
+
+
 class Vehicle(Uncopied):
     """The vehicle of a scenario, or another plant, with its navigation, disturbances and faults. It is stepped by
     whoever owns the clock; commands go in, measurements come out::
@@ -156,56 +202,26 @@ class Vehicle(Uncopied):
             self.unit = "us"
         self.thrusters = self.plant.inputs()
         self.precision = built.scenario.precision
-        self._integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
-        self._substeps = settings.substeps
         with runtime.on_processor(), runtime.in_precision(self.precision):
             initial = built.scenario.initial
             self._start = self._loop.outputs_at_start(initial.position, initial.velocity)
             truth = self.plant.output(jnp.zeros(()), self.plant.initial_state())
             self._form = None if truth.body is None else form
-            self._compile(key_of_seed(built.scenario.seed if seed is None else seed))
+            integrate = COMPACT_METHODS.get(settings.method, COMPACT_METHODS["rk4"])
+            steps = _VehicleSteps(self._form, integrate, settings.substeps)
+            self._compile(steps, key_of_seed(built.scenario.seed if seed is None else seed))
         self._restart()
 
-    def _compile(self, key: Any) -> None:
+    def _compile(self, steps: _VehicleSteps, key: Any) -> None:
         realization = self._realization = realized(self._loop, key)
-        self._begin = compile_step(lambda part, _, start: ((), self._first(part, start)), realization, (), self._start)
+        self._begin = compile_step(lambda part, _, start: ((), steps.first(part, start)), realization, (), self._start)
         self._begin()
-        types, _ = eqx.filter_eval_shape(self._first, realization, self._start)
+        types, _ = eqx.filter_eval_shape(steps.first, realization, self._start)
         state = jax.tree.map(lambda value, like: jnp.asarray(value, like.dtype), self._begin.outputs[0], types)
         zero = np.zeros((), dtype=jax.dtypes.canonicalize_dtype(float))
         step_inputs = _Given(zero, zero, zero, np.zeros(self.thrusters, dtype=zero.dtype))
-        self._go_on = compile_step(self._next, (realization, self.esc), state, step_inputs)
+        self._go_on = compile_step(steps.following, (realization, self.esc), state, step_inputs)
         self.backend = self._go_on.backend
-
-    def _first(self, part: Realization, start: Any) -> tuple[PlantState, _Shown]:
-        state, observation = plant_step.begin(part, start)
-        return state, self._shown(observation, observation.truth, jnp.zeros(()))
-
-    def _next(self, realization_and_esc: tuple[Realization, ESC | None], state: PlantState, step_inputs: _Given):
-        realization, speed_controllers = realization_and_esc
-        plant = realization.loop.plant
-        t = step_inputs.t
-        if speed_controllers is None:
-            applied = plant.admissible(state.plant, step_inputs.command)
-        else:
-            assert isinstance(plant, HybridVehicle)
-            applied = applied_voltage(plant, speed_controllers, state.plant, step_inputs.command)
-        new = plant_step.hold(realization, state, t, step_inputs.dt, applied, self._integrate, self._substeps)
-        status = status_of(realization.loop, new.plant, ())
-        going_on = jnp.stack([status == int(good) for good in _GOING_ON]).any()
-        # The last valid state is kept.
-        new = new._replace(plant=jax.tree.map(lambda n, o: jnp.where(going_on, n, o), new.plant, state.plant))
-        new, observation = plant_step.observe(realization, new, step_inputs.end, applied)
-        before = plant.output(t, state.plant)
-        return new, self._shown(observation._replace(status=status), before, step_inputs.dt)
-
-    def _shown(self, observation: PlantObservation, before: Measurement, dt: Any) -> _Shown:
-        truth = observation.truth
-        force = ()
-        if self._form is not None:
-            force = motion_of(truth, before.velocity[:3], dt).specific_force
-        measured, true = (motion_in(self._form, motion) for motion in (observation.measurement, truth))
-        return _Shown(observation, measured, true, force)
 
     def restart(self, seed: int | None = None) -> VehicleOutput:
         """Go back to time zero and the start that the scenario states; everything random is that of the seed.

@@ -107,13 +107,14 @@ def controller_program(built: Built, name: str, functions: Functions) -> CProgra
 
 def _system(built: Built, name: str, functions: Functions) -> System:
     period, unit = built.scenario.loop.dt, built.closed_loop.plant.input_unit
+    steps = functions.steps
     inputs = ControllerInput(*functions.given, functions.applied, np.asarray(period, dtype=functions.time.dtype))
 
     def answered(memory, answer):
         return memory, ControllerOutput(answer.command, functions.output.of(answer.command))
 
     def start(inputs: ControllerInput):
-        return answered(*functions.first(functions.controller, StepInputs(*inputs[:4])))
+        return answered(*steps.first(functions.controller, StepInputs(*inputs[:4])))
 
     def step(memory, inputs: ControllerInput):
         """As `Autopilot` does: no further than a missed step; a time that is none leaves the state as it was.
@@ -122,13 +123,13 @@ def _system(built: Built, name: str, functions: Functions) -> System:
         """
         if functions.controller.takes_raw_readings:
             return answered(
-                *functions.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, inputs.dt)
+                *steps.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, inputs.dt)
             )
         usual = jnp.asarray(period, dtype=inputs.dt.dtype)
         is_valid = (inputs.dt > 0) & (inputs.dt < jnp.inf)
         elapsed = jnp.where(is_valid, jnp.minimum(inputs.dt, MISSED * usual), usual)
         after, answer = answered(
-            *functions.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, elapsed)
+            *steps.following(functions.controller, memory, StepInputs(*inputs[:4]), inputs.applied, elapsed)
         )
         return jax.tree.map(lambda new, old: jnp.where(is_valid, new, old), after, memory), answer
 

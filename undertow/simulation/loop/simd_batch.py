@@ -11,7 +11,7 @@ by XLA: `run_scenario` falls back for a run, `batch_runner` for many.
 import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import equinox as eqx
 import jax
@@ -24,6 +24,7 @@ from undertow.core.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.core.process_setup import cache_folder
 from undertow.core.program_key import kept_key, program_key
 from undertow.core.status import Status
+from undertow.core.structure_key import Constant
 from undertow.simulation.loop import continuous, sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
@@ -77,7 +78,7 @@ _MOST_LOOPS = 64
 
 
 def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
-    """The loop of a structure, without tracing where an earlier process has made it.
+    """The loop of a structure, without tracing where this process or an earlier one has made it.
 
     Args:
         structure: all that its code depends on.
@@ -89,19 +90,32 @@ def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"
     with _LOOPS_LOCK:
         if key in _LOOPS:
             return _LOOPS[key]
-    loop = _stored_loop(key, make)
+    loop = _stored(key, make, lambda written: simdjit.Loop.read(written, cache_folder() / "native"))
     with _LOOPS_LOCK:
         if len(_LOOPS) >= _MOST_LOOPS:
             _LOOPS.pop(next(iter(_LOOPS)))
         return _LOOPS.setdefault(key, loop)
 
 
-def _stored_loop(key: str, make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
-    """A loop that this process has not used: of an earlier one, or made."""
+class _Writable(Protocol):
+    def written(self) -> bytes: ...
+
+
+Compiled = TypeVar("Compiled", bound=_Writable)
+
+
+def _stored(key: str, make: Callable[[bool], Compiled], read: Callable[[bytes], Compiled]) -> Compiled:
+    """What `make` compiles, or what `read` makes of what an earlier process has written.
+
+    Args:
+        key: of this process.
+        make: compiles it; whether it is to be written.
+        read: from what was written.
+    """
     kept = kept_key(key)
     if kept is None:
         return make(False)
-    made: list[simdjit.Loop] = []
+    made: list[Compiled] = []
 
     def written() -> bytes:
         made.append(make(True))
@@ -114,7 +128,7 @@ def _stored_loop(key: str, make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.L
     if made:
         return made[0]
     try:
-        return simdjit.Loop.read(contents, cache_folder() / "native")
+        return read(contents)
     except Exception:  # of one that cannot be written there is nothing; and whatever is said of code that does not fit
         return make(False)
 
@@ -135,7 +149,13 @@ def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     """
     if unavailable():
         raise Unsupported(unavailable())
-    return simdjit.Step(function, numbers, state, inputs, cache_folder() / "native")
+    example, cache = (numbers, state, inputs), cache_folder() / "native"
+    shapes = [(np.shape(leaf), str(np.asarray(leaf).dtype)) for leaf in jax.tree.leaves(example)]
+    key = program_key("step", Constant(function), jax.tree.structure(example), shapes)
+    make = lambda portable: simdjit.Step(function, *example, cache, portable)
+    if key is None:
+        return make(False)
+    return _stored(key, make, lambda written: simdjit.Step.read(written, *example, cache))
 
 
 def kept_steps(
@@ -241,9 +261,8 @@ class SimdBatchRunner:
         def make(portable: bool) -> simdjit.Loop:
             return simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED, portable)
 
-        # Constants count with their numbers, which arrays of NumPy do in a key.
         leaves = zip(jax.tree.leaves(numbers), constant, strict=True)
-        constants = [np.asarray(leaf) if same else None for leaf, same in leaves]
+        constants = Constant([leaf if same else None for leaf, same in leaves])
         structure = ("runs", run, plan._replace(steps=0), constants, width, compact)
         self._program = make(False) if driver else _kept_loop(structure, make)
 
