@@ -49,11 +49,12 @@ def simulate(command: SimulateCommand) -> int:
             check_rerun(rerun, folder, command.overwrite)
         result = _run(scenario, console, command.allow_code)
         plotting.plot(result, command.pdf)
+        _print_tables(result, console)
         write(result, draft.path)
         repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
         draft.publish()  # the results first: prediction, figures and page take longer, and may fail
         predicting = None if command.prediction is False else thread.submit(predict, result)
-        _print_results(result, folder, console)
+        _print_ending(result, folder, console)
         code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
         replay = write_outputs(result, plotting, predicting, bool(command.prediction), draft, folder, console)
     if rerun is not None:
@@ -72,8 +73,8 @@ def _run(path: Path, console: Console, allow_code: bool) -> ScenarioResult:
         return interruptible(lambda: run_scenario(built))
 
 
-def _print_results(result: ScenarioResult, folder: Path, console: Console) -> None:
-    """Print metrics, certificate and how the run ended."""
+def _print_tables(result: ScenarioResult, console: Console) -> None:
+    """Print metrics and certificate, which nobody waits for until files are written."""
     facts, window = result.facts, result.facts.window
     if facts.left_to_xla:
         why = facts.left_to_xla
@@ -83,6 +84,11 @@ def _print_results(result: ScenarioResult, folder: Path, console: Console) -> No
         console.print(terminal_table(certificate_rows(facts.certificate, window)))
     if facts.transitions is not None:
         console.print(terminal_table(transition_rows(facts.transitions, lost_thrusters(result.series))))
+
+
+def _print_ending(result: ScenarioResult, folder: Path, console: Console) -> None:
+    """Print how the run ended, and where its results are."""
+    facts = result.facts
     for finding in (facts.navigation or {"findings": ()})["findings"]:
         typer.echo(f"Advice: {finding}.", err=True)
     verdict = f"; {facts.success.sentence(facts.meanings)}" if facts.success else ""

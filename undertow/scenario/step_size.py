@@ -9,6 +9,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from undertow.core.errors import Advice, advice
+from undertow.core.kept_programs import kept_program
 from undertow.core.status import Status
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.thrusters.thruster import AbstractThruster
@@ -58,11 +59,14 @@ def _remedy(loop: ClosedLoopSettings, longest: float) -> str:
 
 def fastest_decay(thruster: AbstractThruster) -> float:
     """Fastest decay of a thruster at rest, 1/s; 0 for one without a state."""
+    slopes = np.asarray(_slopes_at_rest(thruster))
+    return float(np.abs(np.linalg.eigvals(slopes)).max(initial=0.0))
+
+
+@kept_program
+def _slopes_at_rest(thruster: AbstractThruster):
     state, tree = ravel_pytree(thruster.initial_state(1))
-    if not state.size:
-        return 0.0
-    rates = lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0]
-    return float(np.abs(np.linalg.eigvals(np.asarray(jax.jit(jax.jacfwd(rates))(state)))).max())
+    return jax.jacfwd(lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0])(state)
 
 
 def step_failure(closed_loop: ClosedLoop, loop: ClosedLoopSettings, outcome: Outcome) -> str:

@@ -11,7 +11,7 @@ by XLA: `run_scenario` falls back for a run, `batch_runner` for many.
 import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -97,14 +97,7 @@ def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"
         return _LOOPS.setdefault(key, loop)
 
 
-class _Writable(Protocol):
-    def written(self) -> bytes: ...
-
-
-Compiled = TypeVar("Compiled", bound=_Writable)
-
-
-def _stored(key: str, make: Callable[[bool], Compiled], read: Callable[[bytes], Compiled]) -> Compiled:
+def _stored(key: str, make: Callable[[bool], Any], read: Callable[[bytes], Any]) -> Any:
     """What `make` compiles, or what `read` makes of what an earlier process has written.
 
     Args:
@@ -115,7 +108,7 @@ def _stored(key: str, make: Callable[[bool], Compiled], read: Callable[[bytes], 
     kept = kept_key(key)
     if kept is None:
         return make(False)
-    made: list[Compiled] = []
+    made: list[Any] = []
 
     def written() -> bytes:
         made.append(make(True))
