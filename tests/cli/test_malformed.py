@@ -13,7 +13,8 @@ import pytest
 
 from undertow.cli import campaign
 from undertow.core.status import Status
-from undertow.report import plotting
+from undertow.report import figures
+from undertow.report.plotted import Plotted
 
 pytestmark = pytest.mark.full
 
@@ -26,7 +27,7 @@ FAILED = [status.word for status in Status if status is not Status.OK]
 @pytest.fixture
 def undrawn(monkeypatch, tmp_path):
     """Drawing takes most of the time of a short run, and has tests of its own. Files that examples name are there."""
-    monkeypatch.setattr(plotting, "_plot", lambda run, width: plotting.Plotted({}, {}, []))
+    monkeypatch.setattr(figures, "plot_run", lambda run, width: Plotted({}, {}, []))
     monkeypatch.setattr(campaign, "write_campaign", lambda title, results, found, folder, pdf, replays: (folder, []))
     for name in ("d.csv", "my_rov.yaml"):
         shutil.copy(malformed.EXAMPLES / name, tmp_path / name)

@@ -225,7 +225,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
         "run.nc",
         "scenario.yaml",
     ]
-    assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["error.png", "error.svg"]
+    assert sorted(path.name for path in (tmp_path / "out" / "figures").iterdir()) == ["error.png"]
 
 
 @pytest.mark.full
