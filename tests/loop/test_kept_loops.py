@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 
+import jax
 import numpy as np
 import pytest
 
@@ -206,3 +207,13 @@ class Doubled:
 # As code of undertow, which has a key.
 Doubled.__module__ = "undertow.run"
 Doubled.of.__module__ = "undertow.run"
+
+
+def test_another_generator_of_random_numbers_is_another_loop(folder):
+    """Also in the same process."""
+    partitionable = jax.config.jax_threefry_partitionable
+    keys = []
+    for setting in (partitionable, not partitionable, partitionable):
+        with jax.threefry_partitionable(setting):
+            keys.append(program_key.program_key("random"))
+    assert keys[0] == keys[2] != keys[1]

@@ -33,8 +33,9 @@ def program_key(*values: Any) -> str | None:
     platform = jax.default_backend() if device is None else getattr(device, "platform", "")
     if platform != "cpu":
         return None
+    random_numbers = bool(jax.config.jax_threefry_partitionable)  # pyright: ignore[reportAttributeAccessIssue]
     try:
-        return structure_key(*values, current_precision())
+        return structure_key(*values, current_precision(), random_numbers)
     except NoKey:
         return None
 
