@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 else:
     try:
         import simdjit
-        import simdjit.loop  # and with it LLVM, which may be missing
         from simdjit import Unsupported
+
+        simdjit.Loop  # noqa: B018 - loads LLVM, which may be missing
     except ImportError as error:
         simdjit = None
         _REASON = (
