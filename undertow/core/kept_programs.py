@@ -12,7 +12,7 @@ part of one's own has: it may have changed what a program computes.
 import functools
 import pickle
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -26,6 +26,8 @@ from undertow.core.structure_key import Constant, arrays_of, joined
 
 if TYPE_CHECKING or KEEPS:
     from simdjit import PortableProgram, Unsupported
+
+Result = TypeVar("Result")
 
 
 def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -73,6 +75,21 @@ def kept_check(check: Callable[[], None], subject: Any) -> None:
         check()
     else:
         kept_code(kept, passed)
+
+
+def kept_result(name: str, subject: Any, compute: Callable[[], Result]) -> Result:
+    """What `compute` gives for a tree of parts with these numbers, or gave in an earlier process.
+
+    Args:
+        name: of what is computed.
+        subject: all that it depends on.
+        compute: its result can be pickled.
+    """
+    key = program_key(name, Constant(subject))
+    kept = None if key is None else kept_key(key)
+    if kept is None:
+        return compute()
+    return pickle.loads(kept_code(kept, lambda: pickle.dumps(compute())))
 
 
 class _Program:

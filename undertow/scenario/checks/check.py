@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean, nearest
+from undertow.core.kept_programs import kept_result
 from undertow.core.runtime import double_outside_runs
 from undertow.core.user_code import place_of
 from undertow.physics.plants.double_integrator import double_integrator
@@ -149,13 +150,13 @@ def _of_scenario(text: Text) -> list[Report]:
         reports.append(_of_thruster(thruster, "thruster", lambda key: _place(thruster, key) or in_scenario))
     if any(report.errors for report in reports):
         return reports  # their errors would cause others in what contains them
-    reports.append(_report(check_contract(loop.plant), partial(_place, loop.plant)))
+    findings = kept_result("contract", loop.plant, lambda: check_contract(loop.plant))
+    reports.append(_report(findings, partial(_place, loop.plant)))
     if not reports[-1].errors:
         around = of_plant(loop.plant)
-        reports += [
-            _report(check_contract(part, around), partial(_place, part))
-            for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller)
-        ]
+        for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller):
+            findings = kept_result("contract", (part, around), partial(check_contract, part, around))
+            reports.append(_report(findings, partial(_place, part)))
     return reports
 
 
