@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import numpy as np
 
 from simdjit.cuda import Driver
 from simdjit.loop import Loop
@@ -30,17 +29,7 @@ def compile(
         Unsupported: the function needs something that the compiler has no rule for.
         OSError: the GPU's driver fails.
     """
-    nothing = np.zeros(())
-    loop = Loop(
-        lambda arguments: arguments,
-        lambda arguments: nothing,
-        lambda arguments, carry, step: carry,
-        lambda arguments, carry, step: function(*arguments),
-        example,
-        lanes=lanes,
-        driver=driver,
-        cache=cache,
-    )
+    loop = Loop.recording(function, example, lanes=lanes, driver=driver, cache=cache)
 
     def run(*arguments: Any) -> Any:
         _, recorded = loop.run(arguments, steps=0, every=1)

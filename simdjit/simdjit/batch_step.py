@@ -40,11 +40,10 @@ class BatchStep:
         constant: Sequence[bool] | None = None,
         cache: Path | None = None,
     ):
-        example, nothing = (numbers, state, inputs), np.zeros(())
+        example = (numbers, state, inputs)
         sizes = [len(jax.tree.leaves(part)) for part in example]
         same = [*(constant or [False] * sizes[0]), *[False] * (sizes[1] + sizes[2])]
-        record = lambda arguments, carry, k: function(*arguments)
-        loop = Loop(lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record, example, same, cache=cache)
+        loop = Loop.recording(function, example, same, cache=cache)
         after, outputs = jax.eval_shape(function, *example)
         if not same_types(state, after):
             raise Unsupported("a state that changes its type")

@@ -91,6 +91,32 @@ class Loop:
         forms = stepped.form, recorded.form
         self._load(_Parts(program, lanes, prologue.of_runs(), read, carry, series, *forms), driver, cache)
 
+    @classmethod
+    def recording(
+        cls,
+        function: Callable,
+        example: tuple[Any, ...],
+        constant: Sequence[bool] | None = None,
+        lanes: int = 0,
+        driver: Driver | None = None,
+        cache: Path | None = None,
+        portable: bool = False,
+    ) -> "Loop":
+        """A loop that carries nothing from step to step and records what a function gives for its numbers.
+
+        Args:
+            function: of as many trees of arrays as `example` has.
+            example: its arguments for one run.
+            constant, lanes, driver, cache, portable: as of a loop.
+
+        Raises:
+            Unsupported, OSError: as of a loop.
+        """
+        nothing = np.zeros(())
+        record = lambda arguments, carry, k: function(*arguments)
+        functions = lambda arguments: arguments, lambda arguments: nothing, lambda arguments, carry, k: carry, record
+        return cls(*functions, example, constant, lanes, driver, cache, portable=portable)
+
     def _load(self, parts: "_Parts", driver: Driver | None, cache: Path | None) -> None:
         self._parts, self.operations = parts, parts.program.operations
         assembly = parts.program.assembly

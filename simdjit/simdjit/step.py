@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import numpy as np
 
 from simdjit.graph import Unsupported
 from simdjit.loop import Loop
@@ -43,10 +42,8 @@ class Step:
         cache: Path | None = None,
         portable: bool = False,
     ):
-        example, nothing = (numbers, state, inputs), np.zeros(())
-        record = lambda arguments, carry, k: function(*arguments)
-        functions = lambda n: n, lambda n: nothing, lambda n, carry, k: carry, record
-        loop = Loop(*functions, example, lanes=1, cache=cache, portable=portable)
+        example = (numbers, state, inputs)
+        loop = Loop.recording(function, example, lanes=1, cache=cache, portable=portable)
         results = jax.eval_shape(function, *example)
         if not same_types(state, results[0]):
             raise Unsupported("a state that changes its type")

@@ -35,16 +35,7 @@ def in_lanes():
         def run(*rows):
             example = tuple(jax.numpy.asarray(row[0]) for row in rows)
             fixed = [i in constant for i in range(len(rows))]
-            nothing = np.zeros(())
-            program = Loop(
-                lambda numbers: numbers,
-                lambda numbers: nothing,
-                lambda numbers, carry, k: carry,
-                lambda numbers, carry, k: function(*numbers),
-                example,
-                fixed,
-                lanes,
-            )
+            program = Loop.recording(function, example, fixed, lanes)
             _, recorded = program.run(tuple(map(np.asarray, rows)), steps=1, every=1)
             return jax.tree.map(lambda leaf: leaf[:, 0], recorded)
 

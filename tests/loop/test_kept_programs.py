@@ -11,8 +11,9 @@ import pytest
 
 from undertow.core import checks, installation, kept_programs, program_key
 from undertow.core.errors import BadInput
-from undertow.core.kept_programs import kept_check, kept_program, kept_result
+from undertow.core.kept_programs import kept_program, kept_result
 from undertow.core.process_setup import KEEP_PROGRAMS
+from undertow.core.structure_key import Constant
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2, odin, remus100
 
@@ -197,7 +198,7 @@ def test_parts_are_arguments(folder):
 def test_a_check_that_passed_is_not_repeated(folder):
     calls = []
     for vehicle in (odin(), odin(), bluerov2()):
-        kept_check(lambda vehicle=vehicle: calls.append(vehicle), vehicle)
+        kept_result("check", vehicle, lambda vehicle=vehicle: calls.append(vehicle))
     assert len(calls) == 2
 
     def refuse():
@@ -206,7 +207,7 @@ def test_a_check_that_passed_is_not_repeated(folder):
 
     for _ in range(2):
         with pytest.raises(BadInput, match="`mass` must be positive"):
-            kept_check(refuse, remus100())
+            kept_result("check", remus100(), refuse)
     assert calls[2:] == ["refused", "refused"]
 
 
@@ -219,6 +220,7 @@ def test_a_result_is_kept_for_the_numbers_that_it_was_computed_of(folder):
 
     heavier = dataclasses.replace(odin(), mass=odin().mass + 1)
     for vehicle in (odin(), heavier, odin(), heavier):
-        assert kept_result("mass", vehicle, lambda vehicle=vehicle: mass(vehicle)) == float(vehicle.mass)
+        found = kept_result("mass", Constant(vehicle), lambda vehicle=vehicle: mass(vehicle))
+        assert found == float(vehicle.mass)
     assert len(calls) == 2
     assert kept_result("another", odin(), lambda: "computed") == "computed"

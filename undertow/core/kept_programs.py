@@ -5,8 +5,7 @@ it needs: for a vehicle that takes a hundred times as long as to run it. Here th
 one it is (`structure_key`). With it belong the sources of undertow, the versions of all libraries, the settings of JAX
 and the kind of processor.
 
-Nothing is kept or found in a process that has loaded code of anybody else, as a script, a notebook or a scenario with a
-part of one's own has: it may have changed what a program computes.
+Nothing is kept or found where `installation.may_keep` says no: beside code of others.
 """
 
 import functools
@@ -57,35 +56,15 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
-def kept_check(check: Callable[[], None], subject: Any) -> None:
-    """Call a check of the structure of a tree of parts, unless it has passed for this structure in an earlier process.
-
-    Args:
-        check: raises an error unless the parts are right; numbers of arrays decide nothing.
-        subject: what it checks.
-    """
-
-    def passed() -> bytes:
-        check()
-        return b"passed"
-
-    key = program_key("check", subject)
-    kept = None if key is None else kept_key(key)
-    if kept is None:
-        check()
-    else:
-        kept_code(kept, passed)
-
-
 def kept_result(name: str, subject: Any, compute: Callable[[], Result]) -> Result:
-    """What `compute` gives for a tree of parts with these numbers, or gave in an earlier process.
+    """What `compute` gives for a tree of parts, or gave in an earlier process.
 
     Args:
         name: of what is computed.
-        subject: all that it depends on.
-        compute: its result can be pickled.
+        subject: all that it depends on; numbers of arrays count in what is a `Constant`.
+        compute: its result can be pickled; an error that it raises is not kept.
     """
-    key = program_key(name, Constant(subject))
+    key = program_key(name, subject)
     kept = None if key is None else kept_key(key)
     if kept is None:
         return compute()

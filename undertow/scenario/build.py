@@ -30,7 +30,7 @@ from undertow.core.contracts import (
     Model,
 )
 from undertow.core.errors import Advice, BadInput, advice, error_location
-from undertow.core.kept_programs import kept_check, kept_program
+from undertow.core.kept_programs import kept_program, kept_result
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.numerics.rounding import three_digits
 from undertow.physics.disturbances.loads import SumOfDisturbances
@@ -266,7 +266,7 @@ def _build(text: Text, scenario: Scenario, part_cache: PartCache) -> Built:
     with error_location("initial"):
         check_start(loop, scenario.initial)
     fits = lambda: check_fit(loop, own_parts(scenario, text.folder))
-    part_cache.check_once(loop, lambda: kept_check(fits, loop))
+    part_cache.check_once(loop, lambda: kept_result("fit", loop, fits))
     described_metrics = [make_part("metrics", f"metrics[{i}]", part) for i, part in enumerate(scenario.metrics)]
     if described_metrics:
         resolved["metrics"] = [description for _, description in described_metrics]

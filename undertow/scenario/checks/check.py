@@ -11,6 +11,7 @@ from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean, nearest
 from undertow.core.kept_programs import kept_result
 from undertow.core.runtime import double_outside_runs
+from undertow.core.structure_key import Constant
 from undertow.core.user_code import place_of
 from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.thrusters.thruster import AbstractThruster
@@ -150,12 +151,12 @@ def _of_scenario(text: Text) -> list[Report]:
         reports.append(_of_thruster(thruster, "thruster", lambda key: _place(thruster, key) or in_scenario))
     if any(report.errors for report in reports):
         return reports  # their errors would cause others in what contains them
-    findings = kept_result("contract", loop.plant, lambda: check_contract(loop.plant))
+    findings = kept_result("contract", Constant(loop.plant), lambda: check_contract(loop.plant))
     reports.append(_report(findings, partial(_place, loop.plant)))
     if not reports[-1].errors:
         around = of_plant(loop.plant)
         for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller):
-            findings = kept_result("contract", (part, around), partial(check_contract, part, around))
+            findings = kept_result("contract", Constant((part, around)), partial(check_contract, part, around))
             reports.append(_report(findings, partial(_place, part)))
     return reports
 
