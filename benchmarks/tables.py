@@ -1,7 +1,10 @@
-"""The tables of docs/explanation/scale.md and simd.md: python benchmarks/tables.py scale|batch [--write]
+"""The tables of docs/explanation/scale.md, simd.md and speed.md.
 
-Every figure is measured anew, in processes of its own, which takes ten minutes for `scale` and five for `batch`. The
-table names the machine, the date and the commit. With --write it replaces the one between the marks of its page.
+    python benchmarks/tables.py scale|batch|rivals [--write]
+
+Every figure is measured anew, in processes of its own, which takes ten minutes for `scale`, five for `batch` and seven
+for `rivals`, whose tools simdjit/benchmarks/rivals names. The table names the machine, the date and the commit. With
+--write it replaces the one between the marks of its page.
 """
 
 import argparse
@@ -15,7 +18,12 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-PAGES = {"scale": HERE.parent / "docs/explanation/scale.md", "batch": HERE.parent / "docs/explanation/simd.md"}
+sys.path.insert(0, str(HERE.parent / "simdjit/benchmarks/rivals"))
+
+from ranking import table
+
+EXPLANATION = HERE.parent / "docs/explanation"
+PAGES = {"scale": EXPLANATION / "scale.md", "batch": EXPLANATION / "simd.md", "rivals": EXPLANATION / "speed.md"}
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 # Rounded prices of 2026, $ per hour, and the power of a laptop, W.
@@ -116,6 +124,22 @@ def batch() -> list[tuple[str, ...]]:
     return [("step", "operations", "compiling", "time per step and run", "times NumPy, or XLA's time"), *rows]
 
 
+def rivals() -> list[tuple[str, ...]]:
+    """simdjit beside other tools, on plants that they can state, and W1 beside XLA and C++."""
+    rows = benchmark("../simdjit/benchmarks/rivals", "--json")["rows"]
+    by_hand = benchmark("yardstick.py", "--json")
+    by_xla = benchmark("compiler_scale.py", "sets")["sets"]["5"]  # W1 has five
+    a_second = 1000  # steps of W1
+    for tool, setting, ns in (
+        ("simdjit", "64 runs at once", by_hand["batch_one_thread_ns"]),
+        ("simdjit", "one run", by_hand["single_ns"]),
+        ("XLA, vmap", "64 runs at once", by_xla["xla_ns"]),
+        ("C++ by hand", "one run", by_hand["yardstick_ns"]),
+    ):
+        rows.append({"problem": "W1, vehicle and law at 1 kHz", "tool": tool, "setting": setting, "ns": ns * a_second})
+    return table(rows)
+
+
 def compiled(one: dict[str, Any]) -> tuple[str, ...]:
     """Operations, seconds to compile, time of a step, and that by XLA; or why the compiler leaves it to XLA."""
     if "left_to_xla" in one:
@@ -188,7 +212,7 @@ def main() -> None:
     parser.add_argument("what", choices=list(PAGES))
     parser.add_argument("--write", action="store_true")
     asked = parser.parse_args()
-    text = page({"scale": scale, "batch": batch}[asked.what](), asked.what)
+    text = page({"scale": scale, "batch": batch, "rivals": rivals}[asked.what](), asked.what)
     print(text)
     if asked.write:
         path = PAGES[asked.what]

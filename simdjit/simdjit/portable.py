@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 from jax.experimental import serialize_executable
 
 from simdjit.graph import Unsupported
@@ -64,4 +63,4 @@ class PortableProgram:
 @functools.cache
 def _load_lapack() -> None:
     """Let JAX put LAPACK in place. A program that called it before would jump to nowhere."""
-    jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
+    jax.jit(jax.lax.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), float))

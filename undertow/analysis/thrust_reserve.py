@@ -95,6 +95,7 @@ def reference_reserve(
     water: Any = (0.0, 0.0, 0.0),
     lost: Sequence[int] = (),
     samples: int = 200,
+    enough: float = _ENOUGH,
 ) -> Reserve:
     """Whether the actuators that are left can follow a reference, by the nominal model.
 
@@ -109,6 +110,7 @@ def reference_reserve(
         water: its velocity, m/s: north, east, down; for a vehicle only.
         lost: numbers, from 0, of actuators that give nothing.
         samples: number of times at which the demand is computed.
+        enough: a reserve, times the demand, beyond which no larger one is searched for, which is quicker for a small one.
 
     Raises:
         BadInput: an actuator that does not exist.
@@ -118,7 +120,7 @@ def reference_reserve(
     demands, gains, least, largest = (np.asarray(value) for value in demands_and_limits)
     _, low, high = _checked(gains[0], least, largest, lost)
     controlled = controlled_axes(gains[0], lost)
-    share = lambda required, effect: _share(effect, required, low, high, lost, controlled)
+    share = lambda required, effect: _share(effect, required, low, high, lost, controlled, enough)
     worst, time = min((share(*both), float(t)) for *both, t in zip(demands, gains, times, strict=True))
     return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(controlled))))
 
@@ -144,14 +146,19 @@ def _demands(model: Model, reference: AbstractReference, times, water):
 _attained_share = kept_program(attained_share)
 
 
-def _share(effect, required, low, high, lost, axes) -> float:
-    """Largest s with E f = s times the demand along the axes, and f within its limits."""
+def _share(effect, required, low, high, lost, axes, enough) -> float:
+    """Largest s with E f = s times the demand along the axes, and f within its limits; at most `enough`."""
     working = np.delete(np.arange(effect.shape[1]), list(lost))
-    rows = effect[np.ix_(list(axes), working)]
-    if np.linalg.norm(required[list(axes)]) < _NOTHING:
-        return _ENOUGH
-    extended = np.concatenate([rows, -required[list(axes), None]], axis=1)
-    low, high = np.append(low[working], 0.0), np.append(high[working], _ENOUGH)
+    rows, required = effect[np.ix_(list(axes), working)], required[list(axes)]
+    low, high = low[working], high[working]
+    if np.linalg.norm(required) < _NOTHING:
+        return enough
+    least = np.linalg.lstsq(rows, enough * required)[0]
+    meets = np.linalg.norm(rows @ least - enough * required) < _NOTHING
+    if meets and ((low <= least) & (least <= high)).all():
+        return enough
+    extended = np.concatenate([rows, -required[:, None]], axis=1)
+    low, high = np.append(low, 0.0), np.append(high, enough)
     return _most(np.append(np.zeros(len(working)), 1.0), extended, low, high)
 
 

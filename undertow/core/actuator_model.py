@@ -6,6 +6,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from undertow.core.arrays import as_array
+
 Inputs = Float[Array, " m"]
 Forces = Float[Array, " m"] | Float[Array, ""]  # one per input, or one that holds for each
 
@@ -83,9 +85,9 @@ class AbstractMemorylessActuator(AbstractActuatorModel):
 class DirectActuator(AbstractMemorylessActuator):
     """The force is proportional to the input, within limits of the input."""
 
-    gain: Forces = eqx.field(converter=jnp.asarray, default=1.0)
-    low: Forces = eqx.field(converter=jnp.asarray, default=-jnp.inf)
-    high: Forces = eqx.field(converter=jnp.asarray, default=jnp.inf)
+    gain: Forces = eqx.field(converter=as_array, default=1.0)
+    low: Forces = eqx.field(converter=as_array, default=-jnp.inf)
+    high: Forces = eqx.field(converter=as_array, default=jnp.inf)
     at_once: bool = eqx.field(static=True, default=True)  # whether the force is known to follow the input at once
 
     def time_constant(self):

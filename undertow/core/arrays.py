@@ -23,7 +23,8 @@ def as_array(value: Any) -> Any:
         return jnp.asarray(value, dtype=float)
     values = np.asarray(value, dtype=float)  # by NumPy, because JAX would compile a program
     if values.nbytes > _MOST_BYTES:
-        return jnp.asarray(values)
+        with jax.ensure_compile_time_eval():
+            return jax.device_put(values)
     # The settings that the array depends on, too; the device may be set for this thread only.
     settings = (jax.config.jax_enable_x64, jax.config.jax_default_device)  # pyright: ignore[reportAttributeAccessIssue]
     return _made(values.tobytes(), values.shape, settings)
@@ -33,6 +34,14 @@ def as_array(value: Any) -> Any:
 def _made(content: bytes, shape: tuple[int, ...], settings: tuple[Any, ...]) -> jax.Array:
     with jax.ensure_compile_time_eval():  # an array made during tracing would belong to that trace
         return jax.device_put(np.frombuffer(content).reshape(shape))  # `asarray` would compile a program for each shape
+
+
+def library_of(*values: Any) -> Any:
+    """NumPy where numbers are known, because JAX would compile a program for each operation; JAX's where one is traced.
+
+    Both round sums, products, quotients and roots alike.
+    """
+    return jnp if any(isinstance(value, Tracer) for value in values) else np
 
 
 def in_present_precision(tree: Any) -> Any:

@@ -21,7 +21,7 @@ from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurren
 from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.surface import stated_depths
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean
+from undertow.scenario.unactuated_attitude import acting_directions, body_force, largest_lean, rotations
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SAMPLES = 201  # instants at which a reference is looked at
@@ -107,13 +107,10 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
         position: that is held, m and rad.
         flow: velocity of the current, world axes, m/s.
     """
-    from scipy.optimize import lsq_linear  # a third of a second, which scenarios without current need not wait for
-    from scipy.spatial.transform import Rotation
-
     thrusts = _thrusts(plant)
     if thrusts is None or not flow.any():
         return _size(flow)
-    rotation = Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
+    (rotation,) = rotations(position[None, 3:])
     shares = np.linspace(0.0, 1.0, _SHARES)
     relative_velocity = np.concatenate([-rotation.T @ flow, np.zeros(3)])
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
@@ -121,11 +118,21 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
     needed = np.asarray(body_force(plant.body, np.outer(shares, relative_velocity), down)) @ acting_directions(plant).T
     speed = 0.0
     for share, force in zip(shares, needed, strict=True):
-        residual = matrix @ lsq_linear(matrix, force, bounds=thrusts).x - force
+        residual = matrix @ _nearest_thrusts(matrix, force, *thrusts) - force
         if _size(residual) > _BALANCED * _size(force):
             break
         speed = float(share * _size(flow))
     return speed
+
+
+def _nearest_thrusts(matrix: np.ndarray, force: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Thrusts between their limits whose force is nearest to a given one."""
+    unlimited = np.linalg.lstsq(matrix, force)[0]
+    if ((low <= unlimited) & (unlimited <= high)).all():
+        return unlimited
+    from scipy.optimize import lsq_linear  # a fifth of a second, which vehicles with thrust to spare need not wait for
+
+    return lsq_linear(matrix, force, bounds=(low, high)).x
 
 
 def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]] | None:
@@ -289,7 +296,7 @@ def _too_demanding(loop: ClosedLoop, plant: HybridVehicle, duration: float, flow
     """A motion that takes more than the thrusters have, in the current; `effort` is its speed over the top speed."""
     if effort < _EASY:
         return
-    reserve = reference_reserve(plant.model(), loop.reference, duration, flow, samples=_LOOKS)
+    reserve = reference_reserve(plant.model(), loop.reference, duration, flow, samples=_LOOKS, enough=_SPARE)
     if reserve.share < 1:
         message = (
             f"the thrusters have {100 * reserve.share:.0f} % of what `reference` takes in this current at "
@@ -342,7 +349,7 @@ def _desired(loop: ClosedLoop, duration: float, start: list[float] | None) -> Re
 
 
 def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) -> ReferenceSamples:
-    at = _targets(reference, jnp.asarray(time))
+    at = _targets(reference, as_array(time))
     return ReferenceSamples(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
 
 

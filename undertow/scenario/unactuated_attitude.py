@@ -47,8 +47,7 @@ def largest_lean(
     unactuated = np.eye(6) - acting_directions(plant)
     if (np.diagonal(unactuated)[:3] > _UNACTUATED).any():
         return None
-    roll, pitch, yaw = angles.T
-    rotation = _turns(2, yaw) @ _turns(1, pitch) @ _turns(0, roll)
+    rotation = rotations(angles)
     leans = [
         _lean_about(plant.body, axis, unactuated, rotation, relative_velocity)
         for axis in _AXES
@@ -61,6 +60,12 @@ def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
     """Projection of forces and moments on the directions along which the thrusters act."""
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
     return matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
+
+
+def rotations(angles: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """Rotations body -> world of roll, pitch and yaw, rad, in NumPy."""
+    roll, pitch, yaw = angles.T
+    return _turns(2, yaw) @ _turns(1, pitch) @ _turns(0, roll)
 
 
 def _lean_about(

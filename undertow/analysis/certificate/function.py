@@ -9,11 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from jaxtyping import Array, Float
 
 from undertow.control.controllers.composite_law import RCAF
 from undertow.control.controllers.robust.estimator import Estimator
 from undertow.control.controllers.robust.robust_law import RobustRCAF
+from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core.arrays import as_array
+from undertow.core.kept_programs import kept_program
 
 PerRecord = np.ndarray  # (time,)
 
@@ -68,7 +71,7 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
     matrix = gramian(law.estimator, dt, run.sizes["axis"])
     d_til = run["estimate"].values - run["uncertainty"].values
     eps = run["modelling_error"].values
-    rho = float(law.estimator.fuzzy.basis_norm_squared())
+    rho = float(size_of_basis(law.estimator.fuzzy))
     per_axis = matrix[:, 0, 0] * eps**2 + 2 * matrix[:, 0, 1] * eps * d_til + matrix[:, 1, 1] * rho * _departure(run)
     share = np.broadcast_to(law.tracking_share, eps.shape[1:])
     if not (share > 0).all():
@@ -80,9 +83,20 @@ def of_robust(law: RobustRCAF, run: xr.Dataset, dt: float) -> Lyapunov:
 
 def transition(estimator: Estimator, dt: float, axes: int) -> np.ndarray:
     """Matrix of (eps, d_hat - d) from one step to the next, per axis, for constant d and basis: poles at exp(p T)."""
-    of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in estimator.gains(as_array(dt)))
+    of_rates, of_estimate = (np.broadcast_to(gain, axes) for gain in _gains(estimator, as_array(dt)))
     ones = np.ones(axes)
     return np.stack([np.stack([1 - of_rates, dt * ones], -1), np.stack([-of_estimate, ones], -1)], -2)
+
+
+@kept_program
+def size_of_basis(fuzzy: FuzzySystem) -> Float[Array, ""]:
+    """|xi(0)|^2."""
+    return fuzzy.basis_norm_squared()
+
+
+@kept_program
+def _gains(estimator: Estimator, dt: Float[Array, ""]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    return estimator.gains(dt)
 
 
 def gramian(estimator: Estimator, dt: float, axes: int) -> np.ndarray:

@@ -6,10 +6,12 @@ from typing import NamedTuple
 import jax
 import numpy as np
 import xarray as xr
+from jaxtyping import Array, Float
 
-from undertow.analysis.certificate.function import minimax_weight
+from undertow.analysis.certificate.function import minimax_weight, size_of_basis
 from undertow.control.controllers.composite_law import RCAF
 from undertow.control.controllers.robust.robust_law import RobustRCAF
+from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
 from undertow.core.kept_programs import kept_program
@@ -61,10 +63,16 @@ def of_paper(law: RCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
 def of_robust(law: RobustRCAF, run: xr.Dataset) -> Iterator[Hypothesis]:
     """What the discrete function asks of the basis, and what bounds the estimation error where d moves."""
     fuzzy, eps = law.estimator.fuzzy, run["modelling_error"].values
-    rho = (np.asarray(fuzzy.basis(as_array(eps.reshape(-1, 1)))) ** 2).sum(-1).reshape(eps.shape)
-    basis_is_constant = (np.abs(rho / float(fuzzy.basis_norm_squared()) - 1) <= _SAME_BASIS).all(-1)
+    basis = _basis(fuzzy, as_array(eps.reshape(-1, 1)))
+    rho = (np.asarray(basis) ** 2).sum(-1).reshape(eps.shape)
+    basis_is_constant = (np.abs(rho / float(size_of_basis(fuzzy)) - 1) <= _SAME_BASIS).all(-1)
     yield Hypothesis("basis", "eps is small beside the fuzzy sets: |xi|^2 within 1 % of |xi(0)|^2", basis_is_constant)
     yield Hypothesis("rate", "|d_dot| is bounded by what the records show", None, "d between records is not recorded")
+
+
+@kept_program
+def _basis(fuzzy: FuzzySystem, x: Float[Array, "k 1"]) -> Float[Array, "k rules"]:
+    return fuzzy.basis(x)
 
 
 def _constant(d: np.ndarray) -> np.ndarray:

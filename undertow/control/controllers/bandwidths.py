@@ -151,7 +151,7 @@ def _actuation(
 
 def scalar_if_uniform(values: Sequence[float]):
     """One number where all axes have the same value."""
-    return values[0] if len(set(values)) == 1 else jnp.asarray(values, dtype=float)
+    return values[0] if len(set(values)) == 1 else as_array(list(values))
 
 
 def largest_forces(actuators: AbstractActuatorModel, count: int) -> Float[Array, " m"]:

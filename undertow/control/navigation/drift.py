@@ -53,7 +53,7 @@ def drifts(sensors: Sequence[AbstractSensor], dvl_blend: ArrayLike, duration: fl
     fixed = {output for sensor in sensors for output in sensor.fixes or ()}
     noise = np.broadcast_to(np.asarray(imu.sampling.noise, dtype=float), 8)
     bias = np.broadcast_to(np.asarray(imu.sampling.bias, dtype=float), 8)
-    g, period = float(gravity()[2]), float(imu.sampling.period)
+    g, period = float(np.asarray(gravity())[2]), float(imu.sampling.period)
     error = lambda index, of_gravity: _Error(
         period * (noise[index] ** 2 + (of_gravity * noise[0]) ** 2), float(np.hypot(bias[index], of_gravity * bias[0]))
     )

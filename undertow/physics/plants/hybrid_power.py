@@ -130,4 +130,4 @@ class HybridPower(eqx.Module):
 
 def has_motor(thruster: AbstractThruster) -> bool:
     """Whether the thruster models its motor, so that a ledger can be kept; traced, not computed."""
-    return jax.eval_shape(thruster.powers, thruster.initial_state(1), jnp.zeros(1)) is not None
+    return jax.eval_shape(lambda: thruster.powers(thruster.initial_state(1), jnp.zeros(1))) is not None

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.actuator_model import DirectActuator
-from undertow.core.arrays import as_array
+from undertow.core.arrays import as_array, library_of
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
 from undertow.core.kept_programs import kept_program
@@ -239,8 +239,8 @@ def _possible_wrenches(thruster_matrix, rank: int):
     """Orthonormal basis of the wrenches that thrusters can give; None where they can give any."""
     if rank == len(BODY_AXES):
         return None
-    svd = jnp.linalg.svd if isinstance(thruster_matrix, Tracer) else np.linalg.svd
-    return jnp.asarray(svd(thruster_matrix)[0][:, :rank])
+    directions, *_ = library_of(thruster_matrix).linalg.svd(thruster_matrix)
+    return as_array(directions[:, :rank])
 
 
 @kept_program

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
+from undertow.core.arrays import library_of
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.physics.thrusters.thruster import PerThruster, Powers
 
@@ -65,17 +66,17 @@ class DCMotor(eqx.Module):
     @property
     def k3(self) -> PerThruster:
         """R / k_t, V/(N m). Eq. (13)."""
-        return self.resistance / self.torque_constant
+        return _quotient(self.resistance, self.torque_constant)
 
     @property
     def torque_per_thrust(self) -> PerThruster:
         """c_tq = c_q / c_t, m. Eq. (12)."""
-        return self.torque_coefficient / self.thrust_coefficient
+        return _quotient(self.torque_coefficient, self.thrust_coefficient)
 
     @property
     def voltage_gain(self) -> PerThruster:
         """alpha = 1 / (k_3 c_tq), N/V. Eq. (15)."""
-        return 1 / (self.k3 * self.torque_per_thrust)
+        return _quotient(1.0, self.k3 * self.torque_per_thrust)
 
     def torque(self, speed: PerThruster) -> PerThruster:
         """Shaft torque Q, N m, at a propeller speed in rad/s. Eq. (10)."""
@@ -139,7 +140,7 @@ class DCMotor(eqx.Module):
 
     def advice(self) -> tuple[str, ...]:
         """Advice on implausible constants."""
-        ratio = np.asarray(self.torque_constant / self.back_emf_constant)
+        ratio = np.asarray(self.torque_constant) / np.asarray(self.back_emf_constant)
         if np.all(np.abs(ratio - 1) <= 0.05):
             return ()
         worst = float(np.ravel(ratio)[np.argmax(np.abs(np.log(np.ravel(ratio))))])
@@ -151,3 +152,7 @@ class DCMotor(eqx.Module):
     def _gain(self, direction: PerThruster) -> PerThruster:
         reverse = 1 / (self.k3 * (self.reverse_torque_coefficient / self.reverse_thrust_coefficient))
         return jnp.where(direction < 0, reverse, self.voltage_gain)
+
+
+def _quotient(over: PerThruster | float, under: PerThruster) -> PerThruster:
+    return library_of(over, under).divide(over, under)

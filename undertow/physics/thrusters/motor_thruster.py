@@ -24,7 +24,7 @@ class AbstractMotorThruster(AbstractThruster):
         return self.motor.voltage_gain
 
     def advice(self):
-        supply, tested = float(np.max(self.supply)), self.motor.tested_voltage
+        supply, tested = float(np.asarray(self.supply).max()), self.motor.tested_voltage
         beyond = (
             f"`supply` is {supply:g} V, but the data of this thruster end at {tested:g} V: thrust and current beyond "
             "are extrapolated",

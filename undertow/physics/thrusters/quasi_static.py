@@ -5,6 +5,7 @@ import abc
 import jax.numpy as jnp
 
 from undertow.core.actuator_model import AbstractMemorylessActuator
+from undertow.core.arrays import library_of
 from undertow.physics.thrusters.thruster import AbstractThruster, PerThruster
 
 
@@ -55,4 +56,6 @@ class QuasiStaticActuator(AbstractMemorylessActuator):
         return self.thruster.voltage_for(force)
 
     def dead_zone(self):
-        return jnp.max(self.thruster.dead_zone / self.thruster.supply)
+        volts, supply = self.thruster.dead_zone, self.thruster.supply
+        library = library_of(volts, supply)
+        return library.max(library.divide(volts, supply))

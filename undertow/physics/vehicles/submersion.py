@@ -18,10 +18,9 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from undertow.core.arrays import as_array
+from undertow.core.arrays import as_array, library_of
 from undertow.core.contracts import FreeSurface, ModelScaling
 from undertow.core.numerics.linear_algebra import inverse_symmetric, matvec
 from undertow.core.numerics.rotations import cross
@@ -45,11 +44,11 @@ def half_size(vehicle: VehicleModel) -> Float[Array, "3"]:
     """
     if vehicle.size is not None:
         return as_array(vehicle.size) / 2
-    displaced = vehicle.buoyancy * vehicle.mass / vehicle.weight  # kg
-    cube = displaced * _SPHERE
-    if isinstance(cube, Tracer):
-        return jnp.broadcast_to(jnp.round(jnp.cbrt(cube) / _GRID) * _GRID, (3,))
-    return as_array(np.full(3, np.round(np.cbrt(np.asarray(cube)) / _GRID) * _GRID))
+    library = library_of(vehicle.buoyancy, vehicle.mass, vehicle.weight)
+    buoyancy, mass, weight = map(library.asarray, (vehicle.buoyancy, vehicle.mass, vehicle.weight))
+    displaced = buoyancy * mass / weight  # kg
+    radius = library.round(library.cbrt(displaced * _SPHERE) / _GRID) * _GRID
+    return as_array(library.broadcast_to(radius, (3,)))
 
 
 def dry_share(x: Float[Array, "*n"]) -> Float[Array, "*n"]:

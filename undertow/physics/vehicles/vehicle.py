@@ -9,8 +9,10 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
+from undertow.core.arrays import as_array, library_of
 from undertow.core.errors import BadInput
 from undertow.core.kept_programs import kept_program
+from undertow.core.numerics.linear_algebra import inverse
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.vehicles.body import Body, rigid_body_mass
@@ -106,7 +108,8 @@ class VehicleModel(eqx.Module):
     @double_outside_runs
     def mass_matrix(self) -> Float[Array, "6 6"]:
         """M = M_RB + M_A."""
-        return rigid_body_mass(self.mass, self.r_g, self.inertia) + self.added_mass
+        rigid = rigid_body_mass(self.mass, self.r_g, self.inertia)
+        return as_array(library_of(rigid, self.added_mass).add(rigid, self.added_mass))
 
     @double_outside_runs
     def thruster_matrix(self) -> Float[Array, "6 N"]:
@@ -119,14 +122,14 @@ class VehicleModel(eqx.Module):
         mass_matrix = self.mass_matrix()
         return Body(
             mass_matrix=mass_matrix,
-            inverse_mass_matrix=jnp.linalg.inv(mass_matrix),
+            inverse_mass_matrix=inverse(mass_matrix),
             linear_damping=self.linear_damping,
             quadratic_damping=self.quadratic_damping,
             weight=self.weight,
             buoyancy=self.buoyancy,
             r_g=self.r_g,
             r_b=self.r_b,
-            gravity=self.weight / self.mass,
+            gravity=library_of(self.weight, self.mass).divide(self.weight, self.mass),
         )
 
     @double_outside_runs

@@ -1,6 +1,5 @@
 """Preset `robust`: the robust variant, with gains from a few physical numbers."""
 
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.control.controllers.bandwidths import axes_of, default_bandwidths
@@ -10,6 +9,7 @@ from undertow.control.controllers.robust.estimator import Estimator, widened
 from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.core import checks
+from undertow.core.arrays import library_of
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.core.option_groups import flat_options
@@ -84,11 +84,12 @@ def robust(
         checks.positive(name, value, unit)
     if reach is None:
         fuzzy = widened(fuzzy, bandwidth, damping, weights_bound)
-    tracking = jnp.asarray(tracking, dtype=float)
+    library = library_of(tracking)
+    tracking = library.asarray(tracking, dtype=float)
     if feedback is None:
-        feedback = jnp.stack([tracking**2, 2 * tracking], -1)
+        feedback = library.stack([tracking**2, 2 * tracking], -1)
     if reference_frequency is None:
-        reference_frequency = jnp.minimum(tracking / 2, 2.0)
+        reference_frequency = library.minimum(tracking / 2, 2.0)
     jumps = checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return RobustRCAF(
         model=model,

@@ -1,6 +1,6 @@
 """The identification model and the composite adaptive law in discrete time: stable at any sampling time."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core import checks
+from undertow.core.arrays import library_of
 from undertow.core.kept_programs import kept_program
 from undertow.core.param import Param, param
 
@@ -146,12 +147,13 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
     """
     # Operation by operation, and not compiled, so that one value and many traced ones are rounded alike.
     settings = (bandwidth, damping, bound, _slope(fuzzy))
-    library: Any = jnp if checks.traced(*settings) else np
+    library = library_of(*settings)
     bandwidth, damping, bound, slope = (library.asarray(value, dtype=float) for value in settings)
     with np.errstate(divide="ignore", invalid="ignore"):  # of values that the estimator refuses
         reach = bound * (slope / (_ADDED * 2 * damping * bandwidth))
     factor = library.maximum(_LEAST, library.where(library.isfinite(reach), reach, _LEAST)).max()
-    return FuzzySystem(factor * fuzzy.centres, factor * fuzzy.widths, evenly_spaced=fuzzy.evenly_spaced)
+    centres, widths = library.multiply(factor, fuzzy.centres), library.multiply(factor, fuzzy.widths)
+    return FuzzySystem(centres, widths, evenly_spaced=fuzzy.evenly_spaced)
 
 
 @kept_program
