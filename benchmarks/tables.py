@@ -2,7 +2,7 @@
 
     python benchmarks/tables.py scale|batch|rivals [--write]
 
-Every figure is measured anew, in processes of its own, which takes ten minutes for `scale`, five for `batch` and seven
+Every figure is measured anew, in processes of its own, which takes ten minutes for `scale`, five for `batch` and twenty
 for `rivals`, whose tools simdjit/benchmarks/rivals names. The table names the machine, the date and the commit. With
 --write it replaces the one between the marks of its page.
 """

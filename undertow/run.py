@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from undertow.analysis.metrics import display_units, infinite, meanings
+from undertow.analysis.metrics import meanings
 from undertow.analysis.success import Success, criterion_of
 from undertow.control.navigation.perfect import perfect
 from undertow.core import checks, runtime
@@ -26,6 +26,7 @@ from undertow.core.contracts import (
     AbstractReference,
 )
 from undertow.core.errors import BadInput, error_location
+from undertow.core.number_text import display_units, infinite
 from undertow.core.status import Status
 from undertow.logs.log import Log
 from undertow.logs.run_log import log_of_run
@@ -131,7 +132,7 @@ class Run:
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
-        return figures.run_figures(self.result.series, self.result.facts)
+        return figures.run_figures(self.result.series, self.result.facts.faults, self.certificate)
 
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
@@ -139,7 +140,8 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        parts = page_contents(self.result, lambda: figures.plot_run(self.result))
+        shown = self.result.series, self.result.facts.faults, self.certificate
+        parts = page_contents(self.result, lambda: figures.plot_run(*shown))
         write_run_page(Path(path), self.result, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)

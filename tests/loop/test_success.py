@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from undertow.analysis.metrics import Metrics, accumulators, display_units, meanings, output_groups, results
+from undertow.analysis.metrics import Metrics, accumulators, meanings, output_groups, results
 from undertow.analysis.success import criterion_of, evaluate_success
 from undertow.control.controllers.pid import pid
 from undertow.control.navigation.perfect import perfect
 from undertow.control.references.setpoint import setpoint
 from undertow.core.metric import Metric
+from undertow.core.number_text import display_units
 from undertow.core.status import Status
 from undertow.physics.disturbances.sinusoid import sinusoid
 from undertow.physics.plants.double_integrator import DoubleIntegrator, double_integrator

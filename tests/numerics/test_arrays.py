@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from undertow.core import runtime
-from undertow.core.arrays import as_array
+from undertow.core.arrays import as_array, library_of
+from undertow.core.numerics.random_keys import key_of_seed
 
 
 @pytest.mark.parametrize("value", [2, 2.5, True, [1.0, 2.0], [[1, 2], [3, 4]], (), np.eye(3), -0.0, np.nan, np.inf])
@@ -66,3 +67,21 @@ def test_precision_and_device_are_those_of_the_moment():
     with runtime.on_processor():
         assert as_array(0.1) is not double and as_array(0.1) is as_array(0.1)
     assert as_array(0.1) is double
+
+
+def test_known_numbers_are_computed_by_numpy_with_the_bits_of_jax():
+    chance = np.random.default_rng(0)
+    a, b = (as_array(chance.lognormal(size=100)) for _ in range(2))
+    assert library_of(a, b) is np
+    for name in ("add", "multiply", "divide"):
+        assert np.array_equal(getattr(np, name)(a, b), getattr(jnp, name)(a, b))
+    assert np.array_equal(1 / np.sqrt(a), 1 / jnp.sqrt(a))
+    libraries = []
+    jax.eval_shape(lambda x: libraries.append(library_of(x, 2.0)), a)
+    assert libraries == [jnp]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 20170212, 2**32 - 1, 2**32, 2**40 + 3, -1])
+def test_the_key_of_a_seed_is_that_of_jax(seed):
+    assert np.array_equal(key_of_seed(seed), jax.random.PRNGKey(seed))
+    assert key_of_seed(seed).dtype == np.uint32

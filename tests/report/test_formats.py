@@ -2,7 +2,8 @@
 
 import pytest
 
-from undertow.report.formats import meets_default_criterion, number, outcome, plain, prose, quantity
+from undertow.core.number_text import plain
+from undertow.report.formats import meets_default_criterion, number, outcome, prose, quantity
 
 MINUS, TIMES = "\u2212", "&thinsp;&times;&thinsp;10"
 

@@ -10,7 +10,6 @@ from undertow.report.figures.run_files import plot_run
 from undertow.report.plotted import Plotted
 from undertow.report.plotting import PlottingProcess, plotting_process
 from undertow.scenario.results.run_facts import facts_from
-from undertow.scenario.results.run_result import RunRecord
 
 pytestmark = pytest.mark.full
 
@@ -19,24 +18,25 @@ ELSEWHERE = """
 import pickle, sys
 from undertow.report.plotting import plotting_process
 with plotting_process() as plotting:
-    plotting.plot(pickle.load(open(sys.argv[1], "rb")), "wide")
+    plotting.plot(*pickle.load(open(sys.argv[1], "rb")), "wide")
     {meanwhile}
     found = plotting.plotted()
 pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
 """
 
 
-def record(run):
-    return RunRecord(run, facts_from(run.attrs))
+def shown(run):
+    facts = facts_from(run.attrs)
+    return run, facts.faults, facts.certificate
 
 
 @pytest.fixture(scope="module")
 def here(runs):
-    return plot_run(record(runs["rafc"]), "wide")
+    return plot_run(*shown(runs["rafc"]), "wide")
 
 
 def elsewhere(run, folder, meanwhile="pass"):
-    (folder / "run").write_bytes(pickle.dumps(record(run)))
+    (folder / "run").write_bytes(pickle.dumps(shown(run)))
     command = [sys.executable, "-P", "-c", ELSEWHERE.format(meanwhile=meanwhile), folder / "run", folder / "found"]
     subprocess.run(command, check=True, cwd=folder)
     return pickle.loads((folder / "found").read_bytes())
@@ -55,11 +55,17 @@ def test_drawn_here_where_the_process_was_killed(runs, here, tmp_path):
     assert loaded and found == here
 
 
+def test_without_jax():
+    """The process that plots starts while JAX does elsewhere; with JAX it would take twice as long."""
+    code = "import sys, undertow.report.plotting; undertow.report.plotting.figures.plot_run; assert 'jax' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
     from undertow.report.figures import run_files
 
     monkeypatch.setattr(run_files, "run_plots", lambda *_: {"error": lambda: 1 / 0})
-    found = plot_run(record(runs["rafc"]))
+    found = plot_run(*shown(runs["rafc"]))
     assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
 
 
@@ -71,7 +77,7 @@ def test_files_are_written(tmp_path):
 def test_no_process_where_matplotlib_is_loaded(runs, here):
     with plotting_process() as plotting:
         assert plotting._process is None
-        plotting.plot(record(runs["rafc"]), "wide")
+        plotting.plot(*shown(runs["rafc"]), "wide")
         assert plotting.plotted() == here
 
 

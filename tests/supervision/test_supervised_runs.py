@@ -14,9 +14,9 @@ from undertow.control.supervision.supervisor import supervisor
 from undertow.control.supervision.transition_log import transitions
 from undertow.core import runtime
 from undertow.core.numerics.integrators import METHODS
+from undertow.report.signal_names import lost_thrusters
 from undertow.scenario.build import build
 from undertow.scenario.reading import from_data
-from undertow.scenario.results.run_result import lost_thrusters
 from undertow.simulation.loop import simd_batch
 from undertow.simulation.loop.sampled import integrate_plant
 

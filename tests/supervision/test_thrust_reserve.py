@@ -53,6 +53,13 @@ def test_a_reference_needs_the_drag_of_the_current_and_a_loss_takes_the_reserve(
     assert pair.missing and not pair.feasible
 
 
+@pytest.mark.parametrize("speed", [0.5, 1.0, 1.6, 2.5, 4.0])
+def test_a_reserve_beyond_enough_is_not_searched_for(speed):
+    model, hold = ODIN.model(), ut.references.setpoint([0.0] * 6, start=[0.0] * 6)
+    reserve = lambda **options: reference_reserve(model, hold, 10.0, (speed, 0.0, 0.0), samples=5, **options)
+    assert reserve(enough=1.05).share == pytest.approx(min(reserve().share, 1.05), rel=1e-9)
+
+
 def test_errors_say_what_is_possible():
     with pytest.raises(BadInput, match="`lost` must have numbers from 0 to 7, one per actuator, but is 8"):
         attainable_wrench(ODIN.thruster_matrix, LOW, HIGH, lost=[8])

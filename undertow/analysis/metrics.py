@@ -423,16 +423,6 @@ def gathered_meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] =
     return {name: metric for name, metric in meanings(loop, user_metrics).items() if name not in _AFTERWARDS}
 
 
-def display_units(value: float, unit: str) -> tuple[float, str]:
-    """A value and its unit as tables show them: angles in degrees."""
-    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
-
-
-def infinite(unit: str) -> str:
-    """What tables say in place of an infinite value: a time that does not come is `never`."""
-    return "never" if unit == "s" else "inf"
-
-
 def titled_name(metric: str) -> str:
     """A metric as words of a heading, which say that the rms of several axes is per axis."""
     of_outputs = metric in PER_AXIS and metric.endswith("_rms")

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from undertow.analysis.metrics import display_units
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.metric import Metric
+from undertow.core.number_text import display_units
 
 # Of tracking, in the steady window, where a scenario has no criterion of its own: 5 cm, and 0.05 rad (2.9 degrees).
 DEFAULT = {"position_rms": 0.05, "attitude_rms": 0.05}  # m, rad

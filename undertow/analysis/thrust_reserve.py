@@ -110,7 +110,7 @@ def reference_reserve(
         water: its velocity, m/s: north, east, down; for a vehicle only.
         lost: numbers, from 0, of actuators that give nothing.
         samples: number of times at which the demand is computed.
-        enough: a reserve, times the demand, beyond which no larger one is searched for, which is quicker for a small one.
+        enough: a reserve beyond which no larger one is searched for; a small one is found sooner.
 
     Raises:
         BadInput: an actuator that does not exist.

@@ -5,7 +5,6 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from undertow.analysis.metrics import display_units
 from undertow.cli.exit_codes import DONE, RUN_FAILED, warn_of
 from undertow.cli.options.campaign import CampaignCommand
 from undertow.cli.pdf_option import check_pdf
@@ -16,6 +15,7 @@ from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_
 from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
+from undertow.core.number_text import display_units
 from undertow.report.campaign_page import by_xla, write_campaign
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.executors import check_cluster

@@ -19,13 +19,14 @@ from undertow.logs.run_log import log_of_run
 from undertow.outside.rerun_file import check_rerun, write_rerun
 from undertow.report.plotting import plotting_process
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
+from undertow.report.signal_names import lost_thrusters
 from undertow.scenario.build import build, own_parts
 from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.checks.vehicle_lint import vehicle_advice
 from undertow.scenario.reading import read
 from undertow.scenario.results.netcdf import write
 from undertow.scenario.results.repetition import Repetition, compare
-from undertow.scenario.results.run_result import ScenarioResult, lost_thrusters
+from undertow.scenario.results.run_result import ScenarioResult
 from undertow.scenario.results.run_scenario import run_scenario
 
 _WRITTEN = ("run.nc", "run.mcap", "metrics.json", "scenario.yaml", "figures", "run.html")
@@ -48,7 +49,7 @@ def simulate(command: SimulateCommand) -> int:
         if rerun is not None:
             check_rerun(rerun, folder, command.overwrite)
         result = _run(scenario, console, command.allow_code)
-        plotting.plot(result, command.pdf)
+        plotting.plot(result.series, result.facts.faults, result.facts.certificate, command.pdf)
         _print_tables(result, console)
         write(result, draft.path)
         repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from undertow.analysis.metrics import display_units, infinite, titled_name
+from undertow.analysis.metrics import titled_name
 from undertow.core.atomic_io import write_whole
+from undertow.core.number_text import display_units, infinite
 from undertow.core.status import Status
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all

@@ -8,45 +8,32 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from undertow.analysis.metrics import display_units
 from undertow.analysis.success import DEFAULT, evaluate_success
+from undertow.core.number_text import DIGITS, LARGE, SMALL, display_units, plain, with_minus
 from undertow.report.mathml import with_symbols
 from undertow.report.page import Html, join, marked, tag, text
-
-_DIGITS = 3
-_SMALL, _LARGE = 1e-3, 1e5  # outside of these a number is written with a power of ten
 
 # In plain text, as Python prints them: powers of ten, minus signs (not hyphens), and plus or minus.
 _POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.)\]}>])-(?=[\d\u221e])")
 _EITHER = re.compile(r"\+-(?=\s?\d)")
 _TINY = re.compile(r"(?<![\w.])0\.000(0*)(\d+)(?!\w)")
-_RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 _SIGNS = {"&lt;=": "&le;", "&gt;=": "&ge;"}
 
 
-def number(value: Any, digits: int = _DIGITS) -> Html:
+def number(value: Any, digits: int = DIGITS) -> Html:
     """A number with the given digits; powers of ten are written out, and a dash stands for a missing number."""
     if value is None:
         return Html("&ndash;")
     if isinstance(value, float) and not math.isfinite(value):
         return text(value)
-    if value and not _SMALL <= abs(value) < _LARGE:
+    if value and not SMALL <= abs(value) < LARGE:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return _with_power(_minus(mantissa), str(int(exponent)))
+        return _with_power(with_minus(mantissa), str(int(exponent)))
     return text(plain(value, digits))
 
 
-def plain(value: float, digits: int = _DIGITS) -> str:
-    """A number as text, for figures; whole numbers have no zeros after the point."""
-    if value and not _SMALL <= abs(value) < _LARGE:
-        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{_minus(mantissa)} \u00d7 10{str(int(exponent)).translate(_RAISED)}"
-    is_integer = float(value).is_integer() or abs(value) >= 10 ** (digits - 0.5)
-    return _minus(f"{value:.0f}" if is_integer else f"{value:#.{digits}g}".rstrip("."))
-
-
-def quantity(value: float | None, of: str, digits: int = _DIGITS) -> Html:
+def quantity(value: float | None, of: str, digits: int = DIGITS) -> Html:
     """A number with its unit; angles in degrees."""
     if value is None:
         return number(None)
@@ -58,7 +45,7 @@ def percent(value: float | None) -> Html:
     """A signed difference in %."""
     if value is None:
         return number(None)
-    return join(_minus(f"{value:+.1f}" if round(value, 1) else "0.0"), Html("&nbsp;%"))
+    return join(with_minus(f"{value:+.1f}" if round(value, 1) else "0.0"), Html("&nbsp;%"))
 
 
 def prose(content: Any) -> Html:
@@ -73,7 +60,7 @@ def prose(content: Any) -> Html:
 def _typeset(words: str) -> Html:
     markup = _TINY.sub(lambda match: _scientific(len(match[1]), match[2]), with_symbols(words))
     markup = _POWER.sub(lambda match: _with_power(match[1], f"{match[2]}{match[3]}".lstrip("+")), markup)
-    markup = re.sub(r"\^(-?\d)", lambda match: f"<sup>{_minus(match[1])}</sup>", markup)
+    markup = re.sub(r"\^(-?\d)", lambda match: f"<sup>{with_minus(match[1])}</sup>", markup)
     markup = _NEGATIVE.sub("\u2212", _EITHER.sub("&plusmn;", markup))
     for sign, entity in _SIGNS.items():
         markup = markup.replace(sign, entity)
@@ -86,7 +73,7 @@ def _scientific(zeros: int, digits: str) -> Html:
 
 
 def _with_power(mantissa: str, exponent: str) -> Html:
-    return join(mantissa, Html("&thinsp;&times;&thinsp;10"), tag("sup", _minus(exponent)))
+    return join(mantissa, Html("&thinsp;&times;&thinsp;10"), tag("sup", with_minus(exponent)))
 
 
 def unit(value: str) -> Html:
@@ -153,8 +140,3 @@ def ending(entry: Mapping[str, Any]) -> str:
 def round_time(seconds: float) -> str:
     """Three digits, but whole seconds from 100 s on."""
     return f"{seconds:.0f}" if seconds >= 100 else f"{seconds:.3g}"
-
-
-def _minus(value: str) -> str:
-    """With a typographic minus sign."""
-    return value.replace("-", "\u2212")

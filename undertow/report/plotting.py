@@ -11,10 +11,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 from undertow.report import figures
 from undertow.report.plotted import Plotted
-from undertow.scenario.results.run_result import RunRecord
 
 
 class PlottingProcess:
@@ -26,12 +26,12 @@ class PlottingProcess:
 
     def __init__(self, process: subprocess.Popen[bytes] | None):
         self._process = process
-        self._request: tuple[RunRecord, str | None] | None = None
+        self._request: tuple[Any, ...] | None = None
         self._sending: threading.Thread | None = None
 
-    def plot(self, run: RunRecord, width: str | None) -> None:
-        """Begin to plot a run, with PDF files where a width is given."""
-        self._request = RunRecord(run.series, run.facts), width
+    def plot(self, *run: Any) -> None:
+        """Begin to plot a run; arguments of `figures.plot_run`."""
+        self._request = run
         if self._process is not None:
             # The process may still be starting, and a pipe holds little.
             self._sending = threading.Thread(target=self._send, daemon=True)

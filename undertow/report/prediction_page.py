@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.analysis.metrics import display_units
+from undertow.core.number_text import display_units
 from undertow.report.figures.prediction import force_label, prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose

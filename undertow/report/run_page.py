@@ -19,10 +19,10 @@ from undertow.report.run_tables import (
     navigation_rows,
     transition_rows,
 )
-from undertow.report.signal_names import input_names
+from undertow.report.signal_names import input_names, lost_thrusters
 from undertow.scenario.reading import dump
 from undertow.scenario.results.run_facts import RunFacts
-from undertow.scenario.results.run_result import RunRecord, RunResult, lost_thrusters
+from undertow.scenario.results.run_result import RunRecord, RunResult
 
 _DIGITS = 4
 

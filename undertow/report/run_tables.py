@@ -5,9 +5,9 @@ from math import isinf
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from undertow.analysis.metrics import display_units, infinite
 from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core.metric import Metric
+from undertow.core.number_text import display_units, infinite
 
 if TYPE_CHECKING:  # it loads SciPy, which a run does not need
     from undertow.analysis.linearization.response import MetricComparison

@@ -7,6 +7,7 @@ import numpy as np
 import rows
 from pendulum import ANGLES, DURATION, LIMIT, RUNS, SAMPLE, SAMPLES, STIFFNESS, command
 
+TOLERANCES = rows.TOLERANCES.values
 WIDTHS = hy.recommended_simd_size(), 64, 256  # runs of a batch
 ANGLE, RATE = hy.make_vars("angle", "rate")
 TORQUE = hy.par[0]
@@ -61,12 +62,11 @@ def controlled(width, tolerance):
 
 
 def of_widths(problem, tool, work):
-    """Print the rows of the width that is fastest for each error."""
-    found = [
-        list(rows.cheapest(problem, f"{tool}, {width} runs at once", rows.TOLERANCES, partial(work, width)))
-        for width in WIDTHS
-    ]
-    rows.print_rows(min(alike, key=lambda row: row.ns) for alike in zip(*found, strict=True))
+    """Print a row for each width."""
+    for width in WIDTHS:
+        rows.print_cheapest(
+            problem, tool, rows.Settings(f"tolerance {{:.0e}}, {width} at once", TOLERANCES), partial(work, width)
+        )
 
 
 of_widths("alone", "heyoka, batch", batch)

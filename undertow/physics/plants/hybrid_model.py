@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.arrays import library_of
+from undertow.core.arrays import as_array, library_of
 from undertow.core.contracts import AbstractCoordinates, AbstractDynamics, Measurement, Model, Target, TrackingError
 from undertow.core.coordinates import AbstractOutputCoordinates
 from undertow.core.measurement import BODY_AXES, body_of, measurement_of_outputs
@@ -204,7 +204,8 @@ class EulerCoordinates(AbstractOutputCoordinates):
         body, matrix = dynamics.body, dynamics.thruster_matrix
         effect = body.inverse_mass_matrix @ matrix
         library = library_of(body.mass_matrix)
-        alike = 1 / library.sqrt(library.diagonal(body.mass_matrix))  # accelerations of equal kinetic energy
+        # Accelerations of equal kinetic energy.
+        alike = as_array(1 / library.sqrt(library.diagonal(body.mass_matrix)))
         return Model(
             BodyDynamics(body, effect, partial_inverse(effect, alike, dynamics.rank)),
             BodyCoordinates(),

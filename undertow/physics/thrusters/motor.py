@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.arrays import library_of
+from undertow.core.arrays import as_array, library_of
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.physics.thrusters.thruster import PerThruster, Powers
 
@@ -155,4 +155,4 @@ class DCMotor(eqx.Module):
 
 
 def _quotient(over: PerThruster | float, under: PerThruster) -> PerThruster:
-    return library_of(over, under).divide(over, under)
+    return as_array(library_of(over, under).divide(over, under))

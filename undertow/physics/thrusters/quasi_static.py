@@ -5,7 +5,7 @@ import abc
 import jax.numpy as jnp
 
 from undertow.core.actuator_model import AbstractMemorylessActuator
-from undertow.core.arrays import library_of
+from undertow.core.arrays import as_array, library_of
 from undertow.physics.thrusters.thruster import AbstractThruster, PerThruster
 
 
@@ -58,4 +58,4 @@ class QuasiStaticActuator(AbstractMemorylessActuator):
     def dead_zone(self):
         volts, supply = self.thruster.dead_zone, self.thruster.supply
         library = library_of(volts, supply)
-        return library.max(library.divide(volts, supply))
+        return as_array(library.max(library.divide(volts, supply)))

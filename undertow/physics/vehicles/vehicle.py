@@ -129,7 +129,7 @@ class VehicleModel(eqx.Module):
             buoyancy=self.buoyancy,
             r_g=self.r_g,
             r_b=self.r_b,
-            gravity=library_of(self.weight, self.mass).divide(self.weight, self.mass),
+            gravity=as_array(library_of(self.weight, self.mass).divide(self.weight, self.mass)),
         )
 
     @double_outside_runs

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from undertow.core.number_text import plain
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
-from undertow.report.formats import plain
 from undertow.studies.arena.leader_board import Board, Standing
 from undertow.studies.arena.robustness import PARAMETERS
 from undertow.studies.arena.scores import FINEST, LOST

@@ -23,7 +23,7 @@ _SPANS = {"input at a limit": ("#e07b00", 0.22, 1.0), "weight at its bound (proj
 _DECADES = 4
 
 
-def certificate(run: xr.Dataset, title: str, bound: float) -> Figure:
+def certificate_figure(run: xr.Dataset, title: str, bound: float) -> Figure:
     """V and its parts, dV/dt, and the largest weight with its bound, where the controller has weights.
 
     Spans with active limits are shaded.

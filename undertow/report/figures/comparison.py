@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from undertow.analysis.metrics import display_units, output_groups, titled_name
+from undertow.analysis.metrics import output_groups, titled_name
+from undertow.core.number_text import display_units
 from undertow.core.status import Status
 from undertow.report.figures import style
 from undertow.report.figures.campaign import beside, distributions_figure, key_height, looks_of

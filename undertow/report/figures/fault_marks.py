@@ -1,32 +1,30 @@
 """Where the faults of a run begin, and when its supervisor took thrusters out of use, as marks in its figures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from undertow.report.figures.multiples import Mark
-from undertow.report.signal_names import input_names
-from undertow.scenario.results.run_facts import RunFacts
-from undertow.scenario.results.run_result import lost_thrusters
+from undertow.report.signal_names import input_names, lost_thrusters
 
 _ONSET, _FOUND = (0, (1, 1.5)), (0, (4, 2))  # dashes
 
 
-def fault_marks(run: xr.Dataset, facts: RunFacts | None) -> list[Mark]:
+def fault_marks(run: xr.Dataset, faults: Sequence[Mapping[str, Any]] = ()) -> list[Mark]:
     """A mark at the onset of each fault of the scenario, and one where a thruster was taken out of use.
 
     Faults of one onset share a mark; one whose onset was sampled has none.
 
     Args:
         run: recorded series.
-        facts: of the run, with its faults; None where they are not known.
+        faults: entries of the scenario.
     """
     short = lambda name: name.partition(" ")[0]
     names = [short(name) for name in input_names(run)]
     words: dict[float, list[str]] = {}
-    for fault in () if facts is None else facts.faults:
+    for fault in faults:
         if isinstance(fault["onset"], int | float):
             words.setdefault(float(fault["onset"]), []).append(f"{_target(fault, names)} {fault['mode']}")
     end = float(np.nanmax(run["time"].values, initial=0.0))

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
+from undertow.core.number_text import plain
 from undertow.report.figures import style
-from undertow.report.formats import plain
 
 _SMALL, _LARGE = 1e-2, 1e5  # outside of these tick labels are long
 

@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from undertow.analysis.metrics import display_units, titled_name
+from undertow.analysis.metrics import titled_name
+from undertow.core.number_text import display_units
 from undertow.report.figures import style
 from undertow.report.figures.campaign import looks_of
 from undertow.studies.comparison.findings import Findings

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from undertow.analysis.metrics import display_units
+from undertow.core.number_text import display_units
 from undertow.report.figures.multiples import Curve
 from undertow.report.figures.style import Look, power
 

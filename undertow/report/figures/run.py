@@ -1,36 +1,41 @@
 """Figures of a single run, with any number of outputs and inputs, completed or not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
-from undertow.report.figures.certificate import certificate, weights_bound
+from undertow.report.figures.certificate import certificate_figure, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.signal_names import axis_names, controller_axis_names, input_names
-from undertow.scenario.results.run_facts import RunFacts
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2
 
 
-def run_figures(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Figure]:
+def run_figures(
+    run: xr.Dataset, faults: Sequence[Mapping[str, Any]] = (), certificate: Mapping[str, Any] | None = None
+) -> dict[str, Figure]:
     """Figures `tracking`, `error`, `estimate` and `effort` of one run.
 
     A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`. Faults are marked.
 
     Args:
         run: recorded series.
-        facts: of the run; None where nothing is known of faults and of the bound of weights.
+        faults: entries of the scenario.
+        certificate: of the run, with the bound of its weights; None where it is not known.
     """
-    return {name: make() for name, make in run_plots(run, facts).items()}
+    return {name: make() for name, make in run_plots(run, faults, certificate).items()}
 
 
-def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Callable[[], Figure]]:
+def run_plots(
+    run: xr.Dataset, faults: Sequence[Mapping[str, Any]] = (), certificate: Mapping[str, Any] | None = None
+) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name; see `run_figures`."""
     outputs = axis_names(run)
     inputs = input_names(run)
@@ -48,7 +53,7 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
     errors = recorded.per_axis(run_in_degrees, "|error|")
     rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
-    marks = fault_marks(run, facts)
+    marks = fault_marks(run, faults)
 
     def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:
         marked = lambda: [block._replace(marks=marks) for block in blocks()]
@@ -65,8 +70,8 @@ def run_plots(run: xr.Dataset, facts: RunFacts | None = None) -> dict[str, Calla
         "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, recorded.settled(run))]),
     }
     if "lyapunov" in run:
-        bound = weights_bound(None if facts is None else facts.certificate)
-        figures["certificate"] = lambda: certificate(run, _titled(run, "Certificate"), bound)
+        bound = weights_bound(certificate)
+        figures["certificate"] = lambda: certificate_figure(run, _titled(run, "Certificate"), bound)
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
     figures["measurement"] = plot("Measurement error", outputs, lambda: _apart(run))

@@ -214,20 +214,6 @@ def _verdicts(outcome: Outcome, settings: MetricsSettings, steady: Mapping[str, 
     return evaluate_requirements(settings.requirements, signals, settings.record, steady, *ending)
 
 
-def lost_thrusters(series: xr.Dataset) -> list[tuple[str, float]] | None:
-    """Name of each thruster that was taken out of use, and the time of the first record of that, s, in its order.
-
-    None for a run in which no monitor watched the thrusters.
-    """
-    if "lost_thrusters" not in series:
-        return None
-    names = series["actuator"].attrs["names"].split(", ")
-    time = series["time"].values
-    lost = zip(names, series["lost_thrusters"].values.T, strict=True)
-    losses = [(name, float(time[signal.argmax()])) for name, signal in lost if signal.any()]
-    return sorted(losses, key=lambda loss: loss[1])
-
-
 def law_of(loop: ClosedLoop) -> AbstractController:
     """The control law of a loop, without supervision and faults of its computer."""
     return unsupervised(law_of_computed(loop.controller))

@@ -2,7 +2,7 @@
 
 import math
 
-from undertow.analysis.metrics import display_units
+from undertow.core.number_text import display_units
 from undertow.studies.comparison.findings import COMPLETED, Findings
 from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, PairedDifference
 from undertow.studies.comparison.pareto import Front

@@ -7,7 +7,8 @@ import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from undertow.analysis.metrics import display_units, infinite, titled_name
+from undertow.analysis.metrics import titled_name
+from undertow.core.number_text import display_units, infinite
 from undertow.studies.comparison.findings import Findings, Median
 from undertow.studies.comparison.paired import PairedDifference
 from undertow.studies.comparison.sentences import digits, relative

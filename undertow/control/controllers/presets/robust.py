@@ -9,7 +9,7 @@ from undertow.control.controllers.robust.estimator import Estimator, widened
 from undertow.control.controllers.robust.robust_law import RobustRCAF
 from undertow.control.estimation.fuzzy_system import gaussian_sets
 from undertow.core import checks
-from undertow.core.arrays import library_of
+from undertow.core.arrays import as_array, library_of
 from undertow.core.contracts import Model
 from undertow.core.errors import BadInput
 from undertow.core.option_groups import flat_options
@@ -87,9 +87,9 @@ def robust(
     library = library_of(tracking)
     tracking = library.asarray(tracking, dtype=float)
     if feedback is None:
-        feedback = library.stack([tracking**2, 2 * tracking], -1)
+        feedback = as_array(library.stack([tracking**2, 2 * tracking], -1))
     if reference_frequency is None:
-        reference_frequency = library.minimum(tracking / 2, 2.0)
+        reference_frequency = as_array(library.minimum(tracking / 2, 2.0))
     jumps = checks.assumed(lambda frequency: (frequency != 0).any(), reference_frequency)
     return RobustRCAF(
         model=model,

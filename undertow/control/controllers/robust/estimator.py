@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core import checks
-from undertow.core.arrays import library_of
+from undertow.core.arrays import as_array, library_of
 from undertow.core.kept_programs import kept_program
 from undertow.core.param import Param, param
 
@@ -152,7 +152,7 @@ def widened(fuzzy: FuzzySystem, bandwidth, damping, bound) -> FuzzySystem:
     with np.errstate(divide="ignore", invalid="ignore"):  # of values that the estimator refuses
         reach = bound * (slope / (_ADDED * 2 * damping * bandwidth))
     factor = library.maximum(_LEAST, library.where(library.isfinite(reach), reach, _LEAST)).max()
-    centres, widths = library.multiply(factor, fuzzy.centres), library.multiply(factor, fuzzy.widths)
+    centres, widths = (as_array(library.multiply(factor, values)) for values in (fuzzy.centres, fuzzy.widths))
     return FuzzySystem(centres, widths, evenly_spaced=fuzzy.evenly_spaced)
 
 
