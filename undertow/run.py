@@ -34,7 +34,7 @@ from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
-from undertow.report.run_page import page_contents, write_run_page
+from undertow.report.run_page import page_contents, shown_of, write_run_page
 from undertow.scenario import factory
 from undertow.scenario.build import build, velocity_noise_of
 from undertow.scenario.changed_values import put_value
@@ -132,7 +132,7 @@ class Run:
 
     def plot(self) -> "dict[str, Figure]":
         """Figures of the run, by name."""
-        return figures.run_figures(self.result.series, self.result.facts.faults, self.certificate)
+        return figures.run_figures(shown_of(self.result))
 
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
@@ -140,8 +140,7 @@ class Run:
         Raises:
             OSError: the file cannot be written.
         """
-        shown = self.result.series, self.result.facts.faults, self.certificate
-        parts = page_contents(self.result, lambda: figures.plot_run(*shown))
+        parts = page_contents(self.result, lambda: figures.plot_run(shown_of(self.result)))
         write_run_page(Path(path), self.result, parts)
         for sentence in parts.failures:
             warnings.warn(sentence, stacklevel=2)

@@ -23,7 +23,7 @@ PATHS = {
     ],
     "version": [("version", 0, "undertow ")],
     "simulate": [
-        ("simulate s.yaml --out run", 0, "Status: completed"),
+        ("simulate s.yaml --out run", 0, "It did not go well from"),
         ("simulate run/run.nc --out run", 2, "--overwrite"),
     ],
     "logs": [("logs layout", 0, "undertow-foxglove.json"), ("logs s.yaml", 2, "`log` must")],

@@ -216,7 +216,7 @@ def test_a_figure_that_fails_costs_no_results(undertow, tmp_path, monkeypatch):
     line = (
         "Warning: figure `tracking` could not be made (ZeroDivisionError: division by zero); the results are complete"
     )
-    assert said.err.splitlines()[-1] == line
+    assert line in said.err.splitlines()
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "figures",
         "metrics.json",

@@ -52,7 +52,7 @@ def test_metric_that_is_the_same_for_all_has_no_panel(compared):
     assert alike(dataset, found) == {"saturated_fraction": 0.0}
     for name in ("differences", "distributions"):
         assert [panel.get_xlabel() for panel in comparison_plots(dataset, found)[name]().axes] == [
-            "position rms per axis, m"
+            "position error, rms per axis, m"
         ]
 
 

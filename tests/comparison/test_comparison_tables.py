@@ -53,9 +53,9 @@ def test_medians(findings):
     rows = {row[0]: row[1:] for row in medians(findings).rows}
     assert rows["completed trials"] == ("10 of 10", "10 of 10", "8 of 10")
     assert rows["within the criterion of success"] == ("10 of 10", "10 of 10", "8 of 8")
-    assert rows["position rms per axis (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
-    assert rows["attitude rms per axis (deg)"][0] == "5.5 [2, 9]"
-    assert rows["saturated fraction"] == ("0 [0, 0]",) * 3
+    assert rows["position error, rms per axis (m)"][:2] == ("1.04 [1.01, 1.08]", "0.59 [0.52, 0.66]*")
+    assert rows["attitude error, rms per axis (deg)"][0] == "5.5 [2, 9]"
+    assert rows["time at the input limits"] == ("0 [0, 0]",) * 3
 
 
 def test_computing_time_is_the_last_row(findings):
@@ -97,9 +97,9 @@ def test_latex(findings):
     assert "\\begin{tabularx}{\\linewidth}{Xrrr}\n\\toprule\nmetric & a & b\\_1 & c \\\\" in text
     assert "\\caption{Median over completed trials [95 \\% interval of the median]; metrics of the steady" in text
     assert "\\label{tab:medians}" in text and "\\label{tab:differences}" in text
-    assert "position rms per axis (m) & 1.04 [1.01, 1.08] & 0.590 [0.520, 0.660]$^{*}$ & " in text
+    assert "position error, rms per axis (m) & 1.04 [1.01, 1.08] & 0.590 [0.520, 0.660]$^{*}$ & " in text
     assert "input variation (m/s$^{2}$/s) & $1.04 \\times 10^{-5}$ [" in text
-    assert "b\\_1 $-$ a & position rms per axis (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
+    assert "b\\_1 $-$ a & position error, rms per axis (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
     for line in text.splitlines():
         if "&" in line:
             assert line.count(" & ") in (3, 6) and line.endswith(" \\\\")

@@ -5,6 +5,7 @@ import xarray as xr
 from undertow.paper.figures.fidelity import fidelity_figure
 from undertow.paper.pages.report import write_report
 from undertow.report.figures import run_figures
+from undertow.report.plotted import Shown
 from undertow.report.replay.replay_data import ReplayData, Thrusters
 
 
@@ -123,7 +124,7 @@ def results():
 def page(runs, tmp_path_factory):
     """The report of the study with two figures: its folder and its text."""
     folder, results = tmp_path_factory.mktemp("report"), results_of_a_study()
-    figures = {"fig06": run_figures(runs["rcafc"])["tracking"], "fidelity": fidelity_figure(results["fidelity"])}
+    figures = {"fig06": run_figures(Shown(runs["rcafc"]))["tracking"], "fidelity": fidelity_figure(results["fidelity"])}
     written = write_report(results, figures, folder)
     assert written == folder / "report.html"
     return written.read_text(encoding="utf-8")

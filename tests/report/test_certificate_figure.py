@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from undertow.report.figures import run_figures, svg
+from undertow.report.plotted import Shown
 from undertow.scenario.results.run_facts import facts_from
 
 pytestmark = pytest.mark.full
@@ -52,7 +53,7 @@ def spans(panel):
 
 def test_lines_and_shades_are_the_data(certified):
     run = certified()
-    figure = run_figures(run, certificate=facts_from(run.attrs).certificate)["certificate"]
+    figure = run_figures(Shown(run, certificate=facts_from(run.attrs).certificate))["certificate"]
     value, rate, weights = figure.axes
     np.testing.assert_array_equal(lines(value)["V"], run["lyapunov"])
     np.testing.assert_array_equal(lines(value)["tracking part"], run["lyapunov_tracking"])
@@ -67,24 +68,24 @@ def test_lines_and_shades_are_the_data(certified):
 
 
 def test_where_tracking_is_no_part_of_v_the_key_says_so(certified):
-    names = list(lines(run_figures(certified(alone=True))["certificate"].axes[0]))
+    names = list(lines(run_figures(Shown(certified(alone=True)))["certificate"].axes[0]))
     assert names == ["V of the estimator", "tracking, not in V"]
 
 
 def test_without_a_bound_none_is_drawn(certified):
     run = certified(bound=None)
-    assert list(lines(run_figures(run, certificate=facts_from(run.attrs).certificate)["certificate"].axes[2])) == [
-        r"largest |$\theta$|"
-    ]
+    assert list(
+        lines(run_figures(Shown(run, certificate=facts_from(run.attrs).certificate))["certificate"].axes[2])
+    ) == [r"largest |$\theta$|"]
 
 
 def test_a_run_that_failed_is_drawn_up_to_its_end(certified):
     run = certified(status="diverged", ended=3.3)
     run["lyapunov"][40:] = np.inf
-    figure = run_figures(run, certificate=facts_from(run.attrs).certificate)["certificate"]
+    figure = run_figures(Shown(run, certificate=facts_from(run.attrs).certificate))["certificate"]
     assert "diverged at 3.3 s" in figure.texts[0].get_text()
     assert max(figure.axes[0].lines[0].get_xdata()) <= 3.3 and svg(figure)
 
 
 def test_an_older_result_has_no_certificate(make_run):
-    assert "certificate" not in run_figures(make_run())
+    assert "certificate" not in run_figures(Shown(make_run()))

@@ -6,6 +6,7 @@ from undertow.control.supervision.conditions import State
 from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.run import run_plots
+from undertow.report.plotted import Shown
 from undertow.report.run_tables import fault_rows, navigation_rows, transition_rows
 from undertow.report.signal_names import lost_thrusters
 from undertow.scenario.results.run_facts import facts_from
@@ -86,7 +87,7 @@ def test_figures_mark_the_onset_of_a_fault_and_when_the_thruster_was_out_of_use(
     marks = [(mark.time, mark.word) for mark in fault_marks(run, facts_from(run.attrs).faults)]
     assert marks == [(8.0, "T2 off"), (4.0, "T5 out of use"), (9.0, "T2 out of use")]
     assert fault_marks(make_run()) == []
-    first, *others = run_plots(run, facts_from(run.attrs).faults)["tracking"]().axes
+    first, *others = run_plots(Shown(run, facts_from(run.attrs).faults))["tracking"]().axes
     assert [note.get_text() for note in first.texts] == ["T5 out of use", "T2 off", "T2 out of use"]
     assert not any(panel.texts for panel in others)
     for panel in (first, *others):

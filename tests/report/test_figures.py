@@ -16,6 +16,7 @@ from undertow.paper.thruster_response import thruster_response
 from undertow.report.figures import png, run_figures, save, svg
 from undertow.report.figures.limits import fit_linear
 from undertow.report.figures.prediction import prediction_plots
+from undertow.report.plotted import Shown
 
 pytestmark = pytest.mark.full
 
@@ -160,25 +161,25 @@ def test_the_fullest_figures_stay_small(make_run):
 
 def test_a_figure_made_while_another_thread_writes_is_the_same(make_run, monkeypatch):
     run = make_run(axes=1, inputs=1)
-    alone, made = svg(run_figures(run)["tracking"]), []
+    alone, made = svg(run_figures(Shown(run))["tracking"]), []
 
     def write_meanwhile(canvas, *written, **how):
-        made.append(run_figures(run)["tracking"])  # the settings for writing are held now
+        made.append(run_figures(Shown(run))["tracking"])  # the settings for writing are held now
         return print_svg(canvas, *written, **how)
 
     print_svg = FigureCanvasSVG.print_svg
     with monkeypatch.context() as patch:
         patch.setattr(FigureCanvasSVG, "print_svg", write_meanwhile)
-        svg(run_figures(run)["error"])
+        svg(run_figures(Shown(run))["error"])
     assert [svg(figure) for figure in made] == [alone]
 
 
 def test_drawing_in_two_threads_changes_nothing(make_run):
     run, found = make_run(axes=1, inputs=1), {}
-    alone = svg(run_figures(run)["tracking"])
+    alone = svg(run_figures(Shown(run))["tracking"])
 
     def draw(number):
-        found[number] = svg(run_figures(run)["tracking"])
+        found[number] = svg(run_figures(Shown(run))["tracking"])
 
     threads = [threading.Thread(target=draw, args=(number,)) for number in range(2)]
     for thread in threads:
@@ -191,9 +192,9 @@ def test_drawing_in_two_threads_changes_nothing(make_run):
 @pytest.mark.parametrize(("axes", "inputs"), [(1, 1), (2, 2), (6, 8), (7, 5)])
 def test_run_figures_for_any_size(make_run, axes, inputs):
     run = make_run(axes=axes, inputs=inputs)
-    figures = run_figures(run)
-    assert list(figures) == ["tracking", "error", "estimate", "effort"]
-    assert [len(figure.axes) for figure in figures.values()] == [axes, axes, axes, inputs]
+    figures = run_figures(Shown(run))
+    assert list(figures) == ["summary", "tracking", "error", "estimate", "effort"]
+    assert [len(figure.axes) for figure in figures.values()][1:] == [axes, axes, axes, inputs]
     last = figures["effort"].axes[-1]
     np.testing.assert_array_equal(line(last, "applied").get_ydata(), run["input"].values[:, -1])
     np.testing.assert_array_equal(line(last, "commanded").get_ydata(), run["commanded_input"].values[:, -1])
@@ -205,8 +206,8 @@ def test_a_sensor_that_errs_has_a_figure_of_its_own(make_run):
     run["measured_position"][:, 0] += 0.25
     run["measured_position"][:, 5] += 2 * np.pi - 0.125  # the same heading but for an eighth
     run["measured_velocity"][:, 2] -= 0.5
-    figures = run_figures(run)
-    assert list(figures) == ["tracking", "error", "estimate", "effort", "measurement"]
+    figures = run_figures(Shown(run))
+    assert list(figures) == ["summary", "tracking", "error", "estimate", "effort", "measurement"]
     position, _ = titled(figures["measurement"], "north")
     heading, _ = titled(figures["measurement"], "yaw")
     _, sinking = titled(figures["measurement"], "down")
@@ -218,7 +219,7 @@ def test_a_sensor_that_errs_has_a_figure_of_its_own(make_run):
 
 def test_diverged_run_is_drawn_up_to_its_end(make_run):
     run = make_run(axes=2, inputs=2, status="diverged", ended=3.3)
-    figures = run_figures(run)
+    figures = run_figures(Shown(run))
     for figure in figures.values():
         assert "diverged at 3.3 s" in figure.texts[0].get_text()
         assert max(figure.axes[0].lines[0].get_xdata()) <= 3.3
@@ -230,7 +231,7 @@ def test_a_run_with_gaps_is_drawn(make_run):
     run = make_run(axes=2, inputs=1)
     run["estimate"][:, 0] = np.nan
     run["input"][100:] = np.inf
-    for figure in run_figures(run).values():
+    for figure in run_figures(Shown(run)).values():
         assert svg(figure)
 
 
@@ -264,7 +265,7 @@ def test_signals_of_a_law_in_body_axes_have_their_names(make_run):
     """Its estimate is along surge, sway, ..., while position and error are north, east, ..."""
     run = make_run()
     run["axis"].attrs["controller_axes"] = "surge, sway, heave, roll, pitch, yaw"
-    figures = run_figures(run)
+    figures = run_figures(Shown(run))
     shown = lambda name: [at for panel in figures[name].axes if (at := panel.get_title(loc="left"))]
     assert shown("estimate")[:3] == ["surge", "sway", "heave"] and shown("tracking")[:3] == ["north", "east", "down"]
 
@@ -272,7 +273,7 @@ def test_signals_of_a_law_in_body_axes_have_their_names(make_run):
 def test_results_without_names_have_numbers(make_run):
     run = make_run(axes=1, inputs=2)
     del run["actuator"].attrs["names"]
-    assert [panel.get_title(loc="left") for panel in run_figures(run)["effort"].axes] == ["input 1", "input 2"]
+    assert [panel.get_title(loc="left") for panel in run_figures(Shown(run))["effort"].axes] == ["input 1", "input 2"]
 
 
 @pytest.mark.parametrize(("unit", "label"), [("V", "\u00b5V"), ("N m", "\u00b5N m"), ("A^2", "$10^{-6}$ A^2")])
@@ -281,6 +282,6 @@ def test_small_values_have_a_prefix_or_their_power_of_ten_in_the_unit(make_run, 
     run = make_run(axes=1, inputs=1)
     run["input"] = (2e-5 * np.sin(run["time"]) + 0 * run["input"]).assign_attrs(units=unit)
     run["commanded_input"] = run["input"]
-    panel = run_figures(run)["effort"].axes[0]
+    panel = run_figures(Shown(run))["effort"].axes[0]
     assert panel.get_ylabel() == f"input, {label}"
     assert panel.yaxis.get_major_formatter()(-1e-5, 0) == "\u221210"

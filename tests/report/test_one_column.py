@@ -8,6 +8,7 @@ from undertow.paper.figures.fidelity import robust_fidelity_figure
 from undertow.report.figures import run_figures, save, style
 from undertow.report.figures.one_column import WIDTH, one_column
 from undertow.report.figures.writing import pdf
+from undertow.report.plotted import Shown
 
 pytestmark = pytest.mark.full
 
@@ -20,7 +21,7 @@ def boxes(figure):
 
 @pytest.mark.parametrize(("axes", "inputs", "name"), [(6, 2, "tracking"), (1, 8, "effort"), (1, 12, "effort")])
 def test_panels_stand_below_each_other_in_one_column(make_run, axes, inputs, name):
-    figure = run_figures(make_run(axes=axes, inputs=inputs))[name]
+    figure = run_figures(Shown(make_run(axes=axes, inputs=inputs)))[name]
     titles = [panel.get_title(loc="left") for panel in figure.axes]
     data = [line.get_ydata() for panel in figure.axes for line in panel.lines]
     figure = one_column(figure)
@@ -73,7 +74,7 @@ def test_only_an_axis_that_is_shared_is_labelled_once():
 
 
 def test_files_and_their_bytes(make_run, tmp_path):
-    figures = [run_figures(make_run(axes=1, inputs=1))["tracking"] for _ in range(3)]
+    figures = [run_figures(Shown(make_run(axes=1, inputs=1)))["tracking"] for _ in range(3)]
     save(figures[0], tmp_path, "none")
     save(figures[1], tmp_path, "wide", "wide")
     save(figures[2], tmp_path, "column", "one-column")

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from undertow.report.figures.run_files import plot_run
-from undertow.report.plotted import Plotted
+from undertow.report.plotted import Plotted, Shown
 from undertow.report.plotting import PlottingProcess, plotting_process
 from undertow.scenario.results.run_facts import facts_from
 
@@ -18,7 +18,7 @@ ELSEWHERE = """
 import pickle, sys
 from undertow.report.plotting import plotting_process
 with plotting_process() as plotting:
-    plotting.plot(*pickle.load(open(sys.argv[1], "rb")), "wide")
+    plotting.plot(pickle.load(open(sys.argv[1], "rb")), "wide")
     {meanwhile}
     found = plotting.plotted()
 pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
@@ -27,12 +27,12 @@ pickle.dump((found, "matplotlib" in sys.modules), open(sys.argv[2], "wb"))
 
 def shown(run):
     facts = facts_from(run.attrs)
-    return run, facts.faults, facts.certificate
+    return Shown(run, facts.faults, facts.certificate)
 
 
 @pytest.fixture(scope="module")
 def here(runs):
-    return plot_run(*shown(runs["rafc"]), "wide")
+    return plot_run(shown(runs["rafc"]), "wide")
 
 
 def elsewhere(run, folder, meanwhile="pass"):
@@ -65,7 +65,7 @@ def test_a_failed_figure_is_a_sentence(monkeypatch, runs):
     from undertow.report.figures import run_files
 
     monkeypatch.setattr(run_files, "run_plots", lambda *_: {"error": lambda: 1 / 0})
-    found = plot_run(*shown(runs["rafc"]))
+    found = plot_run(shown(runs["rafc"]))
     assert found.files == found.pictures == {} and found.failures[0].startswith("figure `error` could not be made (")
 
 
@@ -77,7 +77,7 @@ def test_files_are_written(tmp_path):
 def test_no_process_where_matplotlib_is_loaded(runs, here):
     with plotting_process() as plotting:
         assert plotting._process is None
-        plotting.plot(*shown(runs["rafc"]), "wide")
+        plotting.plot(shown(runs["rafc"]), "wide")
         assert plotting.plotted() == here
 
 

@@ -335,13 +335,17 @@ def _over_series(gathered: Gathered, time: Array, signals: Signals) -> tuple[Any
 # Metrics of the outputs: each comes for those in m, for those in rad (the short way round), or for all where they
 # share another unit. An rms per axis is the root of the mean square over the samples and over these axes.
 _OF_OUTPUTS = {
-    "error_rms": Metric("[axis]", "rms per axis of the tracking error x_d - x"),
-    "error_max": Metric("[axis]", "largest tracking error of any axis"),
-    "estimation_rms": Metric("[axis]/s^2", "rms per axis of d_hat - d"),
-    "uncertainty_rms": Metric("[axis]/s^2", "rms per axis of the uncertainty d = x_ddot - F - G u"),
-    "robust_rms": Metric("[axis]/s^2", "rms per axis of the robust term u_r"),
-    "model_rms": Metric("[axis]/s", "rms per axis of the modelling error x_hat_dot - x_dot"),
-    "weights_peak": Metric("[axis]/s^2", "largest |theta|, which shows parameter drift"),
+    "error_rms": Metric("[axis]", "rms per axis of the tracking error x_d - x", "{} error, rms per axis"),
+    "error_max": Metric("[axis]", "largest tracking error of any axis", "{} error, largest"),
+    "estimation_rms": Metric("[axis]/s^2", "rms per axis of d_hat - d", "load estimate error, {}, rms"),
+    "uncertainty_rms": Metric(
+        "[axis]/s^2", "rms per axis of the uncertainty d = x_ddot - F - G u", "load and model error, {}, rms"
+    ),
+    "robust_rms": Metric("[axis]/s^2", "rms per axis of the robust term u_r", "robust term, {}, rms"),
+    "model_rms": Metric(
+        "[axis]/s", "rms per axis of the modelling error x_hat_dot - x_dot", "modelling error, {}, rms"
+    ),
+    "weights_peak": Metric("[axis]/s^2", "largest |theta|, which shows parameter drift", "fuzzy weights, {}, largest"),
 }
 _TURN = "orientation_rms"
 _WHICH = {"position": "outputs in m", "attitude": "outputs in rad", _ALL: "outputs that share another unit"}
@@ -351,37 +355,55 @@ MEANINGS = {
     of_group(group, name): Metric(
         metric.unit.replace("[axis]", next((unit for unit, named in _GROUPS.items() if named == group), "[axis]")),
         f"{metric.meaning}; {_WHICH[group]}",
+        metric.name.format(group) if name.startswith("error_") or group != _ALL else metric.name.replace(", {}", ""),
     )
     for name, metric in _OF_OUTPUTS.items()
     for group in (*_GROUPS.values(), _ALL)
 } | {
-    _TURN: Metric("rad", "rms angle of the rotation between attitude and target, at any attitude"),
-    "input_rms": Metric("[input]", "rms of the applied input over all inputs"),
-    "input_peak": Metric("[input]", "largest applied input"),
-    "input_variation": Metric("[input]/s", "total variation of the input per second, mean over inputs (chattering)"),
+    _TURN: Metric(
+        "rad", "rms angle of the rotation between attitude and target, at any attitude", "orientation error, rms"
+    ),
+    "input_rms": Metric("[input]", "rms of the applied input over all inputs", "input, rms"),
+    "input_peak": Metric("[input]", "largest applied input", "input, largest"),
+    "input_variation": Metric(
+        "[input]/s", "total variation of the input per second, mean over inputs (chattering)", "input variation"
+    ),
     "energy": Metric(
         "J",
         "electrical energy supplied: energy_source of the energy ledger, or, without one, the power at the samples by "
         "the trapezium rule",
+        "energy",
     ),
     # Infinite if it never settles; not defined for a reference that moves until the end.
     "settling_time": Metric(
         "s",
         "time after which the reference rests and the error stays within 2 % of the step, at least for the last 10 % "
         "of the run",
+        "settling time",
     ),
-    "saturated_fraction": Metric("", "share of the time, mean over inputs, at which an input is saturated"),
-    "bad_readings": Metric("", "number of readings that were not finite, left out or replaced by expected values"),
+    "saturated_fraction": Metric(
+        "", "share of the time, mean over inputs, at which an input is saturated", "time at the input limits"
+    ),
+    "bad_readings": Metric(
+        "", "number of readings that were not finite, left out or replaced by expected values", "bad readings"
+    ),
     "nees": Metric(
         "",
         "normalised estimation error squared of position, velocity and attitude, mean; 9 where the errors of the "
         "navigation filter are as large as it says",
+        "consistency of the filter (NEES)",
     ),
     "energy_balance_residual": Metric(
-        "", "residual of the energy balance as a share of the energy supplied, due to rounding"
+        "",
+        "residual of the energy balance as a share of the energy supplied, due to rounding",
+        "energy balance, residual",
     ),
-    "energy_integration_residual": Metric("", "the same residual computed from the state, due to the integrator"),
-    "rules": Metric("", "fuzzy rules per axis"),
+    "energy_integration_residual": Metric(
+        "",
+        "the same residual computed from the state, due to the integrator",
+        "energy balance from the state, residual",
+    ),
+    "rules": Metric("", "fuzzy rules per axis", "fuzzy rules per axis"),
 }
 
 # Metric -> the same of each output, in its own unit.
@@ -415,7 +437,7 @@ def meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] = ()) -> d
                 raise BadInput("metrics", "have names of their own", f"a second `{name}`")
             metrics[name] = meaning
     unit = lambda metric: Signal((), metric.unit, "").unit_for(plant.output_units, plant.input_unit)
-    return {name: Metric(unit(metric), metric.meaning) for name, metric in metrics.items()}
+    return {name: metric._replace(unit=unit(metric)) for name, metric in metrics.items()}
 
 
 def gathered_meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] = ()) -> dict[str, Metric]:
@@ -424,6 +446,5 @@ def gathered_meanings(loop: ClosedLoop, user_metrics: Sequence[AbstractMetric] =
 
 
 def titled_name(metric: str) -> str:
-    """A metric as words of a heading, which say that the rms of several axes is per axis."""
-    of_outputs = metric in PER_AXIS and metric.endswith("_rms")
-    return metric.replace("_", " ") + (" per axis" if of_outputs else "")
+    """A metric in a few words, for headings; its key with spaces where it is not one of undertow's."""
+    return MEANINGS[metric].name if metric in MEANINGS else metric.replace("_", " ")

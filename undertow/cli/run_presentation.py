@@ -49,11 +49,24 @@ class PredictedMetrics(NamedTuple):
     foregone: bool = False  # known before anything was linearised
 
 
+class RequestedPrediction(NamedTuple):
+    """The prediction beside a run.
+
+    Attributes:
+        coming: predicts the metrics; None for no prediction.
+        requested: whether the user asked for it: the reason is printed as well where there can be none.
+        details: whether its table is printed.
+    """
+
+    coming: Future[PredictedMetrics] | None
+    requested: bool
+    details: bool
+
+
 def write_outputs(
     result: ScenarioResult,
     plotting: PlottingProcess,
-    predicting: Future[PredictedMetrics] | None,
-    requested: bool,
+    prediction: RequestedPrediction,
     draft: Draft,
     folder: Path,
     console: Console,
@@ -63,8 +76,7 @@ def write_outputs(
     Args:
         result: of the run.
         plotting: plots its figures.
-        predicting: predicts its metrics; None for no prediction.
-        requested: whether the user asked for it: the reason is printed as well where there can be none.
+        prediction: of its metrics.
         draft: of the results.
         folder: of the results, as the user knows it.
         console: for what is printed.
@@ -79,15 +91,15 @@ def write_outputs(
         write_run_page(page, result, looks)
     draft.publish()  # nobody waits for the prediction, which is added to the page
     console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
-    if predicting is not None:
-        _add_prediction(result, predicting, requested, draft, looks, console)
+    if prediction.coming is not None:
+        _add_prediction(result, prediction.coming, prediction, draft, looks, console)
     return looks.replay
 
 
 def _add_prediction(
     result: ScenarioResult,
     predicting: Future[PredictedMetrics],
-    requested: bool,
+    asked: RequestedPrediction,
     draft: Draft,
     looks: RunPageContents,
     console: Console,
@@ -100,8 +112,8 @@ def _add_prediction(
     if predicted.metrics is not None:
         write_run_page(draft.path / "run.html", result, looks, predicted.metrics)
     draft.publish()
-    if requested or not foregone:
-        _print_prediction(predicted, result, console)
+    if asked.requested or not foregone:
+        _print_prediction(predicted, asked.details, result, console)
 
 
 def _written(result: ScenarioResult, plotting: PlottingProcess, draft: Draft) -> Plotted:
@@ -164,8 +176,8 @@ def _because(result: ScenarioResult, steady: Mapping[str, Any]) -> str:
     return ". Nonlinear effects matter here: large motions, dead zones, or motors far from their mean speed"
 
 
-def _print_prediction(predicted: PredictedMetrics, result: ScenarioResult, console: Console) -> None:
-    if predicted.metrics and result.steady:
+def _print_prediction(predicted: PredictedMetrics, details: bool, result: ScenarioResult, console: Console) -> None:
+    if details and predicted.metrics and result.steady:
         meanings = result.facts.meanings
         metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.name in meanings]
         console.print(terminal_table(prediction_rows(metrics, result.built.window(), meanings)))

@@ -11,16 +11,18 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.options.simulate import SimulateCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.run_presentation import predict, write_outputs
+from undertow.cli.run_presentation import RequestedPrediction, predict, write_outputs
 from undertow.cli.stages import stage
 from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
 from undertow.outside.rerun_file import check_rerun, write_rerun
+from undertow.report.answer import answer_of
 from undertow.report.plotting import plotting_process
+from undertow.report.run_page import shown_of
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
 from undertow.report.signal_names import lost_thrusters
-from undertow.scenario.build import build, own_parts
+from undertow.scenario.build import Built, build, own_parts
 from undertow.scenario.checks.flow_stability import flow_advice
 from undertow.scenario.checks.vehicle_lint import vehicle_advice
 from undertow.scenario.reading import read
@@ -48,38 +50,58 @@ def simulate(command: SimulateCommand) -> int:
     ):
         if rerun is not None:
             check_rerun(rerun, folder, command.overwrite)
-        result = _run(scenario, console, command.allow_code)
-        plotting.plot(result.series, result.facts.faults, result.facts.certificate, command.pdf)
-        _print_tables(result, console)
-        write(result, draft.path)
-        repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
-        draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-        predicting = None if command.prediction is False else thread.submit(predict, result)
-        _print_ending(result, folder, console)
-        code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
-        replay = write_outputs(result, plotting, predicting, bool(command.prediction), draft, folder, console)
+        built, advised = _built(scenario, console, command.allow_code)
+        try:
+            with stage(console, "compiling and running"):
+                result = interruptible(lambda: run_scenario(built))
+            plotting.plot(shown_of(result), command.pdf)
+            if command.details:
+                _print_tables(result, console)
+            _print_answer(result, console)
+            write(result, draft.path)
+            repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
+            draft.publish()  # the results first: prediction, figures and page take longer, and may fail
+            predicting = None if command.prediction is False else thread.submit(predict, result)
+            console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
+            code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
+            shown = RequestedPrediction(predicting, bool(command.prediction), command.details)
+            replay = write_outputs(result, plotting, shown, draft, folder, console)
+            more = "" if command.details else "; --details prints all numbers"
+            hint = f"Next: undertow analyze {scenario} shows the margins of the gains{more}."
+            console.print(hint, highlight=False, soft_wrap=True)
+            advised += _advice_of(result)
+        finally:  # at the end, where people look, also where the run failed
+            for sentence in advised:
+                typer.echo(f"Advice: {sentence}", err=True)
     if rerun is not None:
         write_rerun(log_of_run(result.dataset), rerun, None if replay is None else replay.size)
     return code
 
 
-def _run(path: Path, console: Console, allow_code: bool) -> ScenarioResult:
+def _built(path: Path, console: Console, allow_code: bool) -> tuple[Built, list[str]]:
+    """The scenario, and what is to be said of it."""
     with stage(console, "reading"):
         text = read(path, allow_code=allow_code)
     with stage(console, "building"):
         built = build(text)
-    for advice in (*built.advice(), *vehicle_advice(built), *flow_advice(built)):
-        typer.echo(f"Advice: {advice.sentence}", err=True)
-    with stage(console, "compiling and running"):
-        return interruptible(lambda: run_scenario(built))
+    return built, [advice.sentence for advice in (*built.advice(), *vehicle_advice(built), *flow_advice(built))]
+
+
+def _print_answer(result: ScenarioResult, console: Console) -> None:
+    """Print how the run ended, and whether it went well."""
+    answer = answer_of(result)
+    for line in (answer.verdict, *answer.lines):
+        console.print(line, highlight=False, soft_wrap=True)
+    for name, verdict in result.facts.requirements.items():
+        outcome = "holds" if verdict.holds else "is violated"
+        console.print(
+            f"Requirement {name} {outcome}: robustness {verdict.robustness:.4g}.", highlight=False, soft_wrap=True
+        )
 
 
 def _print_tables(result: ScenarioResult, console: Console) -> None:
-    """Print metrics and certificate, which nobody waits for until files are written."""
+    """Print metrics and certificate."""
     facts, window = result.facts, result.facts.window
-    if facts.left_to_xla:
-        why = facts.left_to_xla
-        typer.echo(f"Advice: the run used backend xla instead of simd (docs/explanation/simd.md): {why}.", err=True)
     console.print(terminal_table(metrics_rows(facts.steady, facts.whole, window, facts.meanings)))
     if facts.certificate is not None:
         console.print(terminal_table(certificate_rows(facts.certificate, window)))
@@ -87,23 +109,17 @@ def _print_tables(result: ScenarioResult, console: Console) -> None:
         console.print(terminal_table(transition_rows(facts.transitions, lost_thrusters(result.series))))
 
 
-def _print_ending(result: ScenarioResult, folder: Path, console: Console) -> None:
-    """Print how the run ended, and where its results are."""
+def _advice_of(result: ScenarioResult) -> list[str]:
+    """What is to be said of a run beside its answer."""
     facts = result.facts
-    for finding in (facts.navigation or {"findings": ()})["findings"]:
-        typer.echo(f"Advice: {finding}.", err=True)
-    verdict = f"; {facts.success.sentence(facts.meanings)}" if facts.success else ""
-    console.print(f"Status: {result.status.word}{verdict}. Results: {folder}", highlight=False, soft_wrap=True)
-    for name, verdict in facts.requirements.items():
-        outcome = "holds" if verdict.holds else "is violated"
-        console.print(
-            f"Requirement {name} {outcome}: robustness {verdict.robustness:.4g}", highlight=False, soft_wrap=True
-        )
+    advised = [f"{finding}." for finding in (facts.navigation or {"findings": ()})["findings"]]
+    if facts.left_to_xla:
+        why = facts.left_to_xla
+        advised.append(f"the run used backend xla instead of simd (docs/explanation/simd.md): {why}.")
     controller = own_parts(result.built.scenario, result.built.text.folder).get("controller")
-    if controller and (result.status is not Status.OK or (result.success and not result.success.within)):
-        typer.echo(
-            f"Advice: for mistakes in the controller, such as a wrong sign: undertow check {controller}", err=True
-        )
+    if controller and answer_of(result).good is False:
+        advised.append(f"for mistakes in the controller, such as a wrong sign: undertow check {controller}")
+    return advised
 
 
 def _ending_code(result: ScenarioResult) -> int:

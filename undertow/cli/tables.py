@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from undertow.report.run_tables import RunTable, plain
+from undertow.report.run_tables import WORDS, RunTable, plain
 
 
 def titled(title: str, *columns: str | Column) -> Table:
@@ -22,7 +22,7 @@ def numbers(title: str) -> Column:
 def terminal_table(rows: RunTable) -> Table:
     """A table of a run: names on the left, numbers set to the right, units and sentences as they are."""
     first, *further_heads = rows.head
-    table = titled(rows.title, first, *(title if title == "unit" else numbers(title) for title in further_heads))
+    table = titled(rows.title, first, *(title if title in WORDS else numbers(title) for title in further_heads))
     for row in rows.rows:
         table.add_row(*map(plain, row))
     if rows.sentences:

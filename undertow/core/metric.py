@@ -8,10 +8,21 @@ from jaxtyping import Array, Float, PyTree
 
 
 class Metric(NamedTuple):
-    """One metric: its unit, with `[input]` for that of the plant's inputs and `` for none, and what it means."""
+    """What is known of a metric beside its key.
+
+    Attributes:
+        unit: with `[input]` for that of the plant's inputs, and `` for none.
+        meaning: in a sentence.
+        name: in a few words, for tables; the key is shown where there is none.
+    """
 
     unit: str
     meaning: str
+    name: str = ""
+
+    def named(self, key: str) -> str:
+        """Its name, or its key with spaces."""
+        return self.name or key.replace("_", " ")
 
 
 class AbstractMetric(eqx.Module):

@@ -101,6 +101,11 @@ def section(identity: str, title: str, *content: Any) -> Html:
     return tag("section", tag("h2", title), *content, id=identity)
 
 
+def folded(identity: str, title: str, *content: Any) -> Html:
+    """A section that opens on demand."""
+    return tag("details", tag("summary", tag("h2", title)), *content, id=identity, class_="folded")
+
+
 def document(title: str, *content: Any, looks: str = "") -> str:
     """The whole page as text; `looks` are style sheets of its own."""
     looks = files("undertow.report").joinpath("page.css").read_text(encoding="utf-8") + looks

@@ -1,8 +1,28 @@
-"""Figures of a run as they are written and shown."""
+"""Figures of a run: what they show, and how they are written."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+
+class Shown(NamedTuple):
+    """What the figures of a run show. It takes little to send it to another process, which needs no JAX for it.
+
+    Attributes:
+        series: recorded ones.
+        faults: entries of the scenario.
+        certificate: with the bound of the weights; None where it is not known.
+        criterion: what success is judged by: metric -> what it must stay below.
+        supply: largest input, V; None where it is not known.
+    """
+
+    series: xr.Dataset
+    faults: Sequence[Mapping[str, Any]] = ()
+    certificate: Mapping[str, Any] | None = None
+    criterion: Mapping[str, float] = {}
+    supply: float | None = None
 
 
 class Plotted(NamedTuple):

@@ -1,16 +1,18 @@
-"""The page of one run: status, replay, metrics, certificate, figures and scenario, in one file that opens anywhere."""
+"""The page of one run: the answer, one picture, the replay, and details folded away; one file that opens anywhere."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from undertow.core.atomic_io import write_whole
+from undertow.report.answer import Answer, answer_of
 from undertow.report.formats import number, prose
-from undertow.report.page import Html, bullets, document, figure, join, section, table, tag, text
-from undertow.report.plotted import Plotted
+from undertow.report.page import Html, bullets, document, figure, folded, join, section, table, tag, text
+from undertow.report.plotted import Plotted, Shown
 from undertow.report.replay.replay_data import ReplayData, replay_of
 from undertow.report.replay.replay_section import not_made, replay_looks, replay_section
 from undertow.report.run_tables import (
+    WORDS,
     RunTable,
     certificate_rows,
     fault_rows,
@@ -27,8 +29,9 @@ from undertow.scenario.results.run_result import RunRecord, RunResult
 _DIGITS = 4
 
 _CAPTIONS = {
+    "summary": "The path on a map, the error (rms of the axes) beside its limit, and the largest input.",
     "tracking": "Desired and actual outputs.",
-    "error": "Size of the tracking error on a logarithmic scale; for attitude, of the difference of the angles.",
+    "error": "Size of the tracking error; for attitude, of the difference of the angles.",
     "estimate": "Lumped uncertainty, measured from the true acceleration (grey), and the controller's estimate of it.",
     "effort": "Commanded input, and the input that was applied within the limits.",
     "certificate": "Lyapunov function of the stability proof and its rate along the run, and the fuzzy weights.",
@@ -42,6 +45,13 @@ class RunPageContents(NamedTuple):
     figures: Mapping[str, str | bytes]
     replay: ReplayData | None
     failures: list[str]  # a sentence for each part that could not be made
+
+
+def shown_of(run: RunRecord) -> Shown:
+    """What the figures of a run show."""
+    facts = run.facts
+    criterion = {} if facts.success is None else facts.success.criterion
+    return Shown(run.series, list(facts.faults), facts.certificate, criterion, facts.supply)
 
 
 def page_contents(result: RunResult, plotted: Callable[[], Plotted]) -> RunPageContents:
@@ -83,41 +93,62 @@ def _page(
     run: RunRecord, figures: Mapping[str, str | bytes], replay: Html, predicted: Mapping[str, float] | None
 ) -> str:
     facts = run.facts
-    measured = metrics_rows(facts.steady, facts.whole, facts.window, facts.meanings, predicted)
-    certificate = facts.certificate
-    sections = [replay, section("metrics", measured.title, _table(measured), _meanings(measured))]
-    if facts.faults:
-        sections.append(section("faults", "Faults", _table(fault_rows(facts.faults, input_names(run.series)))))
-    if facts.transitions is not None:
-        supervision = transition_rows(facts.transitions, lost_thrusters(run.series))
-        sentences = [tag("p", prose(sentence)) for sentence in supervision.sentences]
-        sections.append(section("supervision", supervision.title, _table(supervision), *sentences))
-    if facts.navigation is not None:
-        navigation = navigation_rows(facts.navigation)
-        sentences = [tag("p", prose(sentence)) for sentence in navigation.sentences]
-        sections.append(section("navigation", navigation.title, _table(navigation), *sentences))
-    if certificate is not None:
-        hypotheses = certificate_rows(certificate, facts.window)
-        sentences = [tag("p", prose(sentence)) for sentence in hypotheses.sentences]
-        sections.append(section("certificate", hypotheses.title, _table(hypotheses), *sentences))
-        if "memory" in certificate:
-            memory = memory_rows(certificate)
-            sentences = [tag("p", prose(sentence)) for sentence in memory.sentences]
-            sections.append(section("memory", memory.title, _table(memory), *sentences))
-    plotted = [
-        figure(picture, name, _CAPTIONS.get(name, name), prose(_CAPTIONS.get(name, name)))
-        for name, picture in figures.items()
-    ]
-    if plotted:
-        sections.append(section("figures", "Figures", *plotted))
+    plotted = {name: _figure(picture, name) for name, picture in figures.items()}
+    first = plotted.pop("summary", Html(""))
     return document(
         facts.title,
         tag("h1", prose(facts.title)),
-        tag("p", prose(_status(facts)), class_="lead"),
-        *sections,
-        section("configuration", "Configuration", *_configuration(facts)),
+        answer_block(answer_of(run)),
+        first,
+        replay,
+        *_what_happened(run),
+        *_details(run, predicted),
+        folded("figures", "More figures", *plotted.values()) if plotted else "",
+        folded("configuration", "Configuration", *_configuration(facts)),
         looks=replay_looks() if replay else "",
     )
+
+
+def answer_block(answer: Answer) -> Html:
+    """The answer, with a colour that says whether it went well."""
+    looks = {True: "holds", False: "fails", None: "open"}[answer.good]
+    lines = bullets([prose(line) for line in answer.lines])
+    return tag("div", tag("p", tag("strong", prose(answer.verdict))), lines, class_=f"answer {looks}")
+
+
+def _figure(picture: str | bytes, name: str) -> Html:
+    caption = _CAPTIONS.get(name, name)
+    return figure(picture, name, caption, prose(caption))
+
+
+def _what_happened(run: RunRecord) -> Iterator[Html]:
+    """Faults, and what the supervisor did."""
+    facts = run.facts
+    if facts.faults:
+        yield section("faults", "Faults", _table(fault_rows(facts.faults, input_names(run.series))))
+    if facts.transitions is not None:
+        supervision = transition_rows(facts.transitions, lost_thrusters(run.series))
+        yield section("supervision", supervision.title, *_with_sentences(supervision))
+
+
+def _details(run: RunRecord, predicted: Mapping[str, float] | None) -> Iterator[Html]:
+    """All numbers, which open on demand."""
+    facts, certificate = run.facts, run.facts.certificate
+    measured = metrics_rows(facts.steady, facts.whole, facts.window, facts.meanings, predicted)
+    yield folded("metrics", "All metrics", _table(measured), _meanings(measured))
+    if facts.navigation is not None:
+        navigation = navigation_rows(facts.navigation)
+        yield folded("navigation", navigation.title, *_with_sentences(navigation))
+    if certificate is not None:
+        hypotheses = certificate_rows(certificate, facts.window)
+        yield folded("certificate", hypotheses.title, *_with_sentences(hypotheses))
+        if "memory" in certificate:
+            memory = memory_rows(certificate)
+            yield folded("memory", memory.title, *_with_sentences(memory))
+
+
+def _with_sentences(rows: RunTable) -> list[Html]:
+    return [_table(rows), *(tag("p", prose(sentence)) for sentence in rows.sentences)]
 
 
 def _table(rows: RunTable) -> Html:
@@ -126,7 +157,7 @@ def _table(rows: RunTable) -> Html:
     named = lambda name: _explained(name, rows.meanings[name]) if name in rows.meanings else prose(name)
     columns = sorted(range(len(rows.head)), key=lambda column: (column > 0, rows.head[column] != "unit"))
     cells = [[named(row[i]) if not i else formatted(row[i]) for i in columns] for row in rows.rows]
-    numeric = [column for column, i in enumerate(columns) if i and rows.head[i] != "unit"]
+    numeric = [column for column, i in enumerate(columns) if i and rows.head[i] not in WORDS]
     return table([prose(rows.head[i]) for i in columns], cells, numeric=numeric)
 
 
@@ -139,15 +170,6 @@ def _meanings(rows: RunTable) -> Html:
     """The meanings of the metrics as a list that opens, for screens without a pointer."""
     listed = bullets([join(tag("code", name), ": ", prose(meaning)) for name, meaning in rows.meanings.items()])
     return tag("details", tag("summary", "What the metrics mean"), listed)
-
-
-def _status(facts: RunFacts) -> str:
-    """How the run ended, and whether control succeeded."""
-    ending = f"Status: {facts.status.word.replace('_', ' ')} at {facts.ended:.4g} s. {facts.sentence}"
-    if facts.success is None:
-        return ending
-    verdict = facts.success.sentence(facts.meanings)
-    return f"{ending} {verdict[:1].upper()}{verdict[1:]}."
 
 
 def _configuration(facts: RunFacts) -> Sequence[Html]:

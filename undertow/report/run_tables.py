@@ -21,6 +21,9 @@ _NOTHING_FOUND = (
 )
 
 
+WORDS = ("unit", "key")  # columns that are no numbers
+
+
 class RunTable(NamedTuple):
     """A table: title, column titles, rows of words and of numbers to be formatted, and sentences below it."""
 
@@ -45,9 +48,11 @@ def metrics_rows(
             displayed = lambda values, name=name, metric=metric: _measured(values[name], metric.unit)
             predicted_cell = [displayed(predicted) if name in predicted else ""] if predicted else []
             steady_cell = displayed(steady) if steady and name in steady else "-"
-            rows.append((name, *predicted_cell, steady_cell, displayed(whole_run), display_units(0.0, metric.unit)[1]))
-    head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit")
-    return RunTable("Metrics", head, rows, meanings={name: metrics[name].meaning for name, *_ in rows})
+            cells = *predicted_cell, steady_cell, displayed(whole_run), display_units(0.0, metric.unit)[1]
+            rows.append((metric.named(name), *cells, name))
+    head = ("metric", *(("predicted",) if predicted else ()), _span(window), "whole run", "unit", "key")
+    meanings = {metric.named(name): metric.meaning for name, metric in metrics.items() if name in whole_run}
+    return RunTable("Metrics", head, rows, meanings=meanings)
 
 
 def prediction_rows(
@@ -59,7 +64,8 @@ def prediction_rows(
         unit = metrics[comparison.name].unit
         cells = (_measured(value, unit) for value in (comparison.predicted, comparison.measured))
         departure = "-" if isinf(comparison.departure) else f"{100 * comparison.departure:.0f} %"
-        rows.append((comparison.name, *cells, departure, display_units(0.0, unit)[1]))
+        name = metrics[comparison.name].named(comparison.name)
+        rows.append((name, *cells, departure, display_units(0.0, unit)[1]))
     return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
 
 

@@ -41,6 +41,8 @@ Replay = Annotated[
     ),
 ]
 
+Details = Annotated[bool, typer.Option("--details", help="Also print the tables, which files and page hold as well.")]
+
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result in DIR.")]
 
 Resume = Annotated[

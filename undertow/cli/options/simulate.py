@@ -7,14 +7,15 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, ScenarioFile
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, ScenarioFile
 
 
 @dataclasses.dataclass(frozen=True)
 class SimulateCommand(Command):
     """Simulate one scenario.
 
-    The command writes run.nc, metrics.json, scenario.yaml, run.mcap, figures/ and run.html when the run has ended.
+    The command says whether the run went well, and by what, and writes run.nc, metrics.json, scenario.yaml, run.mcap,
+    figures/ and run.html when the run has ended.
     run.mcap holds the series for Foxglove and other viewers. run.html holds metrics, figures and a replay in three
     dimensions, and needs no network. If SCENARIO is a result file, its run is repeated, and the command reports whether
     the results are identical bit for bit. Other files in DIR are not changed.
@@ -30,6 +31,7 @@ class SimulateCommand(Command):
         ),
     ] = None
     overwrite: Overwrite = False
+    details: Details = False
     prediction: Annotated[
         bool | None,
         typer.Option(

@@ -19,15 +19,28 @@ _PREFIXABLE = re.compile(r"(m|rad|s|V|A|N|W|J)(?![\w^$])")
 Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
 
-def fit_linear(panel: Axes, series: Named, start: float) -> None:
-    """Fit to the values after `start`, s; earlier values outside the panel are noted above it."""
+def fit_linear(panel: Axes, series: Named, start: float, least: float = 0.0) -> None:
+    """Fit to the values after `start`, s; earlier values outside the panel are noted above it.
+
+    The axis spans at least `least`, so that what is of no account does not fill the panel.
+    """
     late_values = _finite([values[time >= start] for _, time, values in series])
     if not late_values.size:
         return
     low, high = float(late_values.min()), float(late_values.max())
     margin = 0.08 * (high - low) or 0.08 * max(abs(high), 1e-12)
-    low -= margin
-    high += margin
+    margin = max(margin, (least - (high - low)) / 2)
+    _fit(panel, series, start, low - margin, high + margin)
+
+
+def fit_from_zero(panel: Axes, series: Named, start: float, least: float) -> None:
+    """Fit sizes after `start`, s, from zero up to at least `least`; earlier ones outside are noted above the panel."""
+    late_values = _finite([values[time >= start] for _, time, values in series])
+    if late_values.size:
+        _fit(panel, series, start, 0.0, max(1.08 * float(late_values.max()), least) or 1.0)
+
+
+def _fit(panel: Axes, series: Named, start: float, low: float, high: float) -> None:
     panel.set_ylim(low, high)
     _shorten(panel)
     beyond = {}
@@ -36,7 +49,7 @@ def fit_linear(panel: Axes, series: Named, start: float) -> None:
         if outside.size and outside.max() > 0:
             beyond[name] = plain(values[outside.argmax()])
     if beyond:
-        peak_words = [f"{name} to {value}" for name, value in beyond.items()]
+        peak_words = [f"{name} to {value}".lstrip() for name, value in beyond.items()]
         peaks = set(beyond.values())
         if len(beyond) == len(series) and len(peaks) == 1:  # all the same, in few words beside the name of the panel
             peak_words = [f"to {peaks.pop()}"]
@@ -56,9 +69,9 @@ def _shorten(panel: Axes) -> None:
     panel.yaxis.set_major_formatter(lambda value, _: f"{value / 10.0**power:.4g}".replace("-", "\u2212"))
 
 
-def fit_log(panel: Axes, series: Named, start: float) -> None:
+def fit_log(panel: Axes, series: Named, start: float = 0.0, least: float = 0.0) -> None:
     """Logarithmic scale; its bottom leaves out the dips at zero crossings."""
-    del start
+    del start, least
     sizes = _finite([values for _, _, values in series])
     sizes = sizes[sizes > 0]
     if sizes.size:  # nothing positive has no logarithm
@@ -67,9 +80,9 @@ def fit_log(panel: Axes, series: Named, start: float) -> None:
         panel.set_ylim(float(np.quantile(sizes, 0.02)) / 2, 2 * float(sizes.max()))
 
 
-def fit_symmetric(panel: Axes, series: Named, start: float) -> None:
+def fit_symmetric(panel: Axes, series: Named, start: float = 0.0, least: float = 0.0) -> None:
     """Linear about zero, logarithmic outside, for runs that diverged."""
-    del start
+    del start, least
     early_peak = max(early_size(time, values) for _, time, values in series)
     panel.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(max(early_peak, 1e-12))))
     sizes = np.abs(_finite([values for _, _, values in series]))

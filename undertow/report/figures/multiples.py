@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.report.figures import style
-from undertow.report.figures.limits import fit_linear, fit_log, fit_symmetric
+from undertow.report.figures.limits import fit_from_zero, fit_linear, fit_log, fit_symmetric
 
 WIDTH = 9.6  # in
 # Share of a panel that the word of a mark takes, and what hides the curves behind it.
@@ -42,7 +42,8 @@ class Block(NamedTuple):
     quantities: Sequence[str]  # y label per column, with unit
     height: float = 1.15  # in
     width: float = 1.0  # share, where blocks stand beside each other
-    scale: str = "linear"  # or log, symlog
+    scale: str = "linear"  # or log, symlog, zero: linear from zero
+    spans: Sequence[float] = ()  # least span of the y axis, per column; none by default
     window: tuple[float, float] | None = None  # s; the whole record by default
     limits_from: float = 0.0  # s; the y axis fits the values after this time
     titled: bool = False  # whether the panel shows the name of the column
@@ -87,7 +88,9 @@ def _plot(panel: Axes, block: Block, column: int) -> None:
         values = np.where(np.isfinite(curve.values[:, column]), curve.values[:, column], np.nan)
         panel.plot(curve.time, values, **curve.look.line, label=curve.name)
     series = [(curve.name, curve.time, curve.values[:, column]) for curve in curves_in_window]
-    {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric}[block.scale](panel, series, block.limits_from)
+    least = block.spans[column] if block.spans else 0.0
+    fits = {"linear": fit_linear, "log": fit_log, "symlog": fit_symmetric, "zero": fit_from_zero}
+    fits[block.scale](panel, series, block.limits_from, least)
     ends = [curve.time[[0, -1]] for curve in curves_in_window if len(curve.time)]
     if ends and np.ptp(ends) > 0:
         panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))

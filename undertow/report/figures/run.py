@@ -1,7 +1,6 @@
 """Figures of a single run, with any number of outputs and inputs, completed or not."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
@@ -12,31 +11,31 @@ from undertow.report.figures.certificate import certificate_figure, weights_boun
 from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
+from undertow.report.figures.summary import summary
+from undertow.report.plotted import Shown
 from undertow.report.signal_names import axis_names, controller_axis_names, input_names
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2
 
+# Least span of an axis, by its unit: what is smaller is of no account to a vehicle.
+_FLOORS = {"m": 0.01, "deg": 1.0, "m/s": 0.01, "rad/s": 0.01}
 
-def run_figures(
-    run: xr.Dataset, faults: Sequence[Mapping[str, Any]] = (), certificate: Mapping[str, Any] | None = None
-) -> dict[str, Figure]:
-    """Figures `tracking`, `error`, `estimate` and `effort` of one run.
+
+def run_figures(shown: Shown) -> dict[str, Figure]:
+    """Figures `summary`, `tracking`, `error`, `estimate` and `effort` of one run.
 
     A controller with a certificate adds `certificate`, a measurement with errors adds `measurement`. Faults are marked.
 
     Args:
-        run: recorded series.
-        faults: entries of the scenario.
-        certificate: of the run, with the bound of its weights; None where it is not known.
+        shown: what they show.
     """
-    return {name: make() for name, make in run_plots(run, faults, certificate).items()}
+    return {name: make() for name, make in run_plots(shown).items()}
 
 
-def run_plots(
-    run: xr.Dataset, faults: Sequence[Mapping[str, Any]] = (), certificate: Mapping[str, Any] | None = None
-) -> dict[str, Callable[[], Figure]]:
+def run_plots(shown: Shown) -> dict[str, Callable[[], Figure]]:
     """Functions that make the figures of a run, by name; see `run_figures`."""
+    run = shown.series
     outputs = axis_names(run)
     inputs = input_names(run)
     run_in_degrees = recorded.in_degrees(run)
@@ -53,15 +52,18 @@ def run_plots(
     errors = recorded.per_axis(run_in_degrees, "|error|")
     rates = recorded.per_axis(run, "uncertainty", "/s^2")
     levels = recorded.per_input(run, "input")
-    marks = fault_marks(run, faults)
+    marks = fault_marks(run, shown.faults)
 
     def plot(what: str, names: list[str], blocks: Callable[[], list[Block]]) -> Callable[[], Figure]:
         marked = lambda: [block._replace(marks=marks) for block in blocks()]
         return lambda: small_multiples(_titled(run, what), names, marked(), _columns(len(names)))
 
     figures = {
+        "summary": lambda: summary(shown, _titled(run, "Path, error and effort")),
         "tracking": plot("Tracking", outputs, lambda: [_block(run, [desired, actual], places, 0.0)]),
-        "error": plot("Tracking error", outputs, lambda: [Block([error], errors, 1.4, scale="log", titled=True)]),
+        "error": plot(
+            "Tracking error", outputs, lambda: [_block(run, [error], errors, recorded.settled(run), scale="zero")]
+        ),
         "estimate": plot(
             "Lumped uncertainty and its estimate",
             controller_axis_names(run),
@@ -70,7 +72,7 @@ def run_plots(
         "effort": plot("Inputs", inputs, lambda: [_block(run, [commanded, applied], levels, recorded.settled(run))]),
     }
     if "lyapunov" in run:
-        bound = weights_bound(certificate)
+        bound = weights_bound(shown.certificate)
         figures["certificate"] = lambda: certificate_figure(run, _titled(run, "Certificate"), bound)
     if (run["measured_position"] == run["position"]).all() and (run["measured_velocity"] == run["velocity"]).all():
         return figures
@@ -92,13 +94,28 @@ def _apart(run: xr.Dataset) -> list[Block]:
     ]
 
 
-def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float) -> Block:
+def _block(run: xr.Dataset, curves: list[Curve], quantities: list[str], start: float, scale: str = "linear") -> Block:
     failed = run.attrs.get("status", "completed") != "completed"
     peaks = [np.nanmax(np.abs(curve.values), initial=0.0) for curve in curves]
     early_peaks = [early_size(curve.time, curve.values) for curve in curves]
     runaway = failed and max(peaks) > _RUNAWAY * max(early_peaks)
-    scale = "symlog" if runaway else "linear"
-    return Block(curves, quantities, 1.4, scale=scale, limits_from=0.0 if failed else start, titled=True)
+    start = 0.0 if failed else start
+    spans = _spans(curves, quantities, start)
+    scale = "symlog" if runaway else scale
+    return Block(curves, quantities, 1.4, scale=scale, spans=spans, limits_from=start, titled=True)
+
+
+def _spans(curves: list[Curve], quantities: list[str], start: float) -> list[float]:
+    """Least span of the axis of each column: that of the widest one of its quantity, and what matters to a vehicle."""
+    late = [curve.values[curve.time >= start] for curve in curves]
+    widths = np.max([np.nanmax(values, 0, initial=-np.inf) for values in late], 0) - np.min(
+        [np.nanmin(values, 0, initial=np.inf) for values in late], 0
+    )
+    widest: dict[str, float] = {}
+    for quantity, width in zip(quantities, widths, strict=True):
+        floor = _FLOORS.get(quantity.rpartition(", ")[2], 0.0)
+        widest[quantity] = max(widest.get(quantity, floor), float(width) if np.isfinite(width) else 0.0)
+    return [widest[quantity] for quantity in quantities]
 
 
 def _titled(run: xr.Dataset, what: str) -> str:

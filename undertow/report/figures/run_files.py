@@ -1,27 +1,17 @@
 """Figures of one run: their files, which its page shows as well."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import xarray as xr
 from matplotlib.figure import Figure
 
 from undertow.report.figures.run import run_plots
 from undertow.report.figures.writing import make_all, pdf, small_png
-from undertow.report.plotted import Plotted
+from undertow.report.plotted import Plotted, Shown
 
 
-def plot_run(
-    series: xr.Dataset,
-    faults: Sequence[Mapping[str, Any]],
-    certificate: Mapping[str, Any] | None,
-    width: str | None = None,
-) -> Plotted:
+def plot_run(shown: Shown, width: str | None = None) -> Plotted:
     """Figures of a run, each plotted once. A failed figure affects neither the others nor the results.
 
     Args:
-        series: recorded ones.
-        faults, certificate: as of `run_figures`.
+        shown: what they show.
         width: of PDF files; None for none.
     """
     files: dict[str, bytes] = {}
@@ -33,5 +23,5 @@ def plot_run(
         pictures[name] = picture
         files.update({f"{name}.png": picture} | document)
 
-    failures = make_all(lambda: run_plots(series, faults, certificate), put)
+    failures = make_all(lambda: run_plots(shown), put)
     return Plotted(files, pictures, failures)

@@ -1,6 +1,7 @@
 """What is known of a finished run beside its series, and how it stands in the attributes of a result file."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -78,6 +79,14 @@ class RunFacts(NamedTuple):
     def hull(self) -> Sequence[float] | None:
         """Length, width and height of the vehicle, m; None where its file does not say them."""
         return hull_of(self.scenario)
+
+    @property
+    def supply(self) -> float | None:
+        """Supply voltage of the thrusters, V; None where the scenario has none, or one that changes."""
+        plant = self.scenario.get("plant")
+        thruster = plant.get("thruster") if isinstance(plant, Mapping) else None
+        supply = thruster.get("supply") if isinstance(thruster, Mapping) else None
+        return float(supply) if isinstance(supply, int | float) and math.isfinite(supply) else None
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of a dataset that say the same."""

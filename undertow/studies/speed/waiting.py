@@ -100,7 +100,7 @@ def _settings(folder: Path) -> dict[str, str]:
 def _simulated(folder: Path, settings: dict[str, str], scenario: Mapping[str, Any]) -> tuple[float, float]:
     (folder / "scenario.yaml").write_text(json.dumps(scenario), encoding="utf-8")  # JSON is YAML
     command = (*_COMMAND, "simulate", "scenario.yaml", "--out", "out", "--overwrite")
-    return _seconds(command, folder, settings, until="Status: ")
+    return _seconds(command, folder, settings, until="It ")
 
 
 def _seconds(command: Sequence[str], folder: Path, settings: dict[str, str], until: str = "") -> tuple[float, float]:

@@ -1,0 +1,131 @@
+"""What a run comes to, in plain words and people's units: the answer before all tables."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.core.metric import Metric
+from undertow.core.status import Status
+from undertow.report.quantities import LEAST, quantity
+from undertow.report.signal_names import lost_thrusters
+from undertow.scenario.results.run_facts import RunFacts
+from undertow.scenario.results.run_result import RunRecord
+
+_LIMITED = "What limits it:"
+_SOME = 0.01  # share of the time at the limits of the inputs that is worth saying
+_MEASURED = 0.5  # share of the error that the measurement explains, from which on it is said to limit the run
+
+
+class Answer(NamedTuple):
+    """What is said of a run.
+
+    Attributes:
+        good: whether it went well; None where nothing says what counts as success.
+        verdict: the same in a sentence.
+        lines: the errors and what they are judged by, how far off at most, what it took, and what limits it.
+    """
+
+    good: bool | None
+    verdict: str
+    lines: tuple[str, ...]
+
+
+def answer_of(run: RunRecord) -> Answer:
+    """The answer of a finished run."""
+    facts = run.facts
+    good = facts.success.within if facts.success is not None else None if facts.status is Status.OK else False
+    lines = (*_criterion(facts), *_largest(facts), *_effort(facts), *_failures(run), *_limits(run))
+    return Answer(good, _verdict(facts, good), lines)
+
+
+def _verdict(facts: RunFacts, good: bool | None) -> str:
+    if facts.status is not Status.OK:
+        return f"It did not go well. The run ended after {quantity(facts.ended, 's')}: {facts.sentence}"
+    if good is None:
+        return "The run reached its end. The scenario does not say what counts as success."
+    span = "" if facts.window is None else " from {:g} to {:g} s".format(*facts.window)
+    return f"It {'went' if good else 'did not go'} well{span}."
+
+
+def _criterion(facts: RunFacts) -> Iterator[str]:
+    """The metrics that success is judged by, beside what they must stay below; what exceeds it first."""
+    success, steady = facts.success, facts.steady
+    if success is None or steady is None:
+        return
+    keys = sorted(success.criterion, key=lambda key: key not in success.exceeded)
+    judged = "; ".join(_judged(facts.meanings[key], steady.get(key), success.criterion[key], key) for key in keys)
+    yield f"{judged[:1].upper()}{judged[1:]}."
+
+
+def _judged(metric: Metric, value: float | None, most: float, key: str) -> str:
+    """A metric beside what it must stay below."""
+    found = "not defined" if value is None else quantity(value, metric.unit)
+    return f"{metric.named(key)} {found} (limit {quantity(most, metric.unit)})"
+
+
+def _largest(facts: RunFacts) -> Iterator[str]:
+    """How far off the vehicle was at most; in the steady window, without the way there."""
+    named = {"position_max": "in position", "attitude_max": "in attitude", "tracking_max": "of the reference"}
+    metrics, when = (facts.whole, " in the whole run") if facts.steady is None else (facts.steady, "")
+    off = [
+        f"{quantity(metrics[key], facts.meanings[key].unit)} {words}"
+        for key, words in named.items()
+        if metrics.get(key) is not None
+    ]
+    if off:
+        yield f"Largest error{when}: {' and '.join(off)}."
+
+
+def _effort(facts: RunFacts) -> Iterator[str]:
+    """What the inputs gave, how often they were at their limits, and the energy."""
+    whole = facts.whole
+    if whole.get("input_peak") is None:
+        return
+    share = whole.get("saturated_fraction") or 0.0
+    limits = "never at the limits" if not share else f"at the limits for {100 * share:.2g} % of the time"
+    of_supply = "" if facts.supply is None else f" of {quantity(facts.supply, 'V')}"
+    peak = quantity(whole["input_peak"], facts.meanings["input_peak"].unit)
+    energy = whole.get("energy")
+    mean = "" if not energy else f"; {quantity(energy, 'J')}, {quantity(energy / facts.ended, 'W')} on average"
+    yield f"Inputs up to {peak}{of_supply}, {limits}{mean}."
+
+
+def _failures(run: RunRecord) -> Iterator[str]:
+    """Thrusters that were found to have failed."""
+    for name, time in lost_thrusters(run.series) or ():
+        yield f"{name} was found to have failed and was taken out of use at {quantity(time, 's')}."
+
+
+def _limits(run: RunRecord) -> Iterator[str]:
+    """What limits the run: the inputs, the measurement, or loads that are not compensated."""
+    steady = run.facts.steady
+    if steady is None:
+        return
+    if (steady.get("saturated_fraction") or 0.0) >= _SOME:
+        yield f"{_LIMITED} the inputs, which are at their limits; a slower reference or stronger ones would help."
+        return
+    hypotheses = (run.facts.certificate or {}).get("hypotheses", ())
+    unmoved = any(one["name"] == "rank" and one["steady"] is not None and one["steady"] < 1 for one in hypotheses)
+    if unmoved and run.facts.success is not None and not run.facts.success.within:
+        yield f"{_LIMITED} there are axes along which no input acts."
+        return
+    error, measured = steady.get("position_rms"), _measurement_error(run)
+    if error is None or error < LEAST["m"]:
+        return
+    if measured >= _MEASURED * error:
+        yield f"{_LIMITED} the measurement, whose position is {quantity(measured, 'm')} off (rms per axis)."
+        return
+    load, left = steady.get("position_uncertainty_rms"), steady.get("position_estimation_rms")
+    if load and left is not None and left < load:
+        yield f"{_LIMITED} loads that change too fast; {quantity(left / load, '')} of them is not compensated."
+
+
+def _measurement_error(run: RunRecord) -> float:
+    """What the measured positions are off in the steady window, m, rms per axis."""
+    series, window = run.series, run.facts.window
+    metres = [unit == "m" for unit in series["axis"].attrs["unit_of_each"].split(", ")]
+    time = series["time"].values
+    inside = np.ones(len(time), bool) if window is None else (time >= window[0]) & (time <= window[1])
+    off = (series["measured_position"] - series["position"]).values[np.ix_(inside, metres)]
+    return float(np.sqrt(np.mean(off**2))) if off.size else 0.0
