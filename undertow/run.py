@@ -34,7 +34,8 @@ from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
-from undertow.report.run_page import page_contents, shown_of, write_run_page
+from undertow.report.answer import answer_of
+from undertow.report.run_page import in_notebook, page_contents, shown_of, write_run_page
 from undertow.scenario import factory
 from undertow.scenario.build import build, velocity_noise_of
 from undertow.scenario.changed_values import put_value
@@ -134,6 +135,11 @@ class Run:
         """Figures of the run, by name."""
         return figures.run_figures(shown_of(self.result))
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: whether it went well, by what, and one picture."""
+        summary = figures.run_plots(shown_of(self.result))["summary"]()
+        return in_notebook(self.result, figures.small_png(summary))
+
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
 
@@ -159,7 +165,8 @@ class Run:
 
     def __repr__(self) -> str:
         facts = self.result.facts
-        lines = [f"Run: {facts.status.word} at {facts.ended:g} s. {facts.sentence}"]
+        answer = answer_of(self.result)
+        lines = [f"Run: {facts.status.word} at {facts.ended:g} s. {answer.verdict}", *answer.lines]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, metric in facts.meanings.items():
             if name not in facts.whole:
@@ -170,8 +177,6 @@ class Run:
             lines.append(
                 f"  {name:<20}{steady_value:>12}{whole_value:>12}  {display_units(0.0, metric.unit)[1]}".rstrip()
             )
-        if facts.success is not None:
-            lines.append(f"  {facts.success.sentence(facts.meanings)}")
         return "\n".join(lines)
 
 

@@ -19,6 +19,14 @@ def parts():
     return plant, ut.rcaf(plant.model(), preset="paper"), ut.references.setpoint([2, 3, 4, 0, 0, 1])
 
 
+def test_a_notebook_shows_the_answer_and_one_picture(parts):
+    shown = ut.simulate(*parts, duration=0.1)._repr_html_()
+    assert (
+        shown.startswith('<div class="undertow">') and 'class="answer fails"' in shown and "It did not go well" in shown
+    )
+    assert shown.count("<img") == 1 and shown.count("<div") == shown.count("</div>")
+
+
 def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch):
     run = ut.simulate(*parts, duration=0.1, seed=7)
     assert isinstance(run, ut.Run) and run.status == 0

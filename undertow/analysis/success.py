@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.metric import Metric
-from undertow.core.number_text import display_units
 
 # Of tracking, in the steady window, where a scenario has no criterion of its own: 5 cm, and 0.05 rad (2.9 degrees).
 DEFAULT = {"position_rms": 0.05, "attitude_rms": 0.05}  # m, rad
@@ -26,22 +25,6 @@ class Success(NamedTuple):
     criterion: dict[str, float]
     exceeded: dict[str, float | None]
     within: bool
-
-    def sentence(self, metrics: Mapping[str, Metric]) -> str:
-        """The verdict as a sentence."""
-        quantity = lambda name, value: "{:.4g} {}".format(*display_units(value, metrics[name].unit)).rstrip()
-        bound_text = lambda name: f"{name} {quantity(name, self.criterion[name])}"
-        if self.within:
-            return f"tracking: within {', '.join(map(bound_text, self.criterion))}"
-        if not self.exceeded:
-            return (
-                f"tracking: not within {', '.join(map(bound_text, self.criterion))}, as the run did not reach its end"
-            )
-        violations = [
-            f"{bound_text(name)} ({'not defined' if value is None else f'is {quantity(name, value)}'})"
-            for name, value in self.exceeded.items()
-        ]
-        return f"tracking: not within {', '.join(violations)}"
 
 
 def criterion_of(criterion: Mapping[str, float] | None, metrics: Mapping[str, Metric]) -> dict[str, float]:

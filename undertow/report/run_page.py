@@ -39,6 +39,14 @@ _CAPTIONS = {
 }
 
 
+# The looks of a run in a notebook, which has a style sheet of its own.
+_NOTEBOOK = (
+    ".undertow .answer { border-left: 6px solid #777; padding: 0.2em 1em; margin: 0.6em 0; } "
+    ".undertow .holds { border-color: #2f7d4f; } .undertow .fails { border-color: #b3402a; } "
+    ".undertow img { width: 100%; max-width: 60em; background: white; } .undertow figure { margin: 0; }"
+)
+
+
 class RunPageContents(NamedTuple):
     """What a run looks like: figures by name, the replay (None for a plant that is no vehicle), and failures."""
 
@@ -107,6 +115,17 @@ def _page(
         folded("configuration", "Configuration", *_configuration(facts)),
         looks=replay_looks() if replay else "",
     )
+
+
+def in_notebook(run: RunRecord, summary: bytes) -> Html:
+    """A run as a notebook shows it: the answer and one picture.
+
+    Args:
+        run: its record.
+        summary: figure `summary`, PNG.
+    """
+    shown = tag("strong", prose(run.facts.title)), answer_block(answer_of(run)), _figure(summary, "summary")
+    return tag("div", tag("style", Html(_NOTEBOOK)), *shown, class_="undertow")
 
 
 def answer_block(answer: Answer) -> Html:

@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from undertow.report.figures.run import run_figures as run_figures
+    from undertow.report.figures.run import run_plots as run_plots
     from undertow.report.figures.run_files import plot_run as plot_run
     from undertow.report.figures.writing import png as png
     from undertow.report.figures.writing import save as save
     from undertow.report.figures.writing import save_all as save_all
+    from undertow.report.figures.writing import small_png as small_png
     from undertow.report.figures.writing import svg as svg
 
 _MODULE_OF = {
     "plot_run": "undertow.report.figures.run_files",
     "png": "undertow.report.figures.writing",
     "run_figures": "undertow.report.figures.run",
+    "run_plots": "undertow.report.figures.run",
     "save": "undertow.report.figures.writing",
     "save_all": "undertow.report.figures.writing",
+    "small_png": "undertow.report.figures.writing",
     "svg": "undertow.report.figures.writing",
 }
 
