@@ -21,7 +21,10 @@ def quantity(value: float, unit: str) -> str:
     if least is not None and abs(value) < least:
         return f"less than {quantity(least, unit)}"
     if unit == "rad":
-        return f"{_digits(math.degrees(value))} degrees"
+        degrees = _digits(math.degrees(value))
+        return f"{degrees} degree{'' if degrees == '1' else 's'}"
+    if unit == "s":
+        return f"{value:.3g} s"
     if unit == "":
         return f"{_digits(100 * value)} %"
     for factor, prefixed in _PREFIXED.get(unit, ()):

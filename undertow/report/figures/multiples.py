@@ -94,10 +94,15 @@ def _plot(panel: Axes, block: Block, column: int) -> None:
     ends = [curve.time[[0, -1]] for curve in curves_in_window if len(curve.time)]
     if ends and np.ptp(ends) > 0:
         panel.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
-    for mark in block.marks:
+    mark_times(panel, block.marks, named=column == 0)
+
+
+def mark_times(panel: Axes, marks: Sequence[Mark], named: bool) -> None:
+    """A vertical line at each mark, with its word where it is named."""
+    for mark in marks:
         panel.axvline(mark.time, color=style.INK, linestyle=mark.dashes, linewidth=0.6, zorder=1.5)
-    if block.marks and column == 0:
-        _name(panel, block.marks)
+    if marks and named:
+        _name(panel, marks)
 
 
 def _name(panel: Axes, marks: Sequence[Mark]) -> None:

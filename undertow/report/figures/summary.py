@@ -6,7 +6,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
+from undertow.report.figures.fault_marks import fault_marks
 from undertow.report.figures.limits import fit_from_zero, fit_linear
+from undertow.report.figures.multiples import mark_times
 from undertow.report.plotted import Shown
 
 _WIDTH, _HEIGHT, _PATH = 9.6, 4.1, 3.9  # in
@@ -39,6 +41,9 @@ def summary(shown: Shown, title: str) -> Figure:
     for panel, unit in zip(panels, errors, strict=False):
         _error(panel, run, [place for place, other in enumerate(units) if other == unit], unit, shown)
     _effort(panels[-1], run, shown)
+    marks = fault_marks(run, shown.faults)
+    for number, panel in enumerate(panels):
+        mark_times(panel, marks, named=not number)
     for panel in panels[:-1]:
         panel.tick_params(labelbottom=False)
     return figure
