@@ -144,14 +144,14 @@ def imported(path):
 
 
 def test_it_imports_what_it_depends_on():
-    """The package imports what pyproject.toml names; tests and benchmarks pytest and SciPy, which JAX needs, and each other."""
+    """The package imports what pyproject.toml names; tests and benchmarks others as well, and each other."""
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     dependencies = {line.split(">=")[0] for line in project["dependencies"]}
     known = sys.stdlib_module_names | {"simdjit"}
     package = {name for path in (PROJECT / "simdjit").rglob("*.py") for name in imported(path)}
     assert package - known == dependencies
     others = [*(PROJECT / "tests").rglob("*.py"), *(PROJECT / "benchmarks").rglob("*.py")]
-    beside = {"pytest", "scipy"} | {path.stem for path in others}
+    beside = {"pytest", "scipy", *project["optional-dependencies"]["rivals"]} | {path.stem for path in others}
     assert {name for path in others for name in imported(path)} <= known | dependencies | beside
 
 

@@ -164,7 +164,7 @@ def law(model):
 @pytest.mark.parametrize(
     ("input", "code", "answer"),
     [
-        ("jnp.nan * y.position", 1, "It did not go well. The run ended after 0 s: "),
+        ("jnp.nan * y.position", 1, "It did not go well: command not finite after 0 s. "),
         ("-r.position", 0, "It did not go well from"),
     ],
 )

@@ -118,14 +118,15 @@ def written(folder, **changes):
 
 @pytest.mark.full
 def test_a_metric_of_ones_own_in_a_run(folder, capsys):
-    assert command(["simulate", str(written(folder)), "--out", str(folder / "out"), "--no-prediction"]) == 0
+    command_line = ["simulate", str(written(folder)), "--details", "--out", str(folder / "out"), "--no-prediction"]
+    assert command(command_line) == 0
     with xr.open_dataset(folder / "out" / "run.nc") as run:
         beyond = float(-run["error"].values.min())
     found = json.loads((folder / "out" / "metrics.json").read_text())
     assert found["steady"]["overshoot"] == found["whole"]["overshoot"] == pytest.approx(beyond, rel=1e-12)
     assert beyond > 0.05 and "never" not in found["whole"]
     row = next(line for line in capsys.readouterr().out.splitlines() if "overshoot" in line)
-    assert row.replace("│", " ").split()[-1] == "m"
+    assert row.replace("│", " ").split()[-2:] == ["m", "overshoot"]
 
 
 @pytest.mark.parametrize(
@@ -167,7 +168,7 @@ def test_a_certificate_of_ones_own(folder, capsys):
     """Registered in the law's own file: in the dataset, metrics.json, on the terminal and as a figure."""
     (folder / "certified.py").write_text(CERTIFIED)
     path = written(folder, controller={"kind": "./certified.py:sliding"})
-    assert command(["simulate", str(path), "--out", str(folder / "out"), "--no-prediction"]) == 0
+    assert command(["simulate", str(path), "--details", "--out", str(folder / "out"), "--no-prediction"]) == 0
     with xr.open_dataset(folder / "out" / "run.nc") as run:
         value = 0.5 * (run["surface"].values ** 2).sum(-1)
         np.testing.assert_allclose(run["lyapunov"], value, rtol=1e-15)

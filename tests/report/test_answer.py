@@ -105,5 +105,5 @@ def test_each_limit_has_its_reason(make_run):
 
 def test_a_run_that_ended_early_did_not_go_well(make_run):
     good, verdict, lines = answer_of(record(make_run, None, status=Status.DIVERGED))
-    assert good is False and verdict == f"It did not go well. The run ended after 120 s: {Status.DIVERGED.sentence}"
+    assert good is False and verdict == f"It did not go well: diverged after 120 s. {Status.DIVERGED.sentence}"
     assert lines[0].startswith("Largest error in the whole run") and np.all(["limits it" not in line for line in lines])

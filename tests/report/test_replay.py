@@ -172,7 +172,7 @@ def test_page_of_two_minutes_is_small_and_loads_nothing(run, two_minutes, tmp_pa
     assert not re.search(r"""(src|href)\s*=\s*["']?https?:|url\(|@import""", words[0])
     assert not re.search(r"<script[^>]*src", page)
     assert "Three.js Authors" in page and "SPDX-License-Identifier: MIT" in page
-    assert "It did not go well. The run ended after 15 s: It diverged." in page and "<h1>a &lt;run&gt;</h1>" in page
+    assert "It did not go well: diverged after 15 s. It diverged." in page and "<h1>a &lt;run&gt;</h1>" in page
     assert "1.234&thinsp;&times;&thinsp;10<sup>\u22127</sup>" in page
 
 

@@ -41,7 +41,8 @@ def answer_of(run: RunRecord) -> Answer:
 
 def _verdict(facts: RunFacts, good: bool | None) -> str:
     if facts.status is not Status.OK:
-        return f"It did not go well. The run ended after {quantity(facts.ended, 's')}: {facts.sentence}"
+        ending = facts.status.word.replace("_", " ")
+        return f"It did not go well: {ending} after {quantity(facts.ended, 's')}. {facts.sentence}"
     if good is None:
         return "The run reached its end. The scenario does not say what counts as success."
     span = "" if facts.window is None else " from {:g} to {:g} s".format(*facts.window)

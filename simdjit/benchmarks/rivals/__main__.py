@@ -5,7 +5,7 @@ limited torque (`pendulum.py`); and the quadrotor of crazyflow. Of every tool th
 the error asked for. Times are processor time on one core, the shortest of all rounds: code that fills the vector units
 takes half as long again while a neighbour on the same core uses them, too. Tools that are not installed are left out:
 
-    pip install . heyoka diffrax numba CyRK mujoco crazyflow numbalsoda     # the last one needs a Fortran compiler
+    pip install ".[rivals]"     # numbalsoda needs a Fortran compiler, or is left out of the list in pyproject.toml
 """
 
 import argparse

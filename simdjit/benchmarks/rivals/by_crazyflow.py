@@ -1,6 +1,6 @@
 """crazyflow's quadrotor under crazyflow's controller: its own compiled loop, and the same functions by simdjit.
 
-Every run is a world with one drone that flies to a point of its own, in single precision, with one step of dynamics and
+Every run is a world with one drone that goes to a point of its own, in single precision, with one step of dynamics and
 controller at 500 Hz.
 """
 
