@@ -17,7 +17,7 @@ _SOME = 0.01  # share of the time at the limits of the inputs that is worth sayi
 _MEASURED = 0.5  # share of the error that the measurement explains, from which on it is said to limit the run
 
 
-class Answer(NamedTuple):
+class RunAnswer(NamedTuple):
     """What is said of a run.
 
     Attributes:
@@ -31,12 +31,12 @@ class Answer(NamedTuple):
     lines: tuple[str, ...]
 
 
-def answer_of(run: RunRecord) -> Answer:
+def answer_of(run: RunRecord) -> RunAnswer:
     """The answer of a finished run."""
     facts = run.facts
     good = facts.success.within if facts.success is not None else None if facts.status is Status.OK else False
     lines = (*_criterion(facts), *_largest(facts), *_effort(facts), *_failures(run), *_limits(run))
-    return Answer(good, _verdict(facts, good), lines)
+    return RunAnswer(good, _verdict(facts, good), lines)
 
 
 def _verdict(facts: RunFacts, good: bool | None) -> str:

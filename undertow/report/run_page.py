@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from undertow.core.atomic_io import write_whole
-from undertow.report.answer import Answer, answer_of
+from undertow.report.answer import RunAnswer, answer_of
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, folded, join, section, table, tag, text
 from undertow.report.plotted import Plotted, Shown
@@ -128,7 +128,7 @@ def in_notebook(run: RunRecord, summary: bytes) -> Html:
     return tag("div", tag("style", Html(_NOTEBOOK)), *shown, class_="undertow")
 
 
-def answer_block(answer: Answer) -> Html:
+def answer_block(answer: RunAnswer) -> Html:
     """The answer, with a colour that says whether it went well."""
     looks = {True: "holds", False: "fails", None: "open"}[answer.good]
     lines = bullets([prose(line) for line in answer.lines])
