@@ -1,5 +1,6 @@
 """The prologue of a loop: the numbers of each run, and what is computed from them before the first step."""
 
+import secrets
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -75,6 +76,8 @@ class Prologue:
         self._varying = [i for i, same in enumerate(constant) if not same]
         self._left: _Left | None = None
         self._portable = portable
+        # Not its `id`, which another prologue has as soon as this one is gone.
+        self._own_name = secrets.token_hex(16)
         self.constants = [leaf if same else None for leaf, same in zip(leaves, constant, strict=True)]
         self.inputs = [leaves[i] for i in self._varying]
 
@@ -137,7 +140,8 @@ class Prologue:
         """Of what is computed before the first step; of this prologue alone where that has no name."""
         made = [i for i, place in enumerate(self._prepare.passed_on()) if place is None]
         constants = [self.constants[i] for i in self._used]
-        return fingerprint_of_part(self._prepare.closed, self._used, made, constants) or f"{id(self)}"
+        name = fingerprint_of_part(self._prepare.closed, self._used, made, constants) or self._own_name
+        return f"{name}, portable" if self._portable else name
 
     def _given(self) -> tuple[Graph, list[Nodes]]:
         """A new graph, and nodes of all numbers and then of what is made before."""

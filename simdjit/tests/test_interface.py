@@ -103,6 +103,16 @@ def test_a_prologue_of_this_process_alone_is_not_written(tmp_path):
         loop.written()
 
 
+def test_prologues_by_xla_are_not_mixed_up(tmp_path):
+    """Each loop is gone when the next is made, whose parts may then lie where its own lay."""
+    for factor in range(1, 9):
+        prepare = lambda n, factor=factor: factor * jnp.fft.fft(n).real
+        still = lambda n, carry, k: carry
+        loop = simdjit.Loop(prepare, lambda n: n, still, still, np.arange(3.0), cache=tmp_path)
+        (ends, _), wanted = loop.run(np.arange(3.0)[None], 1), factor * np.fft.fft(np.arange(3.0)).real
+        np.testing.assert_allclose(np.ravel(ends), wanted, rtol=1e-6)
+
+
 def test_names_are_loaded_when_they_are_used():
     code = "import sys, simdjit; print('llvmlite' in sys.modules, 'jax' in sys.modules, dir(simdjit) == sorted(dir(simdjit)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False False True\n"
