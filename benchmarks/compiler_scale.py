@@ -26,7 +26,8 @@ sys.path.insert(0, str(ROOT / "simdjit/benchmarks"))
 
 import jax
 import jax.numpy as jnp
-from against_xla import REPETITIONS, RUNS, STEPS, figures, shortest  # on one core
+from against_xla import RUNS, STEPS, figures
+from timing import REPETITIONS, shortest
 
 from simdjit import Unsupported
 from undertow.core import runtime

@@ -5,18 +5,19 @@ The error is the largest difference in position from the same loop with 32 Runge
 method DOP853 with fixed steps, whose coefficients are SciPy's. Times are processor time of a single run.
 """
 
-import time
-from collections.abc import Callable
+import sys
 from pathlib import Path
-from typing import Any
 
 from undertow.core import process_setup
 
 process_setup.prepare()
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "simdjit/benchmarks"))
 
 import jax
 import numpy as np
 from scipy.integrate import DOP853
+from timing import shortest
 
 from undertow.core import runtime
 from undertow.core.numerics import integrators
@@ -27,8 +28,7 @@ from undertow.simulation.loop import sampled, simd_batch
 LOOPS = {"inverted_pendulum": 5.0, "w1": 5.0, "bluerov2_heavy": 20.0}  # files of examples/, and s
 METHODS = (("euler", 1), ("euler", 4), ("rk4", 1), ("rk4", 2), ("rk4", 4), ("dop853", 1))  # and steps of a sample
 STAGES = {"euler": 1, "rk4": 4, "dop853": DOP853.n_stages}
-REPETITIONS = 4
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = ROOT / "examples"
 
 
 def dop853(field, t, y, dt):
@@ -62,16 +62,6 @@ def position(built: Built, method: str, substeps: int, duration: float, simulate
         velocity=start.velocity,
     )
     return np.asarray(outcome.signals["position"])
-
-
-def shortest(work: Callable[[], Any]) -> float:
-    """Processor time, s, of some repetitions."""
-    times = []
-    for _ in range(REPETITIONS):
-        begun = time.process_time()
-        work()
-        times.append(time.process_time() - begun)
-    return min(times)
 
 
 def rows(name: str, duration: float):

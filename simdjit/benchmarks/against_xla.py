@@ -6,36 +6,20 @@ operations per step, seconds to compile, and nanoseconds per step and run in a b
 """
 
 import json
-import os
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, list(os.sched_getaffinity(0))[:1])
 
 import jax
 import numpy as np
+from timing import REPETITIONS, shortest
 
 from simdjit import Loop
 
 jax.config.update("jax_enable_x64", True)
 
-RUNS, STEPS, REPETITIONS = 64, 400, 5
+RUNS, STEPS = 64, 400
 ROWS = (8, 12, 15, 16, 24, 32, 48)
-
-
-def shortest(work: Callable[[], Any]) -> float:
-    """Seconds, of some repetitions after a first one."""
-    work()
-    times = []
-    for _ in range(REPETITIONS):
-        begun = time.process_time()
-        work()
-        times.append(time.process_time() - begun)
-    return min(times)
 
 
 def figures(operations: int, compiling: float, by_simdjit: float, xla_compiling: float, by_xla: float):

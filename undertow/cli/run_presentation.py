@@ -91,20 +91,17 @@ def write_outputs(
         write_run_page(page, result, looks)
     draft.publish()  # nobody waits for the prediction, which is added to the page
     console.print(f"Page: {folder / 'run.html'}", highlight=False, soft_wrap=True)
-    if prediction.coming is not None:
-        _add_prediction(result, prediction.coming, prediction, draft, looks, console)
+    _add_prediction(result, prediction, draft, looks, console)
     return looks.replay
 
 
 def _add_prediction(
-    result: ScenarioResult,
-    predicting: Future[PredictedMetrics],
-    asked: RequestedPrediction,
-    draft: Draft,
-    looks: RunPageContents,
-    console: Console,
+    result: ScenarioResult, prediction: RequestedPrediction, draft: Draft, looks: RunPageContents, console: Console
 ) -> None:
     """Add the prediction to the results and print it; nothing is printed where there can be none, unless asked for."""
+    predicting = prediction.coming
+    if predicting is None:
+        return
     foregone = predicting.done() and predicting.result().foregone
     with contextlib.nullcontext() if foregone else stage(console, "prediction"):
         predicted = predicting.result()
@@ -112,8 +109,8 @@ def _add_prediction(
     if predicted.metrics is not None:
         write_run_page(draft.path / "run.html", result, looks, predicted.metrics)
     draft.publish()
-    if asked.requested or not foregone:
-        _print_prediction(predicted, asked.details, result, console)
+    if prediction.requested or not foregone:
+        _print_prediction(predicted, prediction.details, result, console)
 
 
 def _written(result: ScenarioResult, plotting: PlottingProcess, draft: Draft) -> Plotted:

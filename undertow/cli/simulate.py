@@ -17,7 +17,7 @@ from undertow.cli.tables import terminal_table, wide_console
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
 from undertow.outside.rerun_file import check_rerun, write_rerun
-from undertow.report.answer import answer_of
+from undertow.report.answer import RunAnswer, answer_of
 from undertow.report.plotting import plotting_process
 from undertow.report.run_page import shown_of
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
@@ -57,7 +57,8 @@ def simulate(command: SimulateCommand) -> int:
             plotting.plot(shown_of(result), command.pdf)
             if command.details:
                 _print_tables(result, console)
-            _print_answer(result, console)
+            answer = answer_of(result)
+            _print_answer(answer, result, console)
             write(result, draft.path)
             repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # the results first: prediction, figures and page take longer, and may fail
@@ -69,7 +70,7 @@ def simulate(command: SimulateCommand) -> int:
             more = "" if command.details else "; --details prints all numbers"
             hint = f"Next: undertow analyze {scenario} shows the margins of the gains{more}."
             console.print(hint, highlight=False, soft_wrap=True)
-            advised += _advice_of(result)
+            advised += _advice_of(answer, result)
         finally:  # at the end, where people look, also where the run failed
             for sentence in advised:
                 typer.echo(f"Advice: {sentence}", err=True)
@@ -87,9 +88,8 @@ def _built(path: Path, console: Console, allow_code: bool) -> tuple[Built, list[
     return built, [advice.sentence for advice in (*built.advice(), *vehicle_advice(built), *flow_advice(built))]
 
 
-def _print_answer(result: ScenarioResult, console: Console) -> None:
+def _print_answer(answer: RunAnswer, result: ScenarioResult, console: Console) -> None:
     """Print how the run ended, and whether it went well."""
-    answer = answer_of(result)
     for line in (answer.verdict, *answer.lines):
         console.print(line, highlight=False, soft_wrap=True)
     for name, verdict in result.facts.requirements.items():
@@ -109,7 +109,7 @@ def _print_tables(result: ScenarioResult, console: Console) -> None:
         console.print(terminal_table(transition_rows(facts.transitions, lost_thrusters(result.series))))
 
 
-def _advice_of(result: ScenarioResult) -> list[str]:
+def _advice_of(answer: RunAnswer, result: ScenarioResult) -> list[str]:
     """What is to be said of a run beside its answer."""
     facts = result.facts
     advised = [f"{finding}." for finding in (facts.navigation or {"findings": ()})["findings"]]
@@ -117,7 +117,7 @@ def _advice_of(result: ScenarioResult) -> list[str]:
         why = facts.left_to_xla
         advised.append(f"the run used backend xla instead of simd (docs/explanation/simd.md): {why}.")
     controller = own_parts(result.built.scenario, result.built.text.folder).get("controller")
-    if controller and answer_of(result).good is False:
+    if controller and answer.good is False:
         advised.append(f"for mistakes in the controller, such as a wrong sign: undertow check {controller}")
     return advised
 

@@ -44,6 +44,11 @@ def library_of(*values: Any) -> Any:
     return jnp if any(isinstance(value, Tracer) for value in values) else np
 
 
+def quotient(over: Any, under: Any) -> Any:
+    """Array of one number, or array, over another."""
+    return as_array(library_of(over, under).divide(over, under))
+
+
 def in_present_precision(tree: Any) -> Any:
     """The tree of parts with its numbers converted to the precision that JAX uses now."""
 

@@ -84,7 +84,7 @@ def _effort(facts: RunFacts) -> Iterator[str]:
     if whole.get("input_peak") is None:
         return
     share = whole.get("saturated_fraction") or 0.0
-    limits = "never at the limits" if not share else f"at the limits for {100 * share:.2g} % of the time"
+    limits = "never at the limits" if not share else f"at the limits for {quantity(share, '')} of the time"
     of_supply = "" if facts.supply is None else f" of {quantity(facts.supply, 'V')}"
     peak = quantity(whole["input_peak"], facts.meanings["input_peak"].unit)
     energy = whole.get("energy")

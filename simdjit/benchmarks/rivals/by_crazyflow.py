@@ -15,6 +15,7 @@ import numpy as np
 import rows
 from crazyflow.control import Control
 from crazyflow.sim import Sim
+from rows import shortest
 
 import simdjit
 
@@ -73,7 +74,7 @@ def compared():
     apart = float(np.abs(ends[0] - ends[1]).max())
     assert apart < SAME, apart
     for tool, work in works.items():
-        ns = 1e9 * rows.shortest(work) / RUNS / (STEPS / RATE)
+        ns = 1e9 * shortest(work) / RUNS / (STEPS / RATE)
         yield rows.Row(PROBLEM, tool, f"{RUNS} worlds", apart, ns)
 
 

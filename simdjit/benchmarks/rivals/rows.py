@@ -4,18 +4,17 @@ All are processor time on one core, the shortest of some repetitions, after a fi
 """
 
 import json
-import os
-import time
+import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, NamedTuple
 
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, list(os.sched_getaffinity(0))[:1])  # before any library counts the cores
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 from pendulum import ANSWERS, DURATION, RUNS
+from timing import shortest
 
-REPETITIONS = 5
 NAMES = {"alone": "free pendulum", "controlled": "pendulum under a sampled law"}
 TARGETS = {"alone": (1e-6, 1e-10), "controlled": (1e-6,)}  # rad
 
@@ -40,16 +39,6 @@ class Row(NamedTuple):
     setting: str
     error: float | None  # rad, the largest of all runs
     ns: float | None  # of one run and second of its motion
-
-
-def shortest(work: Callable[[], Any]) -> float:
-    """Processor time, s, of some repetitions."""
-    times = []
-    for _ in range(REPETITIONS):
-        begun = time.process_time()
-        work()
-        times.append(time.process_time() - begun)
-    return min(times)
 
 
 def cheapest(problem: str, tool: str, settings: Settings, make: Callable[[Any], Work]) -> Iterable[Row]:

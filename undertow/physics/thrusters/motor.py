@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.arrays import as_array, library_of
+from undertow.core.arrays import quotient
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.physics.thrusters.thruster import PerThruster, Powers
 
@@ -66,17 +66,17 @@ class DCMotor(eqx.Module):
     @property
     def k3(self) -> PerThruster:
         """R / k_t, V/(N m). Eq. (13)."""
-        return _quotient(self.resistance, self.torque_constant)
+        return quotient(self.resistance, self.torque_constant)
 
     @property
     def torque_per_thrust(self) -> PerThruster:
         """c_tq = c_q / c_t, m. Eq. (12)."""
-        return _quotient(self.torque_coefficient, self.thrust_coefficient)
+        return quotient(self.torque_coefficient, self.thrust_coefficient)
 
     @property
     def voltage_gain(self) -> PerThruster:
         """alpha = 1 / (k_3 c_tq), N/V. Eq. (15)."""
-        return _quotient(1.0, self.k3 * self.torque_per_thrust)
+        return quotient(1.0, self.k3 * self.torque_per_thrust)
 
     def torque(self, speed: PerThruster) -> PerThruster:
         """Shaft torque Q, N m, at a propeller speed in rad/s. Eq. (10)."""
@@ -152,7 +152,3 @@ class DCMotor(eqx.Module):
     def _gain(self, direction: PerThruster) -> PerThruster:
         reverse = 1 / (self.k3 * (self.reverse_torque_coefficient / self.reverse_thrust_coefficient))
         return jnp.where(direction < 0, reverse, self.voltage_gain)
-
-
-def _quotient(over: PerThruster | float, under: PerThruster) -> PerThruster:
-    return as_array(library_of(over, under).divide(over, under))

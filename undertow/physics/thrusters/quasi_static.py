@@ -5,7 +5,7 @@ import abc
 import jax.numpy as jnp
 
 from undertow.core.actuator_model import AbstractMemorylessActuator
-from undertow.core.arrays import as_array, library_of
+from undertow.core.arrays import as_array, library_of, quotient
 from undertow.physics.thrusters.thruster import AbstractThruster, PerThruster
 
 
@@ -56,6 +56,5 @@ class QuasiStaticActuator(AbstractMemorylessActuator):
         return self.thruster.voltage_for(force)
 
     def dead_zone(self):
-        volts, supply = self.thruster.dead_zone, self.thruster.supply
-        library = library_of(volts, supply)
-        return as_array(library.max(library.divide(volts, supply)))
+        share = quotient(self.thruster.dead_zone, self.thruster.supply)
+        return as_array(library_of(share).max(share))

@@ -9,7 +9,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from undertow.core import checks
-from undertow.core.arrays import as_array, library_of
+from undertow.core.arrays import as_array, library_of, quotient
 from undertow.core.errors import BadInput
 from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.linear_algebra import inverse
@@ -129,7 +129,7 @@ class VehicleModel(eqx.Module):
             buoyancy=self.buoyancy,
             r_g=self.r_g,
             r_b=self.r_b,
-            gravity=as_array(library_of(self.weight, self.mass).divide(self.weight, self.mass)),
+            gravity=quotient(self.weight, self.mass),
         )
 
     @double_outside_runs

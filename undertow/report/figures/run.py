@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from undertow.report.figures import recorded, style
 from undertow.report.figures.certificate import certificate_figure, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
-from undertow.report.figures.limits import early_size
+from undertow.report.figures.limits import FLOORS, early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.figures.summary import summary
 from undertow.report.plotted import Shown
@@ -17,9 +17,6 @@ from undertow.report.signal_names import axis_names, controller_axis_names, inpu
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.
 _RUNAWAY = 1e2
-
-# Least span of an axis, by its unit: what is smaller is of no account to a vehicle.
-_FLOORS = {"m": 0.01, "deg": 1.0, "m/s": 0.01, "rad/s": 0.01}
 
 
 def run_figures(shown: Shown) -> dict[str, Figure]:
@@ -113,7 +110,7 @@ def _spans(curves: list[Curve], quantities: list[str], start: float) -> list[flo
     )
     widest: dict[str, float] = {}
     for quantity, width in zip(quantities, widths, strict=True):
-        floor = _FLOORS.get(quantity.rpartition(", ")[2], 0.0)
+        floor = FLOORS.get(quantity.rpartition(", ")[2], 0.0)
         widest[quantity] = max(widest.get(quantity, floor), float(width) if np.isfinite(width) else 0.0)
     return [widest[quantity] for quantity in quantities]
 

@@ -7,15 +7,13 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
 from undertow.report.figures.fault_marks import fault_marks
-from undertow.report.figures.limits import fit_from_zero, fit_linear
+from undertow.report.figures.limits import FLOORS, fit_from_zero, fit_linear
 from undertow.report.figures.multiples import mark_times
 from undertow.report.plotted import Shown
 
 _WIDTH, _HEIGHT, _PATH = 9.6, 4.1, 3.9  # in
 _LEFT, _TOP, _FOOT, _BETWEEN = 0.62, 0.55, 0.42, 0.34
 _LEAST_PATH = 0.2  # m; a path on a smaller map would show noise
-# Floors of the axes: errors below these are of no account to a vehicle.
-_FLOORS = {"m": 0.01, "deg": 1.0}
 _NAMES = {"m": ("position error, m", "position_rms"), "deg": ("attitude error, deg", "attitude_rms")}
 _LIMIT = style.Look("#b3402a", (0, (5, 2)), 0.9, 2)
 
@@ -60,7 +58,7 @@ def _path(panel: Axes, run: xr.Dataset, size: tuple[float, float]) -> None:
             panel.plot(curve.time, curve.values[:, 0], **look.line)
             series.append((signal, curve.time, curve.values[:, 0]))
         style.label(panel, "time, s", recorded.places(run)[0], names[0])
-        fit_linear(panel, series, 0.0, _FLOORS.get(run["axis"].attrs["unit_of_each"].split(", ")[0], 0.0))
+        fit_linear(panel, series, 0.0, FLOORS.get(run["axis"].attrs["unit_of_each"].split(", ")[0], 0.0))
         return
     north, east = names.index("north"), names.index("east")
     values = []
@@ -93,7 +91,7 @@ def _error(panel: Axes, run: xr.Dataset, places: list[int], unit: str, shown: Sh
     words, key = _NAMES[unit]
     limit = shown.criterion.get(key)
     limit = limit if limit is None or unit == "m" else float(np.degrees(limit))
-    _over_time(panel, curve.time, size, limit, _FLOORS[unit], run)
+    _over_time(panel, curve.time, size, limit, FLOORS[unit], run)
     style.label(panel, "", words)
 
 
