@@ -21,7 +21,11 @@ def scenario_schema() -> dict[str, Any]:
     for key, kind in catalogue.KIND_OF.items():
         part = _reference(kind)
         list_of_parts = {"type": "array", "items": part}
-        shapes = {"disturbance": {"anyOf": [part, list_of_parts]}, "metrics": list_of_parts}
+        shapes = {
+            "disturbance": {"anyOf": [part, list_of_parts]},
+            "metrics": list_of_parts,
+            "supervisor": {"anyOf": [{"type": "boolean"}, part]},
+        }
         property_schema = schema["properties"][key]
         schema["properties"][key] = {**shapes.get(key, part), "description": property_schema["description"]}
     mode = {name: schema["$defs"]["Fault"]["properties"]["mode"][name] for name in ("title", "description")}
