@@ -23,11 +23,13 @@ class Code:
         assembly: LLVM's, with a function `run`.
         cache: folder of compiled code; None for the default.
         sparing: order instructions so that few registers are needed, rather than so that none waits for another one.
+        optimize: see `loop.Loop`.
     """
 
-    def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False):
-        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache, sparing)))
+    def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False, optimize: bool = True):
+        level = _THOROUGH if optimize and os.environ.get("SIMDJIT_OPTIMIZATION") != "0" else _BRIEF
+        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target(level))
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache, sparing, level)))
         self._engine.finalize_object()
         self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
 
@@ -58,20 +60,17 @@ def simd_width(bits: int) -> int:
     return register // bits
 
 
-def _optimization() -> int:
-    """How hard LLVM tries: 2, or 0 where SIMDJIT_OPTIMIZATION is 0, which takes a third of the time for slower code.
-
-    Results have the same bits at both levels, as programs ask for IEEE arithmetic as it is written.
-    """
-    return 0 if os.environ.get("SIMDJIT_OPTIMIZATION") == "0" else 2
+# How hard LLVM tries: level 0 takes a sixth to a third of the time for code that runs half as long again. Results have
+# the same bits at both levels, as programs ask for IEEE arithmetic as it is written.
+_BRIEF, _THOROUGH = 0, 2
 
 
-def _target() -> Any:
+def _target(level: int) -> Any:
     """This processor; a new object each time, as every engine disposes of its own."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     name, features = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
-    triple, level = binding.Target.from_default_triple(), _optimization()
+    triple = binding.Target.from_default_triple()
     return triple.create_target_machine(cpu=name, features=features, opt=level, jit=True)
 
 
@@ -89,9 +88,9 @@ def parsed(assembly: str) -> binding.ModuleRef:
     return module
 
 
-def _object(assembly: str, cache: Path | None, sparing: bool) -> bytes:
+def _object(assembly: str, cache: Path | None, sparing: bool, level: int) -> bytes:
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten(), binding.llvm_version_info
-    return cached((assembly, *processor, sparing, _optimization()), ".o", lambda: _compiled(assembly, sparing), cache)
+    return cached((assembly, *processor, sparing, level), ".o", lambda: _compiled(assembly, sparing, level), cache)
 
 
 # LLVM's list scheduling that reduces registers, bottom up. In long programs most numbers lie in memory, and this order
@@ -101,8 +100,8 @@ _SPARING, _USUAL = "-pre-RA-sched=list-burr", "-pre-RA-sched=default"
 _LAST_KNOWN = 22
 
 
-def _compiled(assembly: str, sparing: bool) -> bytes:
-    module, target = parsed(assembly), _target()
+def _compiled(assembly: str, sparing: bool, level: int) -> bytes:
+    module, target = parsed(assembly), _target(level)
     if not sparing or binding.llvm_version_info[0] > _LAST_KNOWN:
         return target.emit_object(module)
     binding.set_option("simdjit", _SPARING)  # of the whole process, so it is set back at once

@@ -43,6 +43,8 @@ class Loop:
         cache: folder of compiled code; None for SIMDJIT_CACHE or the default.
         planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
         portable: whether it will be `written`.
+        optimize: whether the machine code is to be as fast as it can be. Without, it is made in a third of the time and
+            takes half as long again: worth it for some ten thousand steps. No result depends on it.
 
     Raises:
         Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the
@@ -63,6 +65,7 @@ class Loop:
         cache: Path | None = None,
         planned: int = 0,
         portable: bool = False,
+        optimize: bool = True,
     ):
         prepared = Traced(prepare, numbers)
         constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
@@ -89,7 +92,7 @@ class Loop:
             prologue.leave_to_xla(program.prologue_lacks)
         read, carry, series = (Layout(leaves, lanes) for leaves in (prologue.inputs, begun.leaves, recorded.leaves))
         forms = stepped.form, recorded.form
-        self._load(_Parts(program, lanes, prologue.of_runs(), read, carry, series, *forms), driver, cache)
+        self._load(_Parts(program, lanes, prologue.of_runs(), read, carry, series, *forms, optimize), driver, cache)
 
     @classmethod
     def recording(
@@ -120,7 +123,10 @@ class Loop:
     def _load(self, parts: "_Parts", driver: Driver | None, cache: Path | None) -> None:
         self._parts, self.operations = parts, parts.program.operations
         assembly = parts.program.assembly
-        self._code = nvidia.Kernel(assembly, driver, cache) if driver else Code(assembly, cache, parts.lanes > 1)
+        if driver:
+            self._code = nvidia.Kernel(assembly, driver, cache)
+        else:
+            self._code = Code(assembly, cache, sparing=parts.lanes > 1, optimize=parts.optimize)
 
     def written(self) -> bytes:
         """For a file: what `Loop.read` makes the loop of, in another process and without its functions.
@@ -240,6 +246,7 @@ class _Parts(NamedTuple):
         inputs: what it takes of the numbers of its runs.
         numbers, carry, record: memory of what it reads, hands on from step to step, and records.
         carry_form, record_form: how results are put together.
+        optimize: see `Loop`.
     """
 
     program: Program
@@ -250,6 +257,7 @@ class _Parts(NamedTuple):
     record: Layout
     carry_form: Form
     record_form: Form
+    optimize: bool
 
 
 def _lowered(

@@ -190,6 +190,13 @@ def _cheap(graph: Graph, fixed: Sequence[bool], group: Group) -> float | None:
     return _MOVE if len(set(group)) == 1 or all(fixed[node] for node in group) else None
 
 
+def _taken(due: set[Group], part: Sequence[Group]) -> bool:
+    """Whether some packs of a part are due; none of them is afterwards."""
+    is_due = not due.isdisjoint(part)
+    due.difference_update(part)
+    return is_due
+
+
 class _Balance:
     """What packs save and cost, in instructions."""
 
@@ -210,14 +217,18 @@ class _Balance:
             for operand in graph.uses(node) if wanted else ():
                 self._users[operand].add(node)
         groups = {group for of_pack in self._operands.values() for group in of_pack}
+        # Packs to be weighed: what one saves changes only where another one near it is given up.
+        self._due_alone, self._due_in_parts = set(packs), set(packs)
         self._cheap = {group: cost for group in groups if (cost := _cheap(graph, fixed, group)) is not None}
 
     def worthwhile(self) -> list[Group]:
         """The packs that save more than they cost, each of them and together with those that it works with."""
         packs = dict.fromkeys(self._operands)
         while True:
-            lost = [pack for pack in packs if self._given_up([pack])]
-            lost += [pack for part in self._connected(packs.keys() - lost) if self._given_up(part) for pack in part]
+            lost = [pack for pack in packs if _taken(self._due_alone, [pack]) and self._given_up([pack])]
+            for part in self._connected(packs.keys() - lost):
+                if _taken(self._due_in_parts, part) and self._given_up(part):
+                    lost += part
             if not lost:
                 return list(packs)
             for pack in lost:
@@ -225,16 +236,22 @@ class _Balance:
 
     def _given_up(self, packs: Sequence[Group]) -> bool:
         """Take some packs apart if that costs nothing."""
-        beside = {self._pack_of[node] for pack in packs for node in self._neighbours(pack) if node in self._pack_of}
-        around = beside.union(packs)
+        around = self._beside(packs).union(packs)
         before = self._moves(around)
         for pack in packs:
             for node in pack:
                 del self._pack_of[node]
         if self._moves(around.difference(packs)) + sum(map(self._saved, packs)) <= before:
+            near = around | self._beside(around)
+            self._due_alone |= near
+            self._due_in_parts |= near
             return True
         self._pack_of |= {node: pack for pack in packs for node in pack}
         return False
+
+    def _beside(self, packs: Iterable[Group]) -> set[Group]:
+        """Packs that give operands to some packs, or use them."""
+        return {self._pack_of[node] for pack in packs for node in self._neighbours(pack) if node in self._pack_of}
 
     def _saved(self, pack: Group) -> int:
         name = self._graph.operations[pack[0]].name
@@ -276,10 +293,14 @@ class _Balance:
                 if group in beside:
                     beside[pack].add(group)
                     beside[group].add(pack)
-        parts = []
-        while beside:
-            part = list({next(iter(beside))})
-            for pack in part:  # grows on the way
-                part += [other for other in beside.pop(pack) if other in beside and other not in part]
+        parts, reached = [], set[Group]()
+        for pack in beside:
+            if pack in reached:
+                continue
+            part = [pack]
+            for member in part:  # grows on the way
+                reached.add(member)
+                part += beside[member] - reached
+                reached |= beside[member]
             parts.append(part)
         return parts

@@ -26,12 +26,15 @@ class PortableProgram:
         function: of a list of arrays, giving a list of arrays.
         example: arguments, or their shapes and types.
         name: of the program, for profilers.
+        optimize: whether XLA tries hard; without, it compiles in half the time, and results may differ by rounding.
 
     Raises:
         Unsupported: it calls code that a later process may not have.
     """
 
-    def __init__(self, function: Callable[[Arrays], Arrays], example: Arrays, name: str = "program"):
+    def __init__(
+        self, function: Callable[[Arrays], Arrays], example: Arrays, name: str = "program", optimize: bool = True
+    ):
         def named(arrays: Arrays) -> Arrays:
             return function(arrays)
 
@@ -42,7 +45,7 @@ class PortableProgram:
             raise Unsupported(f"a program that calls {further[0]}")
         self._calls_lapack = bool(calls)
         self._counts = len(example), len(jax.tree.leaves(lowered.out_info))
-        self._run = lowered.compile()
+        self._run = lowered.compile(None if optimize else {"xla_backend_optimization_level": "0"})
 
     def __call__(self, arrays: Arrays) -> Arrays:
         """Results, arrays of JAX."""

@@ -44,7 +44,7 @@ class EmulatedGpu:
         text = text.replace("llvm.nvvm.read.ptx.sreg.", "register.") + "".join(
             map(_REGISTER.format, ("ctaid", "ntid", "tid"))
         )
-        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), cpu._target())
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(text), cpu._target(level=0))
         engine.finalize_object()
         self.kernels.append(engine)
         return self._give(found, len(self.kernels))

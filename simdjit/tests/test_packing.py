@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from programs import SIZE, number, program
 
-from simdjit import Loop
+from simdjit import Loop, packing
 from simdjit.graph import F64, Graph
 from simdjit.packing import find_packs, width_of
 from simdjit.scalar import Scalar
@@ -75,6 +75,29 @@ def test_loops_and_branches():
 
     halved, _ = same_bits(function, x)
     assert (np.abs(halved) <= 2).all()
+
+
+def test_packs_far_from_one_that_is_given_up_need_not_be_weighed_again(monkeypatch):
+    """The same packs as by weighing all of them in every round, on random programs of rows that are alike in part."""
+
+    def packs_of(seed):
+        rng, graph = np.random.default_rng(seed), Graph()
+        rows = [[graph.input(("carry", 4 * row + slot), F64) for slot in range(4)] for row in range(6)]
+        for _ in range(200):
+            name, places = str(rng.choice(["add", "mul", "sub"])), rng.integers(4, size=2)
+            alike = rows if rng.random() < 0.95 else rows[: rng.integers(1, 6)]
+            others = rows if rng.random() < 0.95 else rows[::-1]  # of the row itself, or of another one
+            operands = [(row[places[0]], other[places[1]]) for row, other in zip(alike, others, strict=False)]
+            target = rng.integers(4)
+            for row, pair in zip(alike, operands, strict=True):
+                row[target] = graph.apply(name, *pair)
+        outputs = [node for row in rows for node in row]
+        return set(find_packs(graph, outputs, [False] * len(graph.operations), WIDTH).groups.values())
+
+    kept = [packs_of(seed) for seed in range(20)]
+    assert sum(map(len, kept)) > 50
+    monkeypatch.setattr(packing, "_taken", lambda due, part: True)
+    assert [packs_of(seed) for seed in range(20)] == kept
 
 
 def test_a_long_chain_inside_a_loop():

@@ -63,6 +63,22 @@ def test_a_loop_is_a_geometric_sequence():
     np.testing.assert_array_equal(seen, start[:, None] * ratio[:, None] ** at + 0.125 * at * (at - 1))
 
 
+def test_a_loop_may_be_compiled_quickly(tmp_path, monkeypatch):
+    """With the same bits; each has machine code of its own, also where it is written and read."""
+    monkeypatch.delenv("SIMDJIT_OPTIMIZATION", raising=False)
+    known = lambda numbers: numbers
+    step = lambda rates, angles, k: angles + 0.1 * jnp.sin(rates * angles)
+    finals = []
+    for optimize in (True, False):
+        functions = known, lambda rates: 2 * rates, step, lambda rates, angles, k: angles
+        loop = simdjit.Loop(*functions, np.zeros(5), lanes=1, cache=tmp_path, portable=True, optimize=optimize)
+        for each in (loop, simdjit.Loop.read(loop.written(), tmp_path)):
+            final, _ = each.run(np.linspace(-2.0, 2.0, 10).reshape(2, 5), steps=20)
+            finals.append(np.asarray(final).tobytes())
+    assert len(set(finals)) == 1
+    assert len(list(tmp_path.rglob("*.o"))) == 2
+
+
 def test_without_optimization_the_bits_are_the_same(runs, tmp_path, monkeypatch):
     """Each level has machine code of its own in the cache, and the numbers differ in no bit."""
     x, rate = runs

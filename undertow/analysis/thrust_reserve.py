@@ -14,7 +14,7 @@ from undertow.control.supervision.reduced_model import VEHICLE_PRIORITY, attaine
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, Model
 from undertow.core.errors import BadInput
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled, kept_program
 from undertow.core.runtime import double_outside_runs
 
 # Share of an acceleration demanded of one axis that makes it one that the actuators control.
@@ -125,7 +125,7 @@ def reference_reserve(
     return Reserve(worst, time, tuple(sorted(set(controlled_axes(gains[0])) - set(controlled))))
 
 
-@kept_program
+@briefly_compiled
 def _demands(model: Model, reference: AbstractReference, times, water):
     """Acceleration that the actuators have to give and the gain, at each time; least and largest steady forces."""
     dynamics, coordinates, actuators = model.in_body_axes()

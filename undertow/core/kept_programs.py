@@ -29,12 +29,13 @@ if TYPE_CHECKING or KEEPS:
 Result = TypeVar("Result")
 
 
-def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
+def kept_program(function: Callable[..., Any], optimize: bool = True) -> Callable[..., Any]:
     """Compile a pure function of trees of parts, as `eqx.filter_jit` does, and keep its programs.
 
     Args:
         function: of positional arguments; its result is a tree of arrays. It may read nothing that changes but them.
             Arrays of NumPy among them count as arrays of JAX do.
+        optimize: whether XLA tries hard; see `briefly_compiled`.
     """
     compiled = eqx.filter_jit(function)
     programs: dict[str, _Program | None] = {}
@@ -49,11 +50,19 @@ def kept_program(function: Callable[..., Any]) -> Callable[..., Any]:
             return compiled(*arguments)
         if key not in programs:
             kept = kept_key(key)
-            programs[key] = None if kept is None else _program(function, arguments, kept)
+            programs[key] = None if kept is None else _program(function, arguments, kept, optimize)
         program = programs[key]
         return compiled(*arguments) if program is None else program(arguments)
 
     return run
+
+
+def briefly_compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A `kept_program` that XLA compiles in half the time to slower code, whose results may differ by rounding.
+
+    It is for large functions that are called a few times, and whose results enter no run.
+    """
+    return kept_program(function, optimize=False)
 
 
 def kept_result(name: str, subject: Any, compute: Callable[[], Result]) -> Result:
@@ -74,7 +83,7 @@ def kept_result(name: str, subject: Any, compute: Callable[[], Result]) -> Resul
 class _Program:
     """A compiled program and the form of its result."""
 
-    def __init__(self, function: Callable[..., Any], arguments: Any):
+    def __init__(self, function: Callable[..., Any], arguments: Any, optimize: bool):
         arrays, rest = arrays_of(arguments)
         forms = []
 
@@ -86,7 +95,7 @@ class _Program:
             forms.append(form)
             return leaves
 
-        self._program = PortableProgram(of_arrays, arrays, function.__name__)
+        self._program = PortableProgram(of_arrays, arrays, function.__name__, optimize)
         (self._form,) = forms
 
     def __call__(self, arguments: Any) -> Any:
@@ -94,19 +103,19 @@ class _Program:
         return jax.tree.unflatten(self._form, self._program(arrays))
 
 
-def _program(function: Callable[..., Any], arguments: Any, kept: KeptKey) -> _Program | None:
+def _program(function: Callable[..., Any], arguments: Any, kept: KeptKey, optimize: bool) -> _Program | None:
     """The program of a function for arguments of this structure; None where it cannot be kept."""
-    contents = kept_code(kept, lambda: _made(function, arguments))
+    contents = kept_code(kept, lambda: _made(function, arguments, optimize))
     try:
         return pickle.loads(contents) if contents else None
     except Exception:  # whatever XLA, or another version of JAX, says of machine code that it does not take
         return None
 
 
-def _made(function: Callable[..., Any], arguments: Any) -> bytes:
+def _made(function: Callable[..., Any], arguments: Any, optimize: bool) -> bytes:
     """A program for a file; empty where it cannot be kept."""
     try:
-        program = _Program(function, arguments)
+        program = _Program(function, arguments, optimize)
     except Unsupported:
         return b""
     try:

@@ -15,7 +15,7 @@ from undertow.analysis.thrust_reserve import reference_reserve
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractReference, FreeSurface
 from undertow.core.errors import Advice, advice
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.physics.disturbances.current import Current
 from undertow.physics.disturbances.gauss_markov_current import GaussMarkovCurrent
 from undertow.physics.disturbances.loads import SumOfDisturbances
@@ -144,7 +144,7 @@ def _thrusts(plant: HybridVehicle) -> tuple[Float[np.ndarray, " m"], Float[np.nd
     return (low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
 
 
-@kept_program
+@briefly_compiled
 def _steady_range(plant: HybridVehicle):
     actuators = plant.thruster.actuator_model(plant.inputs(), False)
     if actuators.time_constant() is None:  # the steady force is unknown, too
@@ -238,7 +238,7 @@ def _out_of_water(loop: ClosedLoop, start: Float[np.ndarray, " 6"], depth: float
         yield advice("initial.position", message, _SURFACE)
 
 
-@kept_program
+@briefly_compiled
 def _dry_share(plant: HybridVehicle, start, depth):
     """Share of the hull above still water, at the start; `depth` is that of the world's origin, m."""
     x = plant.initial_state(start)
@@ -353,7 +353,7 @@ def _sampled(reference: AbstractReference, time: np.ndarray, start: np.ndarray) 
     return ReferenceSamples(time, np.asarray(at.position, dtype=float), np.asarray(at.velocity, dtype=float), start)
 
 
-@kept_program
+@briefly_compiled
 def _targets(reference: AbstractReference, times):
     return jax.lax.map(reference.at, times)
 

@@ -9,7 +9,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from undertow.core.errors import Advice, advice
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.status import Status
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.thrusters.thruster import AbstractThruster
@@ -63,7 +63,7 @@ def fastest_decay(thruster: AbstractThruster) -> float:
     return float(np.abs(np.linalg.eigvals(slopes)).max(initial=0.0))
 
 
-@kept_program
+@briefly_compiled
 def _slopes_at_rest(thruster: AbstractThruster):
     state, tree = ravel_pytree(thruster.initial_state(1))
     return jax.jacfwd(lambda x: ravel_pytree(thruster.dynamics(tree(x), jnp.zeros(1)))[0])(state)

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.vehicles.body import Body
@@ -81,7 +81,7 @@ def _lean_about(
     return Lean(_AXES[axis], leans[worst], worst)
 
 
-@kept_program
+@briefly_compiled
 def body_force(body: Body, nu: Float[ArrayLike, "k 6"], down: Float[ArrayLike, "k 3"]) -> Float[jax.Array, "k 6"]:
     """C(nu) nu + D(nu) + g at body velocities through the water and directions of gravity, N and N m."""
     force = lambda velocity, gravity: body.coriolis(velocity) + body.damping(velocity) + body.restoring(gravity)

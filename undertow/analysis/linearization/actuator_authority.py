@@ -8,7 +8,7 @@ import numpy as np
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.control.controllers.thruster_allocation import allocate, attained
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _SETTLING, _STEP = 800, 5e-3  # steps and s that an actuator is given to come to its limit
@@ -44,7 +44,7 @@ def actuator_authority(loop: ClosedLoop, at: Equilibrium, loads: np.ndarray) -> 
     return ActuatorAuthority(*map(np.asarray, authority))
 
 
-@kept_program
+@briefly_compiled
 def _reach(loop: ClosedLoop, x, loads):
     plant, (dynamics, coordinates, drive) = loop.plant, loop.controller.model.in_body_axes()
     y = plant.output(jnp.zeros(()), x)

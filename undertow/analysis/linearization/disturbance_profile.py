@@ -9,7 +9,7 @@ from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.core.contracts import Load, Pose
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
@@ -74,7 +74,7 @@ def disturbance_profile(
     return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow)
 
 
-@kept_program
+@briefly_compiled
 def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     realization = loop.realize(key)
     plant = loop.plant

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Measurement, Model
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.physics.plants.reachability import lost_directions
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
@@ -153,7 +153,7 @@ def equilibrium(
     return at_full_load
 
 
-@kept_program
+@briefly_compiled
 def _output(parts: Parts, state: Array) -> Measurement:
     return parts.loop.plant.output(jnp.zeros(()), parts.plant_state(state))
 
@@ -186,14 +186,14 @@ def _steered(model: Model, y: Measurement) -> np.ndarray:
     return np.eye(len(into_axes)) - np.linalg.pinv(lost) @ lost
 
 
-@kept_program
+@briefly_compiled
 def _reach(model: Model, y: Measurement):
     """From accelerations of the outputs to the axes of the law; and what the forces give there."""
     into_axes = jax.jacfwd(lambda a: model.coordinates.acceleration(y, a))(jnp.zeros_like(y.position))
     return into_axes, model.dynamics.gain(y)
 
 
-@kept_program
+@briefly_compiled
 def _settled_input(model: Model, y: Measurement, load):
     """Input that gives the forces against drift and load, once the actuators have come to them."""
     dynamics, coordinates, drive = model

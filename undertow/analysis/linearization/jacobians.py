@@ -17,7 +17,7 @@ from jaxtyping import Array, PyTree
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Load, Target, Water
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.measurement import with_outputs
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
@@ -121,7 +121,7 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     return parts, {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
 
 
-@kept_program
+@briefly_compiled
 def _at_rest(loop: ClosedLoop, target: Target, velocity: Array) -> tuple[PyTree, PyTree, Flow | None]:
     plant, zero = loop.plant, jnp.zeros(())
     x, unloaded = plant.initial_state(target.position, target.velocity), plant.no_load()
@@ -148,7 +148,7 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
     )
 
 
-@kept_program
+@briefly_compiled
 def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
     stacked, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
 

@@ -12,7 +12,7 @@ from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.minimal_realization import visible
 from undertow.analysis.metrics import of_group, output_groups
 from undertow.core.arrays import as_array
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 
 _ENTRIES = ("load", "noise")
 _START = "start"  # a column: where the states are at first
@@ -89,7 +89,7 @@ def compare_metrics(predicted: Mapping[str, float], measured: Mapping[str, Any])
     return [MetricComparison(name, value, measured[name]) for name, value in predicted.items() if name in measured]
 
 
-@kept_program
+@briefly_compiled
 def _driven(start, matrix, entry, driven):
     """States at each step."""
 

@@ -10,7 +10,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PRNGKeyArray
 
 from undertow.core.contracts import AbstractController, Pose
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.numerics.rotations import quaternion_from_euler, rotation_from_quaternion
 from undertow.physics.thrusters.thruster import AbstractThruster
@@ -45,7 +45,7 @@ def thrust_along(thruster: AbstractThruster, inputs: Series, step: float) -> Ser
     return np.concatenate([*parts, last[None]])[: len(inputs)]
 
 
-@kept_program
+@briefly_compiled
 def _thrust_of_chunk(thruster: AbstractThruster, state: Any, inputs: Array, next_inputs: Array, dt: Array) -> Any:
     """State after the records, and thrust at each: linearly implicit Euler, stable for windings far faster than dt."""
     start, unravel = ravel_pytree(state)
@@ -68,7 +68,7 @@ def _thrust_of_chunk(thruster: AbstractThruster, state: Any, inputs: Array, next
     return unravel(final), thrust
 
 
-@kept_program
+@briefly_compiled
 def _thrust(thruster: AbstractThruster, state: Any, u: Array) -> Array:
     return jnp.broadcast_to(thruster.thrust(state, u), u.shape).astype(u.dtype)
 
@@ -105,7 +105,7 @@ def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, vel
     return Environment(*(None if series is None else np.asarray(series) for series in histories))
 
 
-@kept_program
+@briefly_compiled
 def _environment(
     loop: ClosedLoop, key: PRNGKeyArray, time: Array, position: Array, velocity: Array
 ) -> tuple[Array | None, Array | None]:

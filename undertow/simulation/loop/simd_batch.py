@@ -134,6 +134,10 @@ _PLANNED = 1_000_000
 # Steps of all runs together from which on a longer program pays: it takes 0.1 to 0.3 s more to compile.
 _FEW = 2_000_000
 
+# Steps of all runs together from which on it pays to have LLVM try hard: for a large vehicle that takes 2 to 10 s more,
+# and saves a third of the time of the steps, here half a second.
+_SOME = 100_000
+
 
 def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     """`simdjit.Step`: one step of one run, called by somebody else's clock.
@@ -224,7 +228,8 @@ class SimdBatchRunner:
             raise Unsupported(f"a table of {largest} numbers, more than {_LARGEST}")
         self._plan = plan
         # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
-        compact = driver is None and (1 if width == 1 else runs) * plan.steps < _FEW
+        compact = driver is None and runs * plan.steps < _FEW
+        optimize = runs * plan.steps >= _SOME
         integrate = (COMPACT_METHODS if compact else METHODS)[plan.method]
         dt = plan.dt
 
@@ -253,11 +258,11 @@ class SimdBatchRunner:
         functions = realize, start, control_step, record
 
         def make(portable: bool) -> simdjit.Loop:
-            return simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED, portable)
+            return simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED, portable, optimize)
 
         leaves = zip(jax.tree.leaves(numbers), constant, strict=True)
         constants = Constant([leaf if same else None for leaf, same in leaves])
-        structure = ("runs", run, plan._replace(steps=0), constants, width, compact)
+        structure = ("runs", run, plan._replace(steps=0), constants, width, compact, optimize)
         self._program = make(False) if driver else _kept_loop(structure, make)
 
     @property
@@ -355,5 +360,6 @@ def integrate(
 
 def _alone(run: LoopRun, plan: RunPlan) -> Outcome:
     arrays = eqx.filter(run, eqx.is_array)
-    batch = SimdBatchRunner(run, plan, [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)], width=1)
+    constant = [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)]
+    batch = SimdBatchRunner(run, plan, constant, width=1, runs=1)
     return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)

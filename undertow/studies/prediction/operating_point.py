@@ -15,7 +15,7 @@ from undertow.analysis.linearization.response import from_start, metrics_of, sig
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractController, AbstractReference, Outputs, Time
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -56,7 +56,7 @@ def operating_point(built: Built) -> OperatingPoint:
     return OperatingPoint(built, around, mean, linear, margins.spectral_radius(linear))
 
 
-@kept_program
+@briefly_compiled
 def _desired(reference: AbstractReference, t: Time) -> Outputs:
     return reference.at(t).position
 
@@ -133,6 +133,6 @@ def _start(op_point: OperatingPoint) -> list[np.ndarray]:
     return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(op_point.built.scenario.seed), *outputs)]
 
 
-@kept_program
+@briefly_compiled
 def _states_at_start(loop: ClosedLoop, key: PRNGKeyArray, position: Outputs, velocity: Outputs) -> list[Array]:
     return [ravel_pytree(state)[0] for state in loop.realize(key).start(position, velocity)]
