@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 from undertow.core.part_packages import PACKAGE_OF
 
 if TYPE_CHECKING:
+    from undertow.comparison import Comparison as Comparison
+    from undertow.comparison import compare as compare
     from undertow.control import controllers as controllers
     from undertow.control import navigation as navigation
     from undertow.control import references as references
@@ -39,8 +41,6 @@ if TYPE_CHECKING:
     from undertow.run import simulate_scenario as simulate_scenario
     from undertow.scenario.csv_table import read_samples as read_samples
     from undertow.scenario.log_file import read_log as read_log
-    from undertow.studies.comparison.comparison import Comparison as Comparison
-    from undertow.studies.comparison.comparison import compare as compare
 
     __version__: str
 
@@ -48,14 +48,14 @@ if TYPE_CHECKING:
 _HOMES = {
     "Autopilot": "undertow.outside.autopilot.autopilot",
     "BadInput": "undertow.core.errors",
-    "Comparison": "undertow.studies.comparison.comparison",
+    "Comparison": "undertow.comparison",
     "HybridVehicle": "undertow.physics.plants.hybrid_vehicle",
     "NavigationFilter": "undertow.outside.autopilot.navigation_filter",
     "Run": "undertow.run",
     "Vehicle": "undertow.outside.autopilot.vehicle",
     "attitudes_of_quaternions": "undertow.logs.frames",
     "body_vectors": "undertow.logs.frames",
-    "compare": "undertow.studies.comparison.comparison",
+    "compare": "undertow.comparison",
     "prepare": "undertow.core.process_setup",
     "rcaf": "undertow.control.controllers.rcaf",
     "read_log": "undertow.scenario.log_file",

@@ -34,8 +34,8 @@ from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
 from undertow.report import figures
-from undertow.report.answer import answer_of
-from undertow.report.run_page import in_notebook, page_contents, shown_of, write_run_page
+from undertow.report.answers.run_answer import answer_of_run
+from undertow.report.run_page import page_contents, run_in_notebook, shown_of, write_run_page
 from undertow.scenario import factory
 from undertow.scenario.build import build, velocity_noise_of
 from undertow.scenario.changed_values import put_value
@@ -138,7 +138,7 @@ class Run:
     def _repr_html_(self) -> str:
         """What a notebook shows: whether it went well, by what, and one picture."""
         summary = figures.run_plots(shown_of(self.result))["summary"]()
-        return in_notebook(self.result, figures.small_png(summary))
+        return run_in_notebook(self.result, figures.small_png(summary))
 
     def page(self, path: str | Path) -> None:
         """Write one HTML page with metrics, certificate, figures and, for a vehicle, a replay in three dimensions.
@@ -165,7 +165,7 @@ class Run:
 
     def __repr__(self) -> str:
         facts = self.result.facts
-        answer = answer_of(self.result)
+        answer = answer_of_run(self.result)
         lines = [f"Run: {facts.status.word} at {facts.ended:g} s. {answer.verdict}", *answer.lines]
         lines.append(f"  {'metric':<20}{'steady':>12}{'whole':>12}  unit")
         for name, metric in facts.meanings.items():

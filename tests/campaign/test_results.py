@@ -22,7 +22,8 @@ def test_what_it_leaves(campaign_file, whole_figures, tmp_path, capsys):
     path, out = campaign_file(trials=20, cross=CROSS, description="Two PIDs"), tmp_path / "out"
     assert run(["campaign", str(path), "--out", str(out)]) == 1  # some failed
     said = capsys.readouterr()
-    assert "40 of 40 trials" in said.out and "diverged 20" in said.out and said.err == ""
+    assert "20 of 40 trials completed (20 diverged)" in said.out and said.err == ""
+    assert "(controller.frequency wild, plant double_integrator) is violated: 0 % of the trials keep it" in said.out
     found = json.loads((out / "summary.json").read_text())
     calm, wild = found["combinations"]
     assert found["status"] == {"completed": 20, "diverged": 20}

@@ -29,7 +29,7 @@ loop: {duration: 1, dt: 0.002}
 
 def test_predictions_are_written_and_shown(undertow, whole_figures, tmp_path):
     (tmp_path / "s.yaml").write_text(ROBUST)
-    said = undertow("analyze", "s.yaml", "--out", "out")
+    said = undertow("analyze", "s.yaml", "--out", "out", "--details")
     assert said.code == 0, said.err
     found = json.loads((tmp_path / "out" / "prediction.json").read_text())
     assert [row["frequency"] for row in found["estimators"]] == [30.0, 30.0]

@@ -1,13 +1,14 @@
 """`undertow tune`: result files, resuming, bad input."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from messages import named
 from ruamel.yaml import YAML
 
-from undertow.cli.tune import _sentences
+from undertow.report.answers.tuning_answer import answer_of_tuning
 from undertow.studies.tuning.cost import Shares
 from undertow.studies.tuning.stability import Certificate
 from undertow.studies.tuning.tune import Evaluated, Tuned
@@ -124,21 +125,27 @@ def tuning(given, tuned):
 def test_given_gains_are_kept_where_no_others_are_better():
     found = tuning(evaluated("given", 0.1325), evaluated("tuned", 0.134, frequency=2.8627))
     assert found.kept.name == "given"
-    (said,) = _sentences(found)
-    assert said == (
-        "The given gains are kept: on held-out runs their cost is 0.1325, and 0.134 with the best that were found "
-        "(frequency 2.8627). 40 evaluations, 3 rejected without a certificate, 12 s; the search has converged."
+    good, verdict, lines = answer_of_tuning(found, Path("out"))
+    assert good is None
+    assert verdict == (
+        "The given gains are kept. Others were found, but on held-out runs their cost is 1.01 times larger than with the "
+        "given ones."
     )
+    assert lines[0] == "Best gains found: frequency 2.8627."
+    assert "40 evaluations, 3 rejected without a certificate, 12 s; the search has converged." in lines
 
 
 def test_a_ratio_is_said_in_its_direction():
     better = tuning(evaluated("given", 0.2), evaluated("tuned", 0.1, frequency=2.0))
     assert better.kept.name == "tuned"
-    assert "The held-out cost is 2 times smaller than with the given gains." in _sentences(better)[0]
+    answer = answer_of_tuning(better, Path("out"))
+    assert answer.good and "their cost is 2 times smaller than with the given gains." in answer.verdict
+    assert answer.lines[-1] == "Next: undertow simulate out/tuned.yaml"
     unstable = tuning(evaluated("given", 0.1, radius=1.1), evaluated("tuned", 0.15, frequency=2.0))
     assert unstable.kept.name == "tuned"
-    expected = "is 1.5 times larger than with the given gains, which have no certificate of stability."
-    assert expected in _sentences(unstable)[0]
+    answer = answer_of_tuning(unstable, Path("out"))
+    assert "1.5 times larger than with the given gains." in answer.verdict
+    assert "The given gains have no certificate of stability." in answer.lines
 
 
 def test_an_interrupt_before_the_first_answer_promises_nothing(undertow, tmp_path, monkeypatch):

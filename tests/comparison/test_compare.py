@@ -36,7 +36,9 @@ def test_command(scenario, own_law, capsys):
     """A law beside itself, a diverging one and one of a file: numbers, failures, and every file that is left."""
     path, wild = scenario(), scenario("wild", controller=WILD)
     given = f"scenario,again=scenario,{wild},./mine.py:smc"
-    assert run(["compare", path, "--controllers", given, "--trials", "8", "--out", "out"]) == 1  # some failed
+    assert (
+        run(["compare", path, "--controllers", given, "--trials", "8", "--out", "out", "--details"]) == 1
+    )  # some failed
     said = capsys.readouterr()
     assert "Advice: " in said.err and "smc" in said.err
     out, names = Path("out"), ["pid (scenario)", "again", "pid (wild)", "smc"]
@@ -95,8 +97,10 @@ def test_from_python(scenario):
     assert one.median == np.median(quick - slow) and one.low <= one.median <= one.high < 0
     (variation,) = [one for one in found.differences if one.metric == "input_variation"]
     assert variation.larger == 8
-    assert "quick against slow (8 pairs): smaller position rms" in repr(found)
+    assert "quick against slow (8 pairs): smaller position error rms per axis" in repr(found)
     assert "slow & quick" in found.table("latex")
+    shown = found._repr_html_()
+    assert "Comparison: slow, quick" in shown and "The position error rms per axis of quick is smaller" in shown
     with pytest.raises(ut.BadInput, match="`style` must be one of markdown, latex, csv"):
         found.table("word")
 
@@ -108,7 +112,7 @@ def interrupted(*arguments):
 def test_nothing_random(scenario, capsys, monkeypatch):
     """One trial and no interval; equal scenarios differ in nothing. Stopped in a replay, it says how to continue."""
     path = scenario(navigation="perfect")
-    assert run(["compare", path, scenario("copy", navigation="perfect"), "--out", "out"]) == 0
+    assert run(["compare", path, scenario("copy", navigation="perfect"), "--out", "out", "--details"]) == 0
     said = capsys.readouterr()
     assert "Advice: nothing in the scenario is random" in said.err
     assert "copy against axis (1 pair): all differences are zero." in said.out
@@ -131,7 +135,7 @@ def test_scenarios_as_a_whole(scenario, capsys):
     path = scenario()
     Path("other").mkdir()
     Path("other/axis.yaml").write_text(Path(path).read_text().replace("frequency: 2.0", "frequency: 3.0"))
-    assert run(["compare", path, "other/axis.yaml", "--trials", "6", "--out", "out"]) == 0
+    assert run(["compare", path, "other/axis.yaml", "--trials", "6", "--out", "out", "--details"]) == 0
     found = json.loads(Path("out/comparison.json").read_text())
     assert found["names"][1] == "other/axis"
     assert found["differing"] == {"controller": ["pid frequency=2.0", "pid frequency=3.0"]}

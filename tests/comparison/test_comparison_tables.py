@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from undertow.core.metric import Metric
+from undertow.report.answers.comparison_answer import answer_of_comparison
 from undertow.report.run_tables import metrics_rows
 from undertow.studies.comparison.findings import Median, find
 from undertow.studies.comparison.sentences import digits, sentences
@@ -78,10 +79,10 @@ def test_sentences(findings):
     said = sentences(findings)
     assert said[0] == "c did not complete 2 of 10 trials (diverged 2, median time 4 s)."
     assert said[1].startswith("c completed 0 trials that a did not, and a 2 that c did not; this difference is not")
-    assert "b_1 against a (10 pairs): smaller position rms (-43.5 %, in 10 of 10)" in said[3]
-    assert said[3].endswith("no difference is established in attitude rms, saturated fraction.")
+    assert "b_1 against a (10 pairs): smaller position error rms per axis (-43.5 %, in 10 of 10)" in said[3]
+    assert said[3].endswith("no difference is established in attitude error rms per axis, time at the input limits.")
     assert said[4] == "c against a (8 pairs): all differences are zero."
-    assert "c against b_1 (8 pairs): larger position rms" in said[5]
+    assert "c against b_1 (8 pairs): larger position error rms per axis" in said[5]
 
 
 def test_too_few_pairs_for_the_correction(findings):
@@ -153,3 +154,33 @@ def test_csv(findings):
 )
 def test_digits(value, text):
     assert digits(value) == text
+
+
+def test_the_answer_ranks_and_says_what_is_established(findings):
+    """Who completed most comes first, then the smallest error; `c` is behind although its error is that of `a`."""
+    good, verdict, lines = answer_of_comparison(findings, "controller")
+    assert good is False
+    assert verdict == "3 controllers in 10 trials with the same seeds of each: c did not complete all of them."
+    assert lines[0] == "b_1: position error rms per axis 59 cm, attitude error rms per axis 5.5 degrees."
+    assert [line.split(":")[0] for line in lines[:3]] == ["b_1", "a", "c (completed 8 of 10)"]
+    assert lines[3] == "The position error rms per axis of b_1 is smaller than that of a, c: established."
+    assert lines[4].startswith("None of them was tuned")
+
+
+def test_the_answer_of_two_that_completed(findings):
+    """`b_1` is established before `a`; gains that were tuned need no remark."""
+    of_two = findings._replace(
+        names=("a", "b_1"),
+        differences=tuple(each for each in findings.differences if "c" not in (each.candidate, each.baseline)),
+        successes={name: findings.successes[name] for name in ("a", "b_1")},
+        tuning={"a": "tuned for it", "b_1": "by hand"},
+    )
+    good, verdict, lines = answer_of_comparison(of_two, "controller")
+    assert good is True and verdict.endswith("of each: all completed within the criterion of success.")
+    assert lines[2:] == ("The position error rms per axis of b_1 is smaller than that of a: established.",)
+    few = tuple(each._replace(pairs=3) for each in of_two.differences)
+    line = answer_of_comparison(of_two._replace(differences=few), "controller").lines[2]
+    assert line.startswith("3 trials that both completed are too few to establish a difference: it takes ")
+    alone = of_two._replace(differences=tuple(each._replace(p_holm=0.2) for each in of_two.differences))
+    line = answer_of_comparison(alone, "controller").lines[2]
+    assert line == "Between b_1 and a no difference in position error rms per axis is established."

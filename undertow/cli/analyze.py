@@ -12,8 +12,9 @@ from undertow.cli.options.analyze import AnalyzeCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import shares
-from undertow.cli.tables import titled, wide_console
+from undertow.cli.tables import print_lines, titled, wide_console
 from undertow.core.json_text import to_json
+from undertow.report.answers.analysis_answer import answer_of_prediction
 from undertow.report.prediction_page import PredictionTable, tables, write_prediction
 from undertow.scenario.build import build
 from undertow.scenario.checks.flow_stability import flow_advice
@@ -41,13 +42,13 @@ def analyze(command: AnalyzeCommand) -> int:
         (draft.path / "prediction.json").write_text(text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
         warn_of(write_prediction(prediction, warnings, draft.path, command.pdf))
-    for rows in tables(prediction):
+    for rows in tables(prediction) if command.details else ():
         console.print(_table(rows))
-    if prediction.why_not:
-        console.print(f"No metrics are predicted: {prediction.why_not}.", highlight=False, soft_wrap=True)
+    print_lines(console, answer_of_prediction(prediction).text)
+    page = f"Page: {folder / 'prediction.html'}"
+    print_lines(console, [page] if command.details else [page, "Next: --details prints all tables."])
     for sentence in dict.fromkeys(warnings):
         typer.echo(f"Advice: {sentence}", err=True)
-    console.print(f"Page: {folder / 'prediction.html'}", highlight=False, soft_wrap=True)
     return DONE
 
 

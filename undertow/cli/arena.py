@@ -15,12 +15,13 @@ from undertow.cli.options.arena import ArenaCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder
 from undertow.cli.stages import new_lines, stage
-from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.cli.trials import run_trials, worker_count
 from undertow.core import checks
 from undertow.core.atomic_io import write_whole
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.core.json_text import to_json
+from undertow.report.answers.arena_answer import answer_of_board
 from undertow.report.arena_page import PAGE, SCORE, write_board
 from undertow.scenario.reading import dump
 from undertow.studies.arena.entry import ENTRY, LAWS, Cell, folder_of, prepare_entry, read_entry, with_law, write_entry
@@ -102,7 +103,7 @@ def arena(command: ArenaCommand) -> int:
                 f"Stopped; finished trials are kept. To continue: {shlex.join(['undertow', *resume_command])}", err=True
             )
             raise
-        return _conclude(console, folder, command.pdf)
+        return _conclude(console, folder, command.pdf, command.details)
 
 
 def _check_place(folder: Path) -> None:
@@ -181,7 +182,7 @@ def _write_scenarios(law: Candidate, folder: Path, cells: Sequence[Cell], gains:
             write_whole(folder / f"{name.replace(' ', '-')}.yaml", header + dump(keys))
 
 
-def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
+def _conclude(console: Console, folder: Path, pdf: str | None, details: bool) -> int:
     """Write page and tables of all laws in the folder, and print the board."""
     with stage(console, "scores and page"):
         board = board_of(folder)
@@ -195,6 +196,6 @@ def _conclude(console: Console, folder: Path, pdf: str | None) -> int:
     for row in rows.rows:
         table.add_row(*row)
     console.print(table)
-    console.print(SCORE, highlight=False, soft_wrap=True)
-    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    explanation = [SCORE] if details else []
+    print_lines(console, [*explanation, *answer_of_board(board).text, f"Page: {page}"])
     return DONE

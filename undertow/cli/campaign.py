@@ -10,13 +10,14 @@ from undertow.cli.options.campaign import CampaignCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import stage
-from undertow.cli.tables import titled, wide_console
+from undertow.cli.tables import print_lines, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.core.number_text import display_units
-from undertow.report.campaign_page import by_xla, write_campaign
+from undertow.report.answers.campaign_answer import answer_of_campaign, by_xla
+from undertow.report.campaign_page import write_campaign
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.executors import check_cluster
 from undertow.studies.campaign.build_trials import build_trial
@@ -48,15 +49,15 @@ def campaign(command: CampaignCommand) -> int:
             check_replay([prepared.first])
         with resumable(folder, ["campaign", str(path), *(["--replay"] if replay else [])]):
             run_trials(console, prepared, folder, None if resume else _WRITTEN, command.cluster, count)
-            return _conclude(console, prepared, folder, command.pdf, replay)
+            return _conclude(console, prepared, folder, command)
 
 
-def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | None, replay: bool) -> int:
+def _conclude(console: Console, prepared: Prepared, folder: Path, command: CampaignCommand) -> int:
     """Write page, summary and the scenarios of the worst trials; print the summary."""
     with stage(console, "summary"):
         results = load(folder)
         summary_data = summary(results, prepared.trials)
-    worst_trials = summary_data["worst"][:_REPLAYED] if replay else []
+    worst_trials = summary_data["worst"][:_REPLAYED] if command.replay else []
     part_cache = PartCache()
     worst = {f"trial {trial}": build_trial(prepared.trials, part_cache, trial) for trial in worst_trials}
     replays, missing = run_again(console, worst)
@@ -64,12 +65,12 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, pdf: str | Non
         write_whole(folder / "summary.json", to_json(summary_data, indent=1) + "\n")
         _write_worst(prepared, summary_data["worst"], folder / "worst")
         title = prepared.trials.campaign.description or f"Campaign {prepared.trials.text.name}"
-        page, failures = write_campaign(title, results, summary_data, folder, pdf, replays)
+        page, failures = write_campaign(title, results, summary_data, folder, command.pdf, replays)
     warn_of([*missing, *failures])
-    console.print(table(results, summary_data))
-    for sentence in sentences(summary_data):
-        console.print(sentence, highlight=False, soft_wrap=True)
-    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    if command.details:
+        console.print(table(results, summary_data))
+        print_lines(console, sentences(summary_data))
+    print_lines(console, [*answer_of_campaign(results, summary_data).text, f"Page: {page}"])
     return DONE if set(summary_data["status"]) <= {"completed"} else RUN_FAILED
 
 

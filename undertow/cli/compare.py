@@ -15,25 +15,28 @@ from undertow.cli.options.compare import CompareCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.replay_option import check_replay, run_again
 from undertow.cli.stages import new_lines, stage
-from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.cli.trials import built_with_advice, resumable, run_trials, trial_text, trials_folder, worker_count
 from undertow.core import checks
 from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.json_text import to_json
 from undertow.core.status import Status
-from undertow.report.comparison_page import write_comparison
+from undertow.report.answers.comparison_answer import answer_of_comparison
+from undertow.report.comparison_page import noun_of, write_comparison
 from undertow.scenario.part_cache import PartCache
 from undertow.studies.campaign.build_trials import build_trial
 from undertow.studies.campaign.run_campaign import STORE
 from undertow.studies.campaign.store_results import load
 from undertow.studies.comparison.budget_tables import budget_sentences
 from undertow.studies.comparison.candidates import file_stem
-from undertow.studies.comparison.comparison import Comparison, read_comparison
+from undertow.studies.comparison.comparison import ComparisonResult, read_comparison
 from undertow.studies.comparison.equal_budgets import FOLDER, check_budget, equal_budgets
+from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.prepare import PreparedComparison, Tuner, prepare_comparison
 from undertow.studies.comparison.sentences import sentences
 from undertow.studies.comparison.step_time import HOW_LONG, step_times
 from undertow.studies.comparison.tables import NOTE, medians
+from undertow.studies.comparison.tables import table as table_of
 
 # File of each style of table.
 _TABLES = {"markdown": "comparison.md", "latex": "comparison.tex", "csv": "comparison.csv"}
@@ -69,7 +72,7 @@ def compare(command: CompareCommand) -> int:
             check_replay(ready.built)
         with resumable(folder, resume_command):
             run_trials(console, ready.prepared, folder, None if resume else _WRITTEN, None, count)
-            return _conclude(console, ready, folder, command.pdf, replay)
+            return _conclude(console, ready, folder, command)
 
 
 @contextlib.contextmanager
@@ -99,9 +102,9 @@ def _remove_empty(*folders: Path) -> None:
             folder.rmdir()
 
 
-def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: str | None, replay: bool) -> int:
+def _conclude(console: Console, ready: PreparedComparison, folder: Path, command: CompareCommand) -> int:
     """Write page, tables and scenarios; print the findings."""
-    firsts = dict(zip(ready.names, ready.built, strict=True)) if replay else {}
+    firsts = dict(zip(ready.names, ready.built, strict=True)) if command.replay else {}
     replays, missing = run_again(console, firsts)
     with stage(console, "time of a step"):
         times = interruptible(lambda: step_times(dict(zip(ready.names, ready.built, strict=True))))
@@ -111,14 +114,14 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
         findings = comparison.findings
         files = _write_scenarios(ready, comparison, folder / "scenarios")
         for style, name in _TABLES.items():
-            write_whole(folder / name, comparison.table(style))
+            write_whole(folder / name, table_of(findings, style))
         tuned = {} if ready.budgets is None else {"budgets": ready.budgets.data()}
         write_whole(folder / "comparison.json", to_json(findings.data() | tuned, indent=1) + "\n")
         # In a file of their own: they differ from run to run.
         step_time_data = {name: step_time._asdict() for name, step_time in times.items()}
         write_whole(folder / _TIMES, to_json(step_time_data, indent=1) + "\n")
         page, failures = write_comparison(
-            comparison, results, ready.subject, folder, pdf, replays, times, ready.budgets
+            comparison, results, ready.subject, folder, command.pdf, replays, times, ready.budgets
         )
     warn_of([*missing, *failures])
     rows = medians(findings, times)
@@ -126,20 +129,24 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, pdf: st
     for row in rows.rows:
         table.add_row(*row)
     console.print(table)
-    budget_notes = [] if ready.budgets is None else budget_sentences(ready.budgets)
-    for sentence in (NOTE, HOW_LONG, *sentences(findings), *budget_notes):
-        console.print(sentence, highlight=False, soft_wrap=True)
-    for name, note in findings.tuning.items():
-        console.print(f"{name}: {note}.", highlight=False, soft_wrap=True)
-    for name, note in zip(ready.names, ready.notes, strict=True):
-        if not note.tuned and name in files and ready.budgets is None:
-            message = f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
-            console.print(message, highlight=False, soft_wrap=True)
-    console.print(f"Page: {page}", highlight=False, soft_wrap=True)
+    if command.details:
+        print_lines(console, _details(ready, findings, files))
+    print_lines(console, [*answer_of_comparison(findings, noun_of(findings)).text, f"Page: {page}"])
     return DONE if all(findings.completed(name) == findings.trials for name in findings.names) else RUN_FAILED
 
 
-def _write_scenarios(ready: PreparedComparison, comparison: Comparison, folder: Path) -> dict[str, Path]:
+def _details(ready: PreparedComparison, findings: Findings, files: dict[str, Path]) -> Iterator[str]:
+    """What the statistics say of every two candidates, and how each was tuned."""
+    yield from (NOTE, HOW_LONG, *sentences(findings))
+    yield from () if ready.budgets is None else budget_sentences(ready.budgets)
+    for name, note in findings.tuning.items():
+        yield f"{name}: {note}."
+    for name, note in zip(ready.names, ready.notes, strict=True):
+        if not note.tuned and name in files and ready.budgets is None:
+            yield f"To tune {name}: undertow tune {files[name]}; then compare its tuned.yaml"
+
+
+def _write_scenarios(ready: PreparedComparison, comparison: ComparisonResult, folder: Path) -> dict[str, Path]:
     """Write the scenario of the first trial of each candidate, and of its first failed one; the former by name.
 
     `undertow simulate` repeats such a trial; `undertow tune` tunes its controller.

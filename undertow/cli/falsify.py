@@ -13,12 +13,13 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.options.falsify import FalsifyCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.cli.trials import trial_text
 from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
+from undertow.report.answers.falsification_answer import answer_of_falsification, violated
 from undertow.report.figures import save_all
 from undertow.report.figures.falsification import beside_nominal_figure, search_figure
 from undertow.scenario.reading import read
@@ -54,7 +55,7 @@ def falsify_scenario(command: FalsifyCommand) -> int:
         data = as_data(falsification)
         (draft.path / "falsify.json").write_text(to_json(data, indent=2) + "\n", encoding="utf-8")
         if falsification.violation is not None:
-            sentence = f"Counter-example of {scenario.name}: {_violated(falsification)}."
+            sentence = f"Counter-example of {scenario.name}: {violated(falsification)}."
             scenario_text = trial_text(falsification.single_runs[-1].built, sentence)
             (draft.path / "counterexample.yaml").write_text(scenario_text, encoding="utf-8")
         draft.publish()  # before the figures, which may fail
@@ -64,10 +65,9 @@ def falsify_scenario(command: FalsifyCommand) -> int:
             nominal, broken = (run.dataset for run in falsification.single_runs)
             plots["counterexample"] = lambda: beside_nominal_figure(nominal, broken)
         warn_of(save_all(lambda: plots, draft.path / "figures", command.pdf).failures)
-    if falsification.violation is not None:
+    if falsification.violation is not None and command.details:
         console.print(_table(falsification))
-    for line in _sentences(falsification, folder):
-        console.print(line, highlight=False, soft_wrap=True)
+    print_lines(console, [*answer_of_falsification(falsification, folder).text, f"Results: {folder}"])
     return DONE
 
 
@@ -92,11 +92,6 @@ def _live(
         yield say, watch
 
 
-def _violated(falsification: Falsified) -> str:
-    broken = [f"{name} (robustness {value:.3g})" for name, value in falsification.broken.items() if not value > 0]
-    return f"violates {', '.join(broken)}"
-
-
 def _table(falsification: Falsified) -> Table:
     assert falsification.violation is not None
     table = titled("Counter-example", "key", *map(numbers, ("low", "nominal", "value", "high", "departure")))
@@ -104,23 +99,3 @@ def _table(falsification: Falsified) -> Table:
         row = (axis.low, axis.nominal, falsification.values()[axis.key], axis.high)
         table.add_row(axis.key, *(f"{value:.5g}" for value in row), f"{100 * away:.3g} %")
     return table
-
-
-def _sentences(falsification: Falsified, folder: Path) -> list[str]:
-    runs, objective = falsification.objective.runs, falsification.objective
-    remarks = [sentence for sentence in (falsification.nominal_model(),) if sentence]
-    gradient_method = "by differentiation" if falsification.differentiated else "by differences"
-    ending = "the search converged" if falsification.finished else "the budget is used up"
-    if falsification.violation is None:
-        least = min(objective.robustnesses)
-        none = f"No violation in {runs} runs within the bounds; least robustness {least:.4g}. This proves nothing"
-        return [f"{none}: {ending}, gradients {gradient_method}.", *remarks, f"Results: {folder}"]
-    departure = f"{falsification.violation.size:.4g} of the bounds (norm)"
-    repetition = "repeats" if falsification.repeated() else "does not repeat"
-    return [
-        f"The counter-example {_violated(falsification)}. Its departure is {departure}. "
-        f"{runs} runs: {ending}, gradients {gradient_method}.",
-        *remarks,
-        f"A single run {repetition} this bit for bit: undertow simulate {folder / 'counterexample.yaml'}",
-        f"Results: {folder}",
-    ]

@@ -13,11 +13,12 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.run_presentation import RequestedPrediction, predict, write_outputs
 from undertow.cli.stages import stage
-from undertow.cli.tables import terminal_table, wide_console
+from undertow.cli.tables import print_lines, terminal_table, wide_console
 from undertow.core.status import Status
 from undertow.logs.run_log import log_of_run
 from undertow.outside.rerun_file import check_rerun, write_rerun
-from undertow.report.answer import RunAnswer, answer_of
+from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.plotting import plotting_process
 from undertow.report.run_page import shown_of
 from undertow.report.run_tables import certificate_rows, metrics_rows, transition_rows
@@ -57,7 +58,7 @@ def simulate(command: SimulateCommand) -> int:
             plotting.plot(shown_of(result), command.pdf)
             if command.details:
                 _print_tables(result, console)
-            answer = answer_of(result)
+            answer = answer_of_run(result)
             _print_answer(answer, result, console)
             write(result, draft.path)
             repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
@@ -88,10 +89,9 @@ def _built(path: Path, console: Console, allow_code: bool) -> tuple[Built, list[
     return built, [advice.sentence for advice in (*built.advice(), *vehicle_advice(built), *flow_advice(built))]
 
 
-def _print_answer(answer: RunAnswer, result: ScenarioResult, console: Console) -> None:
+def _print_answer(answer: PlainAnswer, result: ScenarioResult, console: Console) -> None:
     """Print how the run ended, and whether it went well."""
-    for line in (answer.verdict, *answer.lines):
-        console.print(line, highlight=False, soft_wrap=True)
+    print_lines(console, answer.text)
     for name, verdict in result.facts.requirements.items():
         outcome = "holds" if verdict.holds else "is violated"
         console.print(
@@ -109,7 +109,7 @@ def _print_tables(result: ScenarioResult, console: Console) -> None:
         console.print(terminal_table(transition_rows(facts.transitions, lost_thrusters(result.series))))
 
 
-def _advice_of(answer: RunAnswer, result: ScenarioResult) -> list[str]:
+def _advice_of(answer: PlainAnswer, result: ScenarioResult) -> list[str]:
     """What is to be said of a run beside its answer."""
     facts = result.facts
     advised = [f"{finding}." for finding in (facts.navigation or {"findings": ()})["findings"]]

@@ -1,5 +1,6 @@
 """Tables and console of the terminal."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from rich.console import Console
@@ -49,6 +50,12 @@ class _Output(Console):
 
     def on_broken_pipe(self) -> None:
         raise  # what Rich has caught, and would end the process for
+
+
+def print_lines(console: Console, lines: Iterable[str]) -> None:
+    """Print sentences, each on a line of its own."""
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
 
 
 def wide_console() -> Console:

@@ -14,14 +14,14 @@ from undertow.cli.interruptible import interruptible
 from undertow.cli.options.tune import TuneCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.tables import numbers, titled, wide_console
+from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core import checks
 from undertow.core.json_text import to_json
+from undertow.report.answers.tuning_answer import answer_of_tuning
 from undertow.report.figures import save_all
 from undertow.report.figures.tuning import tuning_figure
 from undertow.scenario.reading import read
-from undertow.studies.tuning.cost import times_other
 from undertow.studies.tuning.objective import Improvement
 from undertow.studies.tuning.tune import METHODS, Tuned, as_data, as_scenario, tune
 
@@ -53,10 +53,9 @@ def tune_scenario(command: TuneCommand) -> int:
         draft.publish()  # before the figure, which may fail
         checkpoint.unlink()
         warn_of(save_all(lambda: {"tuning": lambda: tuning_figure(data)}, draft.path / "figures", command.pdf).failures)
-    console.print(_table(tuning))
-    for line in _sentences(tuning):
-        console.print(line, highlight=False, soft_wrap=True)
-    console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
+    if command.details:
+        console.print(_table(tuning))
+    print_lines(console, [*answer_of_tuning(tuning, folder).text, f"Results: {folder}"])
     return DONE
 
 
@@ -97,36 +96,3 @@ def _table(tuning: Tuned) -> Table:
             f"{gains.certificate.worst:.5f}",
         )
     return table
-
-
-def _sentences(tuning: Tuned) -> list[str]:
-    scenario_gains, *_, tuned = tuning.evaluated
-    chosen_gains = tuning.kept
-    options = ", ".join(f"{name} {_short(value)}" for name, value in (tuned.options or {}).items())
-    ending = "the search has converged" if tuning.finished else "the time budget is used up"
-    if tuning.searched == 0:
-        ending += ", and only the initial design (the given gains and points spread over their ranges) was evaluated"
-    if chosen_gains is scenario_gains:
-        summary = (
-            f"The given gains are kept: on held-out runs their cost is {scenario_gains.held_out_cost:.4g}, and "
-            f"{tuned.held_out_cost:.4g} with the best that were found ({options})."
-        )
-    else:
-        uncertified = "" if scenario_gains.certificate.holds else ", which have no certificate of stability"
-        summary = (
-            f"Tuned: {options}\n"
-            f"The held-out cost is {times_other(tuned.held_out_cost, scenario_gains.held_out_cost)} with the given "
-            f"gains{uncertified}."
-        )
-    spent = (
-        f"{tuning.evaluations} evaluations, {tuning.rejected} rejected without a certificate, {tuning.elapsed:.0f} s"
-    )
-    return [f"{summary} {spent}; {ending}."]
-
-
-def _short(value: Any) -> str:
-    """Gains as text; equal gains of several axes are shown once."""
-    if not isinstance(value, list):
-        return f"{value:g}"
-    rows = [_short(entry) if isinstance(entry, list) else f"{entry:g}" for entry in value]
-    return rows[0] if len(set(rows)) == 1 else f"({', '.join(rows)})"

@@ -5,6 +5,8 @@ import re
 from pathlib import Path
 
 from undertow.core.atomic_io import write_whole
+from undertow.report.answers.arena_answer import answer_of_board
+from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.arena import arena_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
@@ -77,10 +79,12 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
             title,
             tag("h1", prose(title)),
             tag("p", prose(lead), class_="lead"),
+            answer_block(answer_of_board(board)),
             *(tag("p", prose(sentence)) for sentence in saved.failures),
+            *_shown(pictures, "tasks"),
             _rows(leader_rows(board)),
             tag("p", prose(f"{SCORE} {HOW_LONG}"), class_="small"),
-            section("tasks", "Errors by task", *_shown(pictures, "tasks"), _rows(task_rows(board))),
+            section("tasks", "Errors by task", _rows(task_rows(board))),
             *([_ratios(ratios)] if ratios.rows else []),
             section("vehicles", "Errors by vehicle", _rows(vehicle_rows(board))),
             *([_robustness(pictures, margins)] if margins.rows else []),

@@ -11,6 +11,8 @@ from undertow.analysis.metrics import titled_name
 from undertow.core.atomic_io import write_whole
 from undertow.core.number_text import display_units, infinite
 from undertow.core.status import Status
+from undertow.report.answers.campaign_answer import answer_of_campaign, by_xla
+from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all
 from undertow.report.formats import chip, ending, number, prose, quantity, unit
@@ -61,12 +63,13 @@ def write_campaign(
     page = document(
         title,
         tag("h1", prose(title)),
-        tag("p", f"{summary['done']} of {summary['trials']} trials", class_="lead"),
+        answer_block(answer_of_campaign(results, summary)),
+        plotted["distributions"],
         *([tag("p", prose(summary["nominal_model"]))] if summary["nominal_model"] else []),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("status", "Status of the trials", *_endings(summary)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, summary)),
-        section("metrics", "Distributions", plotted["distributions"], distributions(results, summary)),
+        section("metrics", "Distributions", distributions(results, summary)),
         *_optional(
             "sensitivity", "Sensitivity", *_chance(summary), plotted["sensitivity"], *_choices(results, summary)
         ),
@@ -179,16 +182,6 @@ def endings(summary: Mapping[str, Any]) -> Html:
         )
     head = ("trials", *map(named, combinations))
     return table(head, rows, numeric=range(1, len(head)), wide=len(combinations) > 3)
-
-
-def by_xla(summary: Mapping[str, Any]) -> str:
-    """A sentence about trials that used the XLA backend; empty where none did."""
-    if not summary["by_xla"]:
-        return ""
-    consequence = "which is slower, and a single run repeats such a trial only up to rounding"
-    return (
-        f"{summary['by_xla']} trials used the XLA backend, {consequence}. `undertow simulate` of one states the reason."
-    )
 
 
 def requirements(results: Results, summary: Mapping[str, Any]) -> Html:

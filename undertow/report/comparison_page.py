@@ -7,16 +7,19 @@ from pathlib import Path
 import xarray as xr
 
 from undertow.core.atomic_io import write_whole
+from undertow.report.answers.comparison_answer import answer_of_comparison
+from undertow.report.answers.notebook import in_notebook
+from undertow.report.answers.plain_answer import answer_block
 from undertow.report.campaign_page import asked
 from undertow.report.figures.comparison import alike, comparison_plots
-from undertow.report.figures.writing import save_all
+from undertow.report.figures.writing import save_all, small_png
 from undertow.report.formats import prose
 from undertow.report.page import Html, bullets, document, figure, section, table, tag
 from undertow.report.replay.replay_data import ReplayData
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.studies.campaign.store_results import Results
 from undertow.studies.comparison.budget_tables import budget_rows, budget_sentences
-from undertow.studies.comparison.comparison import Comparison
+from undertow.studies.comparison.comparison import ComparisonResult
 from undertow.studies.comparison.equal_budgets import EqualBudgets
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.sentences import HOW, sentences
@@ -49,7 +52,7 @@ _FAIR = (
 
 
 def write_comparison(
-    comparison: Comparison,
+    comparison: ComparisonResult,
     results: Results,
     subject: str,
     folder: Path,
@@ -74,7 +77,7 @@ def write_comparison(
         OSError: the folder cannot be written.
     """
     findings = comparison.findings
-    noun = findings.dimension if findings.dimension in _COMPARED else "variant"
+    noun = noun_of(findings)
     saved = save_all(lambda: comparison_plots(comparison.dataset, findings), folder / "figures", pdf)
     title = f"Comparison: {', '.join(findings.names)}"
     figures = [
@@ -82,20 +85,23 @@ def write_comparison(
         for name, vector in saved.vectors.items()
         for caption in [_CAPTIONS[name].format(noun=noun)]
     ]
+    further_figures = figures[1:]
     if alike_sentence := _alike(comparison.dataset, findings):
-        figures.insert(0, tag("p", prose(alike_sentence)))
+        further_figures.insert(0, tag("p", prose(alike_sentence)))
     page = document(
         title,
         tag("h1", prose(title)),
         tag("p", prose(_lead(findings, subject)), class_="lead"),
+        answer_block(answer_of_comparison(findings, noun)),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
+        *figures[:1],
         _rows(medians(findings, times)),
         tag("p", prose(f"{NOTE}{f' {HOW_LONG}' if times else ''}"), class_="small"),
         bullets([prose(sentence) for sentence in sentences(findings)]),
         *([_differing(findings)] if findings.differing else []),
         *([replay_section(replays, _replayed(replays, findings))] if replays else []),
         section("tuning", "Tuning", *_how_tuned(noun, findings, budgets)),
-        section("figures", "Figures", *figures),
+        section("figures", "More figures", *further_figures),
         section("endings", "Status of the trials", _endings(findings)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(findings), words=2)),
         section("configuration", "Configuration", *asked(results)),
@@ -104,6 +110,22 @@ def write_comparison(
     path = folder / "comparison.html"
     write_whole(path, page)
     return path, saved.failures
+
+
+def in_notebook_of(comparison: ComparisonResult) -> Html:
+    """A comparison as a notebook shows it: the answer and the first of its figures."""
+    findings = comparison.findings
+    noun, pictures = noun_of(findings), []
+    for name, make in list(comparison_plots(comparison.dataset, findings).items())[:1]:
+        caption = _CAPTIONS[name].format(noun=noun)
+        pictures.append(figure(small_png(make()), name, caption, prose(caption)))
+    title = f"Comparison: {', '.join(findings.names)}"
+    return in_notebook(title, answer_of_comparison(findings, noun), *pictures)
+
+
+def noun_of(findings: Findings) -> str:
+    """What is compared, in a word."""
+    return findings.dimension if findings.dimension in _COMPARED else "variant"
 
 
 def _lead(findings: Findings, subject: str) -> str:

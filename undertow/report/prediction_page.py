@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.core.number_text import display_units
+from undertow.report.answers.analysis_answer import answer_of_prediction
+from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.prediction import force_label, prediction_plots
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
@@ -51,9 +53,11 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
         f"Prediction: {title}",
         tag("h1", "Prediction from the linearised closed loop"),
         tag("p", prose(title), class_="lead"),
+        answer_block(answer_of_prediction(prediction)),
+        *figures[:1],
         *warnings,
         *(_section(number, rows) for number, rows in enumerate(tables(prediction))),
-        section("figures", "Figures", *figures),
+        section("figures", "More figures", *figures[1:]),
         tag("p", prose(LEFT_OUT), class_="small"),
     )
     (folder / "prediction.html").write_text(page, encoding="utf-8")

@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from undertow.core.atomic_io import write_whole
-from undertow.report.answer import RunAnswer, answer_of
+from undertow.report.answers.notebook import in_notebook
+from undertow.report.answers.plain_answer import answer_block
+from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.formats import number, prose
 from undertow.report.page import Html, bullets, document, figure, folded, join, section, table, tag, text
 from undertow.report.plotted import Plotted, Shown
@@ -37,14 +39,6 @@ _CAPTIONS = {
     "certificate": "Lyapunov function of the stability proof and its rate along the run, and the fuzzy weights.",
     "measurement": "What the controller received less the true outputs and rates.",
 }
-
-
-# The looks of a run in a notebook, which has a style sheet of its own.
-_NOTEBOOK = (
-    ".undertow .answer { border-left: 6px solid #777; padding: 0.2em 1em; margin: 0.6em 0; } "
-    ".undertow .holds { border-color: #2f7d4f; } .undertow .fails { border-color: #b3402a; } "
-    ".undertow img { width: 100%; max-width: 60em; background: white; } .undertow figure { margin: 0; }"
-)
 
 
 class RunPageContents(NamedTuple):
@@ -106,7 +100,7 @@ def _page(
     return document(
         facts.title,
         tag("h1", prose(facts.title)),
-        answer_block(answer_of(run)),
+        answer_block(answer_of_run(run)),
         first,
         replay,
         *_what_happened(run),
@@ -117,22 +111,14 @@ def _page(
     )
 
 
-def in_notebook(run: RunRecord, summary: bytes) -> Html:
+def run_in_notebook(run: RunRecord, summary: bytes) -> Html:
     """A run as a notebook shows it: the answer and one picture.
 
     Args:
         run: its record.
         summary: figure `summary`, PNG.
     """
-    shown = tag("strong", prose(run.facts.title)), answer_block(answer_of(run)), _figure(summary, "summary")
-    return tag("div", tag("style", Html(_NOTEBOOK)), *shown, class_="undertow")
-
-
-def answer_block(answer: RunAnswer) -> Html:
-    """The answer, with a colour that says whether it went well."""
-    looks = {True: "holds", False: "fails", None: "open"}[answer.good]
-    lines = bullets([prose(line) for line in answer.lines])
-    return tag("div", tag("p", tag("strong", prose(answer.verdict))), lines, class_=f"answer {looks}")
+    return in_notebook(run.facts.title, answer_of_run(run), _figure(summary, "summary"))
 
 
 def _figure(picture: str | bytes, name: str) -> Html:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, ScenarioFile, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, ScenarioFile, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,3 +23,4 @@ class AnalyzeCommand(Command):
     overwrite: Overwrite = False
     allow_code: AllowCode = False
     pdf: Pdf = None
+    details: Details = False

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import Pdf, Workers
+from undertow.cli.options.shared import Details, Pdf, Workers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,3 +51,4 @@ class ArenaCommand(Command):
         False
     )
     pdf: Pdf = None
+    details: Details = False

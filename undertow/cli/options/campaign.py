@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, Replay, Resume, Workers, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Replay, Resume, Workers, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,3 +34,4 @@ class CampaignCommand(Command):
     allow_code: AllowCode = False
     pdf: Pdf = None
     replay: Replay = False
+    details: Details = False

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, Replay, Resume, Workers, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Replay, Resume, Workers, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,3 +51,4 @@ class CompareCommand(Command):
             "trials then have held-out seeds, parameter sets and wave heights.",
         ),
     ] = None
+    details: Details = False

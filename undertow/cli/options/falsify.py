@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Overwrite, Pdf, Resume, ScenarioFile, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Resume, ScenarioFile, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,3 +36,4 @@ class FalsifyCommand(Command):
     overwrite: Overwrite = False
     allow_code: AllowCode = False
     pdf: Pdf = None
+    details: Details = False

@@ -1,28 +1,23 @@
-"""The result of a comparison, and `ut.compare`, which runs one from Python."""
+"""The result of a comparison, and what runs one without files."""
 
-import dataclasses
 import os
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from undertow.analysis.metrics import MEANINGS
-from undertow.core import checks
 from undertow.simulation.executors import make_executor
 from undertow.studies.campaign.columns import DONE
 from undertow.studies.campaign.run_campaign import STORE, run_campaign
 from undertow.studies.campaign.store_results import Results, load
 from undertow.studies.comparison.equal_budgets import equal_budgets
 from undertow.studies.comparison.findings import Findings, find
-from undertow.studies.comparison.paired import PairedDifference
 from undertow.studies.comparison.prepare import PreparedComparison, prepare_comparison
-from undertow.studies.comparison.sentences import sentences
-from undertow.studies.comparison.tables import STYLES, table
 
 # Metrics that are compared, where they are defined: those that mean the same for every law.
 _COMPARED = (
@@ -37,8 +32,7 @@ _COMPARED = (
 )
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
-class Comparison:
+class ComparisonResult(NamedTuple):
     """A finished comparison.
 
     Attributes:
@@ -50,32 +44,8 @@ class Comparison:
     dataset: xr.Dataset
     findings: Findings
 
-    @property
-    def differences(self) -> tuple[PairedDifference, ...]:
-        """Every two candidates in every metric."""
-        return self.findings.differences
 
-    def table(self, style: str = "markdown") -> str:
-        """Metrics and differences as a table.
-
-        Args:
-            style: `markdown`; `latex`, which needs the packages booktabs and tabularx; or `csv`, a line per metric and
-                candidate.
-
-        Raises:
-            BadInput: another style.
-        """
-
-        checks.choice("style", style, tuple(STYLES))
-        return table(self.findings, style)
-
-    def __repr__(self) -> str:
-
-        names = ", ".join(self.findings.names)
-        return "\n".join([f"Comparison of {names}, {self.findings.trials} trials each.", *sentences(self.findings)])
-
-
-def read_comparison(folder: Path, results: Results, ready: PreparedComparison) -> Comparison:
+def read_comparison(folder: Path, results: Results, ready: PreparedComparison) -> ComparisonResult:
     """The result of a comparison whose campaign has run in a folder and was read from there."""
 
     with xr.open_zarr(folder / STORE, consolidated=False) as opened:
@@ -87,10 +57,10 @@ def read_comparison(folder: Path, results: Results, ready: PreparedComparison) -
     metrics = [name for name in (*_COMPARED, *custom_metrics) if name in results.metrics]
     tuning = {name: note.sentence for name, note in zip(ready.names, ready.notes, strict=True)}
     findings = find(dataset, ready.dimension, metrics, tuning, ready.differing)
-    return Comparison(dataset, findings._replace(nominal_model=ready.prepared.trials.nominal_model()))
+    return ComparisonResult(dataset, findings._replace(nominal_model=ready.prepared.trials.nominal_model()))
 
 
-def compare(
+def run_comparison(
     scenario: str | Path | Mapping[str, Any] | Sequence[str | Path],
     controllers: Sequence[str] | Mapping[str, Any] | None = None,
     trials: int | None = None,
@@ -98,7 +68,7 @@ def compare(
     tune: int | None = None,
     workers: int | None = None,
     allow_code: bool = False,
-) -> Comparison:
+) -> ComparisonResult:
     """Compare controllers on one scenario, or several scenarios, trial by trial with the same samples and seeds.
 
     What `undertow compare` does, with the same numbers, and without its files.
@@ -127,7 +97,7 @@ def compare(
             tuner = lambda candidates, base: equal_budgets(candidates, base, tune, Path(tuning_folder))
         ready = prepare_comparison(sources, controllers, trials, allow_code, tuner)
     for sentence in ready.advice:
-        warnings.warn(sentence, stacklevel=2)
+        warnings.warn(sentence, stacklevel=3)
     with tempfile.TemporaryDirectory() as folder, make_executor(None, workers or os.cpu_count() or 1) as executor:
         run_campaign(ready.prepared, Path(folder), executor, lambda tally: None)
         return read_comparison(Path(folder), load(Path(folder)), ready)

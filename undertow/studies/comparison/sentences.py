@@ -2,6 +2,7 @@
 
 import math
 
+from undertow.analysis.metrics import titled_name
 from undertow.core.number_text import display_units
 from undertow.studies.comparison.findings import COMPLETED, Findings
 from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, PairedDifference
@@ -59,8 +60,8 @@ def _front(front: Front) -> str:
 
 
 def metric_name(metric: str) -> str:
-    """A metric as words."""
-    return metric.replace("_", " ")
+    """A metric in a few words, within a sentence that separates by commas."""
+    return titled_name(metric).replace(",", "")
 
 
 def value_with_unit(value: float, unit: str) -> str:
@@ -99,7 +100,7 @@ def _between(findings: Findings, candidate: str, baseline: str) -> str:
             f"{metric_name(difference.metric)} {size}" for difference, size in zip(differences, sizes, strict=True)
         ]
         return f"{sentence}: {', '.join(parts)}. All trials are equal, so that nothing is established by statistics."
-    if pairs < (needed := _needed(findings)):
+    if pairs < (needed := needed_pairs(findings)):
         return f"{sentence}: too few to establish a difference; at least {needed} pairs are needed."
     established = [difference for difference in differences if difference.established]
     smaller = [
@@ -113,7 +114,7 @@ def _between(findings: Findings, candidate: str, baseline: str) -> str:
     return f"{sentence}: {'; '.join(parts)}."
 
 
-def _needed(findings: Findings) -> int:
+def needed_pairs(findings: Findings) -> int:
     """Pairs from which on the smallest p of the rank test, 2^(1 - n), is below 5 % after correction for all tests."""
     tests = sum(bool(difference.smaller or difference.larger) for difference in findings.differences)
     return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)

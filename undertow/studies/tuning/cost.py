@@ -87,8 +87,13 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in parts))
 
 
+_ALIKE = 0.005  # difference of two costs, as a share, that three digits do not show
+
+
 def times_other(cost: float, other: float) -> str:
     """A cost as a multiple of another one, in words that say which is smaller."""
+    if abs(cost - other) < _ALIKE * other:
+        return "as large as"
     return f"{other / cost:.3g} times smaller than" if cost < other else f"{cost / other:.3g} times larger than"
 
 

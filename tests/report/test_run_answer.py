@@ -6,7 +6,7 @@ import pytest
 from undertow.analysis.metrics import MEANINGS
 from undertow.analysis.success import evaluate_success
 from undertow.core.status import Status
-from undertow.report.answer import answer_of
+from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.quantities import quantity
 from undertow.scenario.results.run_facts import RunFacts
 from undertow.scenario.results.run_result import RunRecord
@@ -75,7 +75,7 @@ def record(make_run, steady=GOOD, off=0.0, certificate=None, status=Status.OK, *
 
 
 def test_a_good_run_says_so_with_numbers_and_limits(make_run):
-    good, verdict, (judged, largest, effort, limited) = answer_of(record(make_run))
+    good, verdict, (judged, largest, effort, limited) = answer_of_run(record(make_run))
     assert good and verdict == "It went well from 10 to 20 s."
     assert judged.startswith(
         "Position error, rms per axis 1.5 cm (limit 5 cm); attitude error, rms per axis 0.15 degrees"
@@ -86,7 +86,7 @@ def test_a_good_run_says_so_with_numbers_and_limits(make_run):
 
 
 def test_what_exceeds_its_limit_comes_first(make_run):
-    good, verdict, (judged, *_) = answer_of(record(make_run, GOOD | {"attitude_rms": 0.5}))
+    good, verdict, (judged, *_) = answer_of_run(record(make_run, GOOD | {"attitude_rms": 0.5}))
     assert (
         good is False
         and verdict.startswith("It did not go well")
@@ -95,7 +95,7 @@ def test_what_exceeds_its_limit_comes_first(make_run):
 
 
 def test_each_limit_has_its_reason(make_run):
-    last = lambda *arguments, **options: answer_of(record(make_run, *arguments, **options)).lines[-1]
+    last = lambda *arguments, **options: answer_of_run(record(make_run, *arguments, **options)).lines[-1]
     assert "the inputs, which are at their limits" in last(GOOD | {"saturated_fraction": 0.1})
     assert "whose position is 1.2 cm off" in last(off=0.012)
     unmoved = {"hypotheses": [{"name": "rank", "steady": 0.0}]}
@@ -104,6 +104,6 @@ def test_each_limit_has_its_reason(make_run):
 
 
 def test_a_run_that_ended_early_did_not_go_well(make_run):
-    good, verdict, lines = answer_of(record(make_run, None, status=Status.DIVERGED))
+    good, verdict, lines = answer_of_run(record(make_run, None, status=Status.DIVERGED))
     assert good is False and verdict == f"It did not go well: diverged after 120 s. {Status.DIVERGED.sentence}"
     assert lines[0].startswith("Largest error in the whole run") and np.all(["limits it" not in line for line in lines])

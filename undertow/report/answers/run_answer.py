@@ -1,12 +1,12 @@
-"""What a run comes to, in plain words and people's units: the answer before all tables."""
+"""The answer of one run."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from undertow.core.metric import Metric
 from undertow.core.status import Status
+from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.quantities import LEAST, quantity
 from undertow.report.signal_names import lost_thrusters
 from undertow.scenario.results.run_facts import RunFacts
@@ -17,26 +17,12 @@ _SOME = 0.01  # share of the time at the limits of the inputs that is worth sayi
 _MEASURED = 0.5  # share of the error that the measurement explains, from which on it is said to limit the run
 
 
-class RunAnswer(NamedTuple):
-    """What is said of a run.
-
-    Attributes:
-        good: whether it went well; None where nothing says what counts as success.
-        verdict: the same in a sentence.
-        lines: the errors and what they are judged by, how far off at most, what it took, and what limits it.
-    """
-
-    good: bool | None
-    verdict: str
-    lines: tuple[str, ...]
-
-
-def answer_of(run: RunRecord) -> RunAnswer:
-    """The answer of a finished run."""
+def answer_of_run(run: RunRecord) -> PlainAnswer:
+    """The errors and what they are judged by, how far off at most, what it took, and what limits a finished run."""
     facts = run.facts
     good = facts.success.within if facts.success is not None else None if facts.status is Status.OK else False
     lines = (*_criterion(facts), *_largest(facts), *_effort(facts), *_failures(run), *_limits(run))
-    return RunAnswer(good, _verdict(facts, good), lines)
+    return PlainAnswer(good, _verdict(facts, good), lines)
 
 
 def _verdict(facts: RunFacts, good: bool | None) -> str:

@@ -1,0 +1,95 @@
+"""The answer of `undertow analyze`: whether the loop is stable, how large errors become, and how much is left."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.report.quantities import quantity
+from undertow.studies.prediction.predict import Prediction
+
+_ENOUGH = 0.999  # share of the time in which the actuators give what the loads demand
+_GREAT = 100.0  # factor of a gain from which on a margin is as good as any
+
+
+def answer_of_prediction(prediction: Prediction) -> PlainAnswer:
+    """The answer of a prediction."""
+    lost = [point.where for point in prediction.points if not point.found]
+    unstable = [point.where for point in prediction.points if point.found and point.radius >= 1]
+    held = prediction.authority.held >= _ENOUGH
+    lines = (*_errors(prediction), *_margins(prediction), *_noise(prediction), *_actuators(prediction))
+    return PlainAnswer(not lost and not unstable and held, _verdict(prediction, lost, unstable, held), lines)
+
+
+def _verdict(prediction: Prediction, lost: list[str], unstable: list[str], held: bool) -> str:
+    if unstable:
+        return f"The closed loop is unstable: {_listed(unstable)}."
+    if lost:
+        return f"There is no equilibrium: {_listed(lost)}. The actuators cannot hold the loads there."
+    stable = f"The closed loop is stable at all {len(prediction.points)} operating points"
+    if not held:
+        return f"{stable}, but the actuators cannot give what the loads demand."
+    return f"{stable}, and the actuators give what the loads demand."
+
+
+def _listed(places: list[str]) -> str:
+    shown = ", ".join(places[:3])
+    return shown if len(places) <= 3 else f"{shown} and {len(places) - 3} more operating points"
+
+
+def _errors(prediction: Prediction) -> Iterator[str]:
+    """Predicted errors of the steady window."""
+    if prediction.metrics is None:
+        yield f"No errors are predicted: {prediction.why_not}."
+        return
+    known = prediction.operating_point.built.known_metrics()
+    parts = [
+        f"{known[key].named(key)} {quantity(prediction.metrics[key], known[key].unit)}"
+        for key in ("position_rms", "attitude_rms", "tracking_rms")
+        if key in prediction.metrics
+    ]
+    if parts:
+        yield f"Predicted: {'; '.join(parts)}."
+
+
+def _margins(prediction: Prediction) -> Iterator[str]:
+    """How much later, weaker, stronger or slower the loop may be."""
+    margins, dt = prediction.margins, prediction.operating_point.linear.dt
+    further = [
+        f"{_milliseconds(margins[name])} {words}"
+        for name, words in (("delay", "of further delay"), ("lag", "of further lag"))
+        if np.isfinite(margins[name])
+    ]
+    if further:
+        yield f"It stays stable with up to {' or '.join(further)}."
+    least, most = margins["gain_low"], margins["gain_high"]
+    bounds = [f"at least {least:.2g}"] if least > 1 / _GREAT else []
+    bounds += [f"at most {most:.2g}"] if most < _GREAT else []
+    if bounds:
+        yield f"Inputs may have {' and '.join(bounds)} times the effect that the model assumes."
+    if np.isfinite(margins["sampling_time"]):
+        limit = _milliseconds(margins["sampling_time"])
+        yield f"These gains need a sampling time below {limit}; it is {_milliseconds(dt)}."
+
+
+def _milliseconds(seconds: float) -> str:
+    return "no time" if seconds == 0 else f"{1e3 * seconds:.2g} ms" if seconds < 0.0995 else f"{seconds:.2g} s"
+
+
+def _noise(prediction: Prediction) -> Iterator[str]:
+    """The noise of measured velocities that the inputs bear."""
+    largest = prediction.noise.largest
+    if np.isfinite(largest):
+        yield (
+            f"Noise of the measured velocities of {quantity(largest, 'm')}/s and {quantity(largest, 'rad')}/s (one "
+            "standard deviation) drives the inputs to their limits."
+        )
+
+
+def _actuators(prediction: Prediction) -> Iterator[str]:
+    """The share of the inputs that loads take."""
+    used = max((point.used for point in prediction.points if point.found), default=0.0)
+    if used:
+        yield f"The loads take up to {quantity(used, '')} of an input."
+    if prediction.lost:
+        yield f"No input acts along {', '.join(prediction.lost)}."
