@@ -18,7 +18,8 @@ pytestmark = pytest.mark.docs
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts and "gallery" not in path.parts)
-READ = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
+OUTSIDE = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "paper.md")
+READ = [*(ROOT / name for name in OUTSIDE), *PAGES]
 
 _TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```", re.M | re.S)
 _CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.M | re.S)

@@ -12,8 +12,9 @@ import pytest
 pytestmark = pytest.mark.docs
 
 ROOT = Path(__file__).parents[2]
-SEARCHED = ("undertow", "soak", "docs", "examples", "benchmarks", "README.md", "CONTRIBUTING.md")
-SUFFIXES = {".py", ".md", ".yaml", ".css", ".html", ".cff"}
+TEXTS_OF_THE_PROJECT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "paper.md", ".github")
+SEARCHED = ("undertow", "soak", "docs", "examples", "benchmarks", *TEXTS_OF_THE_PROJECT)
+SUFFIXES = {".py", ".md", ".yaml", ".yml", ".css", ".html", ".cff"}
 
 # Retired word (a regular expression) -> the field's word.
 RETIRED = {
