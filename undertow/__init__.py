@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from undertow.control.controllers.rcaf import rcaf as rcaf
     from undertow.core.errors import BadInput as BadInput
     from undertow.core.process_setup import prepare as prepare
+    from undertow.explorer import explore as explore
     from undertow.logs.frames import attitudes_of_quaternions as attitudes_of_quaternions
     from undertow.logs.frames import body_vectors as body_vectors
     from undertow.logs.frames import world_vectors as world_vectors
@@ -56,6 +57,7 @@ _HOMES = {
     "attitudes_of_quaternions": "undertow.logs.frames",
     "body_vectors": "undertow.logs.frames",
     "compare": "undertow.comparison",
+    "explore": "undertow.explorer",
     "prepare": "undertow.core.process_setup",
     "rcaf": "undertow.control.controllers.rcaf",
     "read_log": "undertow.scenario.log_file",

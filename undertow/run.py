@@ -85,12 +85,16 @@ class Run:
         if not isinstance(self.result, ScenarioResult):
             hint = "Write it as a scenario, and run that by `ut.simulate_scenario`"
             raise BadInput("again", "be of a run of a scenario", "of one of a closed loop made of objects", hint=hint)
-        text = self.result.built.text
-        data = copy.deepcopy(text.data)
+        text, data = self.result.built.text, self.scenario
         for name, value in values.items():
             put_value(data, name.replace("__", "."), value)
         changed = text._replace(data=from_data(data).data)
         return Run(run_scenario(build(changed, self._part_cache)), self._part_cache)
+
+    @property
+    def scenario(self) -> dict[str, Any]:
+        """The scenario as it was given, a copy; empty for a closed loop made of objects."""
+        return copy.deepcopy(self.result.built.text.data) if isinstance(self.result, ScenarioResult) else {}
 
     @property
     def dataset(self) -> xr.Dataset:

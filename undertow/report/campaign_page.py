@@ -65,7 +65,6 @@ def write_campaign(
         tag("h1", prose(title)),
         answer_block(answer_of_campaign(results, summary)),
         plotted["distributions"],
-        *([tag("p", prose(summary["nominal_model"]))] if summary["nominal_model"] else []),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("status", "Status of the trials", *_endings(summary)),
         *_optional("requirements", "Requirements", tag("p", prose(_INTERVALS)), requirements(results, summary)),

@@ -1,0 +1,169 @@
+"""A scenario with sliders in a notebook: a compiled loop that is run again whenever one moves."""
+
+import html
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from undertow.core.errors import BadInput
+from undertow.report.answers.notebook import in_notebook
+from undertow.report.answers.run_answer import answer_of_run
+from undertow.report.live_picture import live_picture
+from undertow.report.page import document
+from undertow.report.replay.replay_data import replay_of
+from undertow.report.replay.replay_section import replay_looks, replay_section
+from undertow.report.run_page import shown_of
+from undertow.run import Run, simulate_scenario
+from undertow.scenario.reading import key_path
+
+try:
+    import ipywidgets as widgets
+except ImportError:
+    widgets = None
+
+Range = tuple[float, float] | Sequence[Any] | bool
+
+_SPAN = 2.0  # an unnamed slider goes to twice the value
+_MOST = 6  # sliders that nobody asked for
+_STEPS = 100
+# Where the numbers are that people turn first.
+_FIRST = ("controller", "disturbance", "faults")
+
+
+class Explorer:
+    """Sliders, the answer and the first picture of the run with their values, and its replay on demand.
+
+    Attributes:
+        run: the latest run.
+        values: what was moved, by key path.
+    """
+
+    def __init__(self, run: Run, ranges: Mapping[str, Range]):
+        if widgets is None:
+            remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[notebook]'"
+            raise BadInput("", "", f"ipywidgets is not installed. {remedy}")
+        self.run, self.values = run, {}
+        self._controls = {key: _control(key, choices, _stated(run, key)) for key, choices in ranges.items()}
+        self._picture, self._replay = widgets.HTML(), widgets.HTML()
+        show_replay = widgets.Button(description="Replay in 3D", tooltip="of the run that is shown")
+        show_replay.on_click(lambda button: self._show_replay())
+        for key, control in self._controls.items():
+            control.observe(lambda change, key=key: self._run_with(key, change["new"]), names="value")
+        self.view = widgets.VBox([*self._controls.values(), self._picture, show_replay, self._replay])
+        self._show()
+
+    def _run_with(self, key: str, value: Any) -> None:
+        """Run with another value at a key path, and show it; where it cannot be, that is said, and the run stays.
+
+        What nobody has moved stays as the scenario has it, also where it leaves it to a default.
+        """
+        values = {**self.values, key: value}
+        try:
+            self.run = self.run.again(**values)
+        except BadInput as error:
+            self._picture.value = f"<p style='color:#b3402a'>{html.escape(str(error))}</p>"
+            return
+        self.values = values
+        self._replay.value = ""
+        self._show()
+
+    def _show(self) -> None:
+        result = self.run.result
+        picture = live_picture(result, shown_of(result))
+        self._picture.value = in_notebook(result.facts.title, answer_of_run(result), picture)
+
+    def _show_replay(self) -> None:
+        """The replay of the present run, in a frame of its own: its scripts must not meet those of the notebook."""
+        result = self.run.result
+        replay = replay_of(result.series, result.loop, result.facts.seed, result.facts.hull)
+        if replay is None:
+            self._replay.value = "<p>Only a vehicle with thrusters has a replay.</p>"
+            return
+        page = document(result.facts.title, replay_section([replay]), looks=replay_looks())
+        frame = "width:100%;height:640px;border:0"
+        self._replay.value = f"<iframe style='{frame}' srcdoc='{html.escape(page, quote=True)}'></iframe>"
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        return self.view._repr_mimebundle_(**options)
+
+
+def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str, Range] | None = None) -> Explorer:
+    """Show a scenario with sliders: whenever one moves, the loop runs again, and the picture follows.
+
+        ut.explore("examples/bluerov2_heavy.yaml", {"disturbance[0].velocity[0]": (0, 1), "seed": (0, 20)})
+
+    A run of 20 s of a vehicle takes some hundredths of a second, as nothing is compiled again. What changes the
+    structure of the loop, such as another controller, is compiled once for each choice.
+
+    Args:
+        scenario: a file, the scenario as data, or a run of one.
+        ranges: key path -> (lowest, highest) for a slider, with whole steps where both are whole numbers; a list of
+            choices; or True or False for a switch. None for the numbers that the scenario states of its controller, its
+            disturbances and its faults, from 0 to twice the value.
+
+    Raises:
+        BadInput: the scenario or a key path is wrong, or ipywidgets is not installed.
+    """
+    run = scenario if isinstance(scenario, Run) else simulate_scenario(scenario)
+    return Explorer(run, _ranges_of(run) if ranges is None else ranges)
+
+
+def _control(key: str, choices: Range, stated: Any) -> Any:
+    """A slider, a list of choices or a switch."""
+    assert widgets is not None
+    look = {"description": key, "style": {"description_width": "16em"}, "layout": widgets.Layout(width="48em")}
+    if isinstance(choices, bool):
+        return widgets.Checkbox(value=choices if stated is None else bool(stated), **look)
+    if _is_range(choices):
+        low, high = choices
+        if not low < high:
+            raise BadInput(key, "have a range from low to high", choices)
+        start = min(max(stated, low), high) if _is_number(stated) else (low + high) / 2
+        if isinstance(low, int) and isinstance(high, int) and isinstance(stated, int | None):
+            return widgets.IntSlider(value=round(start), min=low, max=high, **look)
+        return widgets.FloatSlider(
+            value=start, min=low, max=high, step=(high - low) / _STEPS, readout_format=".3g", **look
+        )
+    if not isinstance(choices, list) or not choices:
+        raise BadInput(key, "have (lowest, highest), a list of choices, or a switch", choices)
+    return widgets.Dropdown(options=choices, value=stated if stated in choices else choices[0], **look)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_range(choices: Range) -> bool:
+    return isinstance(choices, tuple) and len(choices) == 2 and all(map(_is_number, choices))
+
+
+def _stated(run: Run, key: str) -> Any:
+    """What the scenario states at a key path; None where it leaves it to a default."""
+    node: Any = run.scenario
+    for step in key_path(key):
+        if isinstance(node, dict):
+            node = node.get(step)
+        elif isinstance(node, list) and isinstance(step, int) and step < len(node):
+            node = node[step]
+        else:
+            return None
+    return node
+
+
+def _ranges_of(run: Run) -> dict[str, Range]:
+    """Numbers that the scenario states where people turn first."""
+    numbers: dict[str, Range] = {}
+
+    def collect(node: Any, path: str) -> None:
+        if isinstance(node, dict):
+            for key, inner in node.items():
+                collect(inner, f"{path}.{key}")
+        elif isinstance(node, list):
+            for place, inner in enumerate(node):
+                collect(inner, f"{path}[{place}]")
+        elif _is_number(node) and node > 0:
+            numbers[path] = (0.0, _SPAN * node)
+
+    for section in _FIRST:
+        collect(run.scenario.get(section), section)
+    return dict(list(numbers.items())[:_MOST])
