@@ -23,7 +23,13 @@ NAME = f"{PROJECT['name']}-{PROJECT['version']}"
 
 def in_git(*folders):
     """Files that git knows, by their paths from the root."""
-    listing = subprocess.run(["git", "ls-files", "-z", *folders], cwd=ROOT, capture_output=True, check=True, text=True)
+    listing = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", *folders],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+        text=True,
+    )
     return {path for path in listing.stdout.split("\0") if path}
 
 
