@@ -102,10 +102,10 @@ def _over_time(
     most = max(1.1 * float(finite.max()) if finite.size else 0.0, floor, 1.15 * (limit or 0.0), 1e-12)
     end = max(float(time[-1]), 1e-9)
     panel = _Panel(_PATH + _LEFT, top, _WIDTH - _PATH - _LEFT - 10, height, (0.0, end), (0.0, most))
-    drawing = [*_frame(panel, words), _line(panel, time, size, _BLUE)]
+    parts = [*_frame(panel, words), _line(panel, time, size, _BLUE)]
     if limit is not None:
-        drawing.append(_line(panel, np.array([0.0, end]), np.array([limit, limit]), _RED, dashed=True))
-    return drawing
+        parts.append(_line(panel, np.array([0.0, end]), np.array([limit, limit]), _RED, dashed=True))
+    return parts
 
 
 def _frame(panel: _Panel, heading: str) -> list[Html]:
