@@ -21,6 +21,7 @@ plant:
   vehicle: odin
   thruster: {kind: first_order, thrust_per_volt: 20, time_constant: 0.1, supply: 24}
   ledger: false
+controller: paper
 reference: {kind: setpoint, position: [0, 0, 0, 0, 0, 0]}
 disturbance: {kind: sinusoid, amplitude: 2, frequency: 1}
 loop: {duration: 1, dt: 0.002}
@@ -56,9 +57,9 @@ def test_what_is_doubtful_is_advised(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(LAGGING)
     said = undertow("analyze", "s.yaml", "--out", "out")
     assert said.code == 0
-    assert "Advice: the loop is unstable at 3 of 3 operating points: rightmost pole +" in said.err
+    assert "Advice: the loop is unstable at 4 of 4 operating points: rightmost pole +" in said.err
     assert "Advice: the weights are not bounded" in said.err
-    assert "No metrics are predicted: the loop linearised at fixed weights is unstable" in said.out
+    assert "No errors are predicted: the loop linearised at fixed weights is unstable" in said.out
     margins = json.loads((tmp_path / "out" / "prediction.json").read_text())["margins"]
     assert margins == {"sampling_time": 0.0, "delay": 0.0, "lag": 0.0, "gain_low": 1.0, "gain_high": 1.0}
 
