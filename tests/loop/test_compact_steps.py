@@ -35,7 +35,7 @@ def test_a_single_run_has_the_bits_of_a_batch(runs):
     numbers = workload.several(one.run, 4)
     constant = [False] * len(jax.tree.leaves(numbers))
     batch = SimdBatchRunner(one.run, one.plan, constant, width=4, runs=runs).run(numbers)
-    single = SimdBatchRunner(one.run, one.plan, constant, width=1, runs=1)
+    single = SimdBatchRunner(one.run, one.plan, constant, width=1, runs=1.0)
     alone = single.run(jax.tree.map(lambda leaf: leaf[:1], numbers))
     for each, other in zip(jax.tree.leaves(alone.final), jax.tree.leaves(batch.final), strict=True):
         assert np.asarray(each)[0].tobytes() == np.asarray(other)[0].tobytes()

@@ -361,5 +361,5 @@ def integrate(
 def _alone(run: LoopRun, plan: RunPlan) -> Outcome:
     arrays = eqx.filter(run, eqx.is_array)
     constant = [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)]
-    batch = SimdBatchRunner(run, plan, constant, width=1, runs=1)
+    batch = SimdBatchRunner(run, plan, constant, width=1, runs=1.0)
     return outcome_of(batch.run(jax.tree.map(lambda leaf: np.asarray(leaf)[None], arrays)), 0)
