@@ -71,7 +71,12 @@ def test_figures_repetition_and_further_trials(scenario, own_law, whole_figures,
     path, out = scenario(), Path("out")
     given = ["compare", path, "--controllers", "scenario,./mine.py:smc", "--out", "out"]
     assert run([*given, "--trials", "8"]) == 0
-    assert {one.stem for one in (out / "figures").glob("*.svg")} == {"differences", "pareto", "histories", "distributions"}
+    assert {one.stem for one in (out / "figures").glob("*.svg")} == {
+        "differences",
+        "pareto",
+        "histories",
+        "distributions",
+    }
     errors = xr.open_zarr(out / "trials.zarr", consolidated=False).load()["position_rms"].values
     assert run(["simulate", "out/scenarios/2-smc.yaml", "--no-prediction", "--out", "one"]) == 0
     metrics = json.loads(Path("one/metrics.json").read_text())["steady"]

@@ -184,3 +184,10 @@ def test_the_answer_of_two_that_completed(findings):
     alone = of_two._replace(differences=tuple(each._replace(p_holm=0.2) for each in of_two.differences))
     line = answer_of_comparison(alone, "controller").lines[2]
     assert line == "Between b_1 and a no difference in position error rms per axis is established."
+
+
+def test_the_answer_where_nothing_differs(findings):
+    """Two names of one law: no test was made, and none is established."""
+    zero = tuple(each._replace(smaller=0, larger=0, median=0.0, low=0.0, high=0.0) for each in findings.differences)
+    lines = answer_of_comparison(findings._replace(differences=zero), "controller").lines
+    assert lines[3] == "Between b_1 and a, c no difference in position error rms per axis is established."

@@ -117,7 +117,7 @@ def _between(findings: Findings, candidate: str, baseline: str) -> str:
 def needed_pairs(findings: Findings) -> int:
     """Pairs from which on the smallest p of the rank test, 2^(1 - n), is below 5 % after correction for all tests."""
     tests = sum(bool(difference.smaller or difference.larger) for difference in findings.differences)
-    return max(FEWEST, math.floor(1 + math.log2(tests / LEVEL)) + 1)
+    return max(FEWEST, math.floor(1 + math.log2(max(tests, 1) / LEVEL)) + 1)
 
 
 def _counted(findings: Findings, difference: PairedDifference, number: int) -> str:
