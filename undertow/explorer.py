@@ -10,9 +10,9 @@ from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.live_picture import live_picture
 from undertow.report.page import document
-from undertow.report.replay.replay_data import replay_of
+from undertow.report.plotted import Plotted
 from undertow.report.replay.replay_section import replay_looks, replay_section
-from undertow.report.run_page import shown_of
+from undertow.report.run_page import page_contents, shown_of
 from undertow.run import Run, simulate_scenario
 from undertow.scenario.reading import key_path
 
@@ -39,9 +39,7 @@ class Explorer:
     """
 
     def __init__(self, run: Run, ranges: Mapping[str, Range]):
-        if widgets is None:
-            remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[notebook]'"
-            raise BadInput("", "", f"ipywidgets is not installed. {remedy}")
+        assert widgets is not None
         self.run, self.values = run, {}
         self._controls = {key: _control(key, choices, _stated(run, key)) for key, choices in ranges.items()}
         self._picture, self._replay = widgets.HTML(), widgets.HTML()
@@ -74,12 +72,12 @@ class Explorer:
 
     def _show_replay(self) -> None:
         """The replay of the present run, in a frame of its own: its scripts must not meet those of the notebook."""
-        result = self.run.result
-        replay = replay_of(result.series, result.loop, result.facts.seed, result.facts.hull)
-        if replay is None:
-            self._replay.value = "<p>Only a vehicle with thrusters has a replay.</p>"
+        contents = page_contents(self.run.result, lambda: Plotted({}, {}, []))
+        if contents.replay is None:
+            why = " ".join(contents.failures) or "Only a vehicle with thrusters has a replay."
+            self._replay.value = f"<p>{html.escape(why)}</p>"
             return
-        page = document(result.facts.title, replay_section([replay]), looks=replay_looks())
+        page = document(self.run.result.facts.title, replay_section([contents.replay]), looks=replay_looks())
         frame = "width:100%;height:640px;border:0"
         self._replay.value = f"<iframe style='{frame}' srcdoc='{html.escape(page, quote=True)}'></iframe>"
 
@@ -104,6 +102,9 @@ def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str,
     Raises:
         BadInput: the scenario or a key path is wrong, or ipywidgets is not installed.
     """
+    if widgets is None:
+        remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[notebook]'"
+        raise BadInput("", "", f"ipywidgets is not installed. {remedy}")
     run = scenario if isinstance(scenario, Run) else simulate_scenario(scenario)
     return Explorer(run, _ranges_of(run) if ranges is None else ranges)
 

@@ -217,9 +217,9 @@ class _Balance:
             for operand in graph.uses(node) if wanted else ():
                 self._users[operand].add(node)
         groups = {group for of_pack in self._operands.values() for group in of_pack}
+        self._cheap = {group: cost for group in groups if (cost := _cheap(graph, fixed, group)) is not None}
         # Packs to be weighed: what one saves changes only where another one near it is given up.
         self._due_alone, self._due_in_parts = set(packs), set(packs)
-        self._cheap = {group: cost for group in groups if (cost := _cheap(graph, fixed, group)) is not None}
 
     def worthwhile(self) -> list[Group]:
         """The packs that save more than they cost, each of them and together with those that it works with."""

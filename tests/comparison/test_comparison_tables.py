@@ -164,7 +164,7 @@ def test_the_answer_ranks_and_says_what_is_established(findings):
     assert lines[0] == "b_1: position error rms per axis 59 cm, attitude error rms per axis 5.5 degrees."
     assert [line.split(":")[0] for line in lines[:3]] == ["b_1", "a", "c (completed 8 of 10)"]
     assert lines[3] == "The position error rms per axis of b_1 is smaller than that of a, c: established."
-    assert lines[4].startswith("None of them was tuned")
+    assert lines[4].startswith("No gains were searched for")
 
 
 def test_the_answer_of_two_that_completed(findings):
@@ -173,7 +173,10 @@ def test_the_answer_of_two_that_completed(findings):
         names=("a", "b_1"),
         differences=tuple(each for each in findings.differences if "c" not in (each.candidate, each.baseline)),
         successes={name: findings.successes[name] for name in ("a", "b_1")},
-        tuning={"a": "tuned for it", "b_1": "by hand"},
+        tuning={
+            "a": "tuned by `undertow tune` (search)",
+            "b_1": "gains given (frequency 2), not tuned by `undertow tune`",
+        },
     )
     good, verdict, lines = answer_of_comparison(of_two, "controller")
     assert good is True and verdict.endswith("of each: all completed within the criterion of success.")
@@ -191,3 +194,22 @@ def test_the_answer_where_nothing_differs(findings):
     zero = tuple(each._replace(smaller=0, larger=0, median=0.0, low=0.0, high=0.0) for each in findings.differences)
     lines = answer_of_comparison(findings._replace(differences=zero), "controller").lines
     assert lines[3] == "Between b_1 and a, c no difference in position error rms per axis is established."
+
+
+def test_one_that_never_completed_hides_nothing_of_the_others(findings):
+    """Without a pair with `c`, what stands between `a` and `b_1` is said as it is without `c`."""
+    alone = [
+        each._replace(pairs=0, p_holm=np.nan) if "c" in (each.candidate, each.baseline) else each
+        for each in findings.differences
+    ]
+    lines = answer_of_comparison(findings._replace(differences=tuple(alone)), "controller").lines
+    assert lines[3] == "The position error rms per axis of b_1 is smaller than that of a: established."
+    assert not any("c" == word.strip(".,") for line in lines[4:] for word in line.split())
+
+
+@pytest.mark.parametrize(
+    "sentence", ["default gains of `pid`, not tuned", "gains from the rule of `controllers/bandwidths.py`"]
+)
+def test_gains_that_nobody_searched_for(findings, sentence):
+    answer = answer_of_comparison(findings._replace(tuning=dict.fromkeys(findings.names, sentence)), "controller")
+    assert answer.lines[-1].startswith("No gains were searched for: `--tune 60`")

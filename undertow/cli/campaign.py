@@ -16,7 +16,7 @@ from undertow.core.atomic_io import replacing_folder, write_whole
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.core.number_text import display_units
-from undertow.report.answers.campaign_answer import answer_of_campaign, by_xla
+from undertow.report.answers.campaign_answer import answer_of_campaign
 from undertow.report.campaign_page import write_campaign
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.executors import check_cluster
@@ -69,7 +69,6 @@ def _conclude(console: Console, prepared: Prepared, folder: Path, command: Campa
     warn_of([*missing, *failures])
     if command.details:
         console.print(table(results, summary_data))
-        print_lines(console, sentences(summary_data))
     print_lines(console, [*answer_of_campaign(results, summary_data).text, f"Page: {page}"])
     return DONE if set(summary_data["status"]) <= {"completed"} else RUN_FAILED
 
@@ -135,24 +134,3 @@ def _spread(quantiles: dict | None, unit: str) -> str:
         return "-"
     low, middle, high = (display_units(value, unit)[0] for value in quantiles.values())
     return f"{middle:.3g} [{low:.3g}, {high:.3g}]"
-
-
-def sentences(summary_data: dict) -> list[str]:
-    """The numbers of trials by status, and the verdict on each requirement."""
-    endings_text = ", ".join(f"{word} {number}" for word, number in summary_data["status"].items())
-    text = [f"{summary_data['done']} trials: {endings_text}."]
-    text += [sentence for sentence in (summary_data["nominal_model"], by_xla(summary_data)) if sentence]
-    for invalid in summary_data["invalid"]:
-        text.append(f"Invalid trials ({invalid['trials']} with this error): {invalid['why']}.")
-    for combination in summary_data["combinations"]:
-        values_text = "".join(f", {key} {value}" for key, value in combination["values"].items())
-        for requirement in combination["requirements"]:
-            low, high = (100 * bound for bound in requirement["interval"])
-            formula, name = requirement["formula"], requirement["metric"]
-            bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
-            text.append(
-                f"Requirement {bound} in {100 * requirement['share']:g} % of the trials{values_text}: "
-                f"{requirement['verdict']}; kept by {100 * requirement['kept']:.1f} % "
-                f"(95 % interval {low:.1f} to {high:.1f} %)."
-            )
-    return text

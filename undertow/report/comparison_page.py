@@ -101,7 +101,7 @@ def write_comparison(
         *([_differing(findings)] if findings.differing else []),
         *([replay_section(replays, _replayed(replays, findings))] if replays else []),
         section("tuning", "Tuning", *_how_tuned(noun, findings, budgets)),
-        section("figures", "More figures", *further_figures),
+        *([section("figures", "More figures", *further_figures)] if further_figures else []),
         section("endings", "Status of the trials", _endings(findings)),
         section("differences", "Paired differences", tag("p", prose(HOW)), _rows(paired(findings), words=2)),
         section("configuration", "Configuration", *asked(results)),

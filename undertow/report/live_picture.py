@@ -9,15 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.report.page import Html, tag, text
-from undertow.report.plotted import Shown
+from undertow.report.plotted import ERRORS, FLOORS, LEAST_PATH, Shown
 from undertow.scenario.results.run_result import RunRecord
 
 _WIDTH, _HEIGHT = 960, 380
 _PATH, _LEFT, _FOOT, _GAP = 360, 56, 34, 30  # pixels
 _POINTS = 400  # of a curve; more are not seen
-_LEAST_PATH, _FLOORS = 0.2, {"m": 0.01, "rad": 1.0}  # m; m and degrees: less would show noise
 _BLUE, _GREY, _RED = "#1f6f9f", "#9a9a9a", "#b3402a"
-_ERRORS = {"m": ("position error, m", "position_rms", 1.0), "rad": ("attitude error, deg", "attitude_rms", 180 / np.pi)}
+_IN_DEGREES = {"rad": ("deg", 180 / np.pi)}  # unit of outputs -> unit that is shown, and factor
 
 
 class _Panel(NamedTuple):
@@ -45,13 +44,7 @@ def live_picture(run: RunRecord, shown: Shown) -> Html:
     every = max(1, -(-len(series["time"]) // _POINTS))
     values = {name: series[name].values[::every] for name in ("time", "position", "reference", "error", "input")}
     names, units = [str(name) for name in series["axis"].values], series["axis"].attrs["unit_of_each"].split(", ")
-    curves = [
-        (words, factor * np.sqrt((values["error"][:, places] ** 2).mean(1)), limit, _FLOORS[unit])
-        for unit, (words, key, factor) in _ERRORS.items()
-        for places in [[place for place, other in enumerate(units) if other == unit]]
-        for limit in [None if key not in shown.criterion else factor * shown.criterion[key]]
-        if places
-    ]
+    curves = _errors(values["error"], units, shown)
     unit_of_input = series["input"].attrs["units"].removesuffix("1")
     effort = f"largest input{f', {unit_of_input}' if unit_of_input else ''}"
     curves.append((effort, np.abs(values["input"]).max(1), shown.supply, 0.0))
@@ -61,6 +54,20 @@ def live_picture(run: RunRecord, shown: Shown) -> Html:
         parts += _over_time(values["time"], *curve, top=_GAP + row * (height + _GAP), height=height)
     parts.append(_words(_PATH + _LEFT, _HEIGHT - 6, f"time, 0 to {values['time'][-1]:g} s"))
     return tag("svg", *parts, viewBox=f"0 0 {_WIDTH} {_HEIGHT}", style="width:100%;max-width:60em;background:#fff")
+
+
+def _errors(error: np.ndarray, units: Sequence[str], shown: Shown) -> list[tuple[str, np.ndarray, float | None, float]]:
+    """For the outputs of each kind: title, error at each instant (rms of these axes), its limit, and the least span."""
+    curves = []
+    for unit in dict.fromkeys(units):
+        displayed, factor = _IN_DEGREES.get(unit, (unit, 1.0))
+        if displayed not in ERRORS:
+            continue
+        title, metric = ERRORS[displayed]
+        axes = [place for place, other in enumerate(units) if other == unit]
+        limit = None if metric not in shown.criterion else factor * shown.criterion[metric]
+        curves.append((title, factor * np.sqrt((error[:, axes] ** 2).mean(1)), limit, FLOORS[displayed]))
+    return curves
 
 
 def _path(values: dict[str, np.ndarray], names: Sequence[str]) -> list[Html]:
@@ -88,7 +95,7 @@ def _square(points: np.ndarray, shape: float) -> tuple[tuple[float, float], tupl
     known = points[np.isfinite(points).all(1)]
     low, high = known.min(0), known.max(0)
     middle = (low + high) / 2
-    half = 0.55 * max((high[0] - low[0]) / shape, high[1] - low[1], _LEAST_PATH)
+    half = 0.55 * max((high[0] - low[0]) / shape, high[1] - low[1], LEAST_PATH)
     (east, north) = middle.tolist()
     return (east - half * shape, east + half * shape), (north - half, north + half)
 

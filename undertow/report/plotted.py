@@ -6,6 +6,12 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
+# Least span of an axis, by its unit: what is smaller is of no account to a vehicle.
+FLOORS = {"m": 0.01, "deg": 1.0, "m/s": 0.01, "rad/s": 0.01}
+LEAST_PATH = 0.2  # m; a path on a smaller map would show noise
+# Errors of the first picture: unit -> title, and the metric that has their limit.
+ERRORS = {"m": ("position error, m", "position_rms"), "deg": ("attitude error, deg", "attitude_rms")}
+
 
 class Shown(NamedTuple):
     """What the figures of a run show. It takes little to send it to another process, which needs no JAX for it.

@@ -57,7 +57,7 @@ def write_prediction(prediction: Prediction, advice: Sequence[str], folder: Path
         *figures[:1],
         *warnings,
         *(_section(number, rows) for number, rows in enumerate(tables(prediction))),
-        section("figures", "More figures", *figures[1:]),
+        *([section("figures", "More figures", *figures[1:])] if figures[1:] else []),
         tag("p", prose(LEFT_OUT), class_="small"),
     )
     (folder / "prediction.html").write_text(page, encoding="utf-8")

@@ -35,10 +35,15 @@ def _count(summary: Mapping[str, Any], key: str) -> int:
     return sum(combination["success"][key] for combination in summary["combinations"])
 
 
+def _named(combination: Mapping[str, Any]) -> str:
+    """The swept values of a combination; empty where nothing is swept."""
+    return ", ".join(f"{key} {value}" for key, value in combination["values"].items())
+
+
 def _verdicts(summary: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Every requirement with the combination that it is about; the words are empty where there is one only."""
+    """Every requirement with the combination that it is about."""
     return [
-        (", ".join(f"{key} {value}" for key, value in combination["values"].items()), requirement)
+        (_named(combination), requirement)
         for combination in summary["combinations"]
         for requirement in combination["requirements"]
     ]
@@ -72,8 +77,10 @@ def _requirements(summary: Mapping[str, Any]) -> Iterator[str]:
     for where, requirement in verdicts[:_MOST]:
         low, high = requirement["interval"]
         of = f" ({where})" if where else ""
+        name, formula = requirement["metric"], requirement["formula"]
+        bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
         yield (
-            f"Requirement {requirement['metric']}{of} {_VERDICTS[requirement['verdict']]}: "
+            f"Requirement {bound}{of} {_VERDICTS[requirement['verdict']]}: "
             f"{quantity(requirement['kept'], '')} of the trials keep it, "
             f"95 % interval {100 * low:.1f} to {100 * high:.1f} %; {quantity(requirement['share'], '')} are required."
         )
@@ -82,8 +89,7 @@ def _requirements(summary: Mapping[str, Any]) -> Iterator[str]:
 def _errors(results: Results, summary: Mapping[str, Any]) -> Iterator[str]:
     """Median, and what 95 % of the trials stay below, of the tracking errors."""
     for combination in summary["combinations"][:_MOST]:
-        where = ", ".join(f"{key} {value}" for key, value in combination["values"].items())
-        parts = []
+        where, parts = _named(combination), []
         for name in results.tracking:
             if name in combination["metrics"]:
                 _, median, high = combination["metrics"][name].values()

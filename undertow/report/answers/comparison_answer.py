@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from undertow.core.metric import Metric
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.quantities import quantity
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.sentences import metric_name, needed_pairs
+from undertow.studies.comparison.tuning_note import tells_of_search
 
 # Candidates that have a line of their own; the table has all.
 _MOST = 4
@@ -79,9 +79,8 @@ def _candidates(findings: Findings) -> Iterator[str]:
 
 
 def _value(findings: Findings, metric: str, name: str) -> str:
-    value = findings.medians[metric][name].value
-    # The units of a comparison leave out the 1 of dimensionless numbers; a share has none either.
-    return quantity(value, Metric(findings.units[metric] or "1", "").unit)
+    # The units of a comparison leave out the 1 of plain numbers.
+    return quantity(findings.medians[metric][name].value, findings.units[metric] or "1")
 
 
 def _established(findings: Findings) -> Iterator[str]:
@@ -93,21 +92,26 @@ def _established(findings: Findings) -> Iterator[str]:
         yield "Nothing in the scenario is random, so that one trial tells all: differences are what they are."
         return
     differences = [difference for difference in findings.differences if difference.metric == metric]
-    of_best = [difference for difference in differences if best in (difference.candidate, difference.baseline)]
-    pairs = min((difference.pairs for difference in of_best), default=0)
-    needed = needed_pairs(findings)
+    of_rival = {
+        difference.baseline if difference.candidate == best else difference.candidate: difference
+        for difference in differences
+        if best in (difference.candidate, difference.baseline)
+    }
+    pairs, needed = max((difference.pairs for difference in of_rival.values()), default=0), needed_pairs(findings)
     if pairs < needed:
         yield (
             f"{pairs} trials that both completed are too few to establish a difference: it takes {needed} at least "
             f"(`--trials {max(20, needed)}`)."
         )
         return
+    # One that failed too often to be compared has been named in the verdict.
+    compared = {rival: difference for rival, difference in of_rival.items() if difference.pairs >= needed}
     beaten = [
-        difference.baseline if difference.candidate == best else difference.candidate
-        for difference in of_best
+        rival
+        for rival, difference in compared.items()
         if difference.established and (difference.median < 0) == (difference.candidate == best)
     ]
-    undecided = [name for name in findings.names if name != best and name not in beaten]
+    undecided = [rival for rival in compared if rival not in beaten]
     if beaten:
         yield f"The {metric_name(metric)} of {best} is smaller than that of {', '.join(beaten)}: established."
     if undecided:
@@ -115,6 +119,6 @@ def _established(findings: Findings) -> Iterator[str]:
 
 
 def _fairness(findings: Findings, noun: str) -> Iterator[str]:
-    """Whether gains were tuned: without, a comparison of controllers says little."""
-    if noun == "controller" and not any("tuned" in note for note in findings.tuning.values()):
-        yield "None of them was tuned: `--tune 60` gives every controller the same budget before it is compared."
+    """Whether gains were searched for: without, a comparison of controllers says little."""
+    if noun == "controller" and not any(map(tells_of_search, findings.tuning.values())):
+        yield "No gains were searched for: `--tune 60` gives every controller the same budget before it is compared."

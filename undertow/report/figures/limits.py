@@ -16,9 +16,6 @@ _SMALL, _LARGE = 1e-2, 1e5  # outside of these tick labels are long
 _PREFIXES = {-9: "n", -6: "\u00b5", -3: "m", 3: "k", 6: "M"}
 _PREFIXABLE = re.compile(r"(m|rad|s|V|A|N|W|J)(?![\w^$])")
 
-# Least span of an axis, by its unit: what is smaller is of no account to a vehicle.
-FLOORS = {"m": 0.01, "deg": 1.0, "m/s": 0.01, "rad/s": 0.01}
-
 Named = Sequence[tuple[str, np.ndarray, np.ndarray]]  # name, time, values
 
 

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from undertow.report.figures import recorded, style
 from undertow.report.figures.certificate import certificate_figure, weights_bound
 from undertow.report.figures.fault_marks import fault_marks
-from undertow.report.figures.limits import FLOORS, early_size
+from undertow.report.figures.limits import early_size
 from undertow.report.figures.multiples import Block, Curve, small_multiples
 from undertow.report.figures.summary import summary
-from undertow.report.plotted import Shown
+from undertow.report.plotted import FLOORS, Shown
 from undertow.report.signal_names import axis_names, controller_axis_names, input_names
 
 # A failed run is plotted on a symmetric logarithmic scale if its peak is this many times its early size.

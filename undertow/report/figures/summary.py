@@ -7,14 +7,12 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import recorded, style
 from undertow.report.figures.fault_marks import fault_marks
-from undertow.report.figures.limits import FLOORS, fit_from_zero, fit_linear
+from undertow.report.figures.limits import fit_from_zero, fit_linear
 from undertow.report.figures.multiples import mark_times
-from undertow.report.plotted import Shown
+from undertow.report.plotted import ERRORS, FLOORS, LEAST_PATH, Shown
 
 _WIDTH, _HEIGHT, _PATH = 9.6, 4.1, 3.9  # in
 _LEFT, _TOP, _FOOT, _BETWEEN = 0.62, 0.55, 0.42, 0.34
-_LEAST_PATH = 0.2  # m; a path on a smaller map would show noise
-_NAMES = {"m": ("position error, m", "position_rms"), "deg": ("attitude error, deg", "attitude_rms")}
 _LIMIT = style.Look("#b3402a", (0, (5, 2)), 0.9, 2)
 
 
@@ -24,7 +22,7 @@ def summary(shown: Shown, title: str) -> Figure:
     figure = style.blank(_WIDTH, _HEIGHT)
     keys = {"desired": style.TRUTH, "actual": style.SOLID}
     units = run["axis"].attrs["unit_of_each"].split(", ")
-    errors = [unit for unit in _NAMES if unit in units]
+    errors = [unit for unit in ERRORS if unit in units]
     if shown.criterion or shown.supply:
         keys["limit"] = _LIMIT
     style.head(figure, title, keys)
@@ -77,7 +75,7 @@ def _square(panel: Axes, points: np.ndarray, size: tuple[float, float]) -> None:
     """Equal scales in a panel of that size, in, at least some decimetres wide."""
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     width, height = size
-    span = 1.1 * max((high[0] - low[0]) / width, (high[1] - low[1]) / height, _LEAST_PATH / min(width, height))
+    span = 1.1 * max((high[0] - low[0]) / width, (high[1] - low[1]) / height, LEAST_PATH / min(width, height))
     middle = (low + high) / 2
     panel.set_xlim(middle[0] - span * width / 2, middle[0] + span * width / 2)
     panel.set_ylim(middle[1] - span * height / 2, middle[1] + span * height / 2)
@@ -88,7 +86,7 @@ def _error(panel: Axes, run: xr.Dataset, places: list[int], unit: str, shown: Sh
     curve = recorded.curve(run, "error", "error", style.SOLID)
     size = np.sqrt((curve.values[:, places] ** 2).mean(1))
     panel.plot(curve.time, size, **style.SOLID.line)
-    words, key = _NAMES[unit]
+    words, key = ERRORS[unit]
     limit = shown.criterion.get(key)
     limit = limit if limit is None or unit == "m" else float(np.degrees(limit))
     _over_time(panel, curve.time, size, limit, FLOORS[unit], run)

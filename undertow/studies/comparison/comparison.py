@@ -69,23 +69,7 @@ def run_comparison(
     workers: int | None = None,
     allow_code: bool = False,
 ) -> ComparisonResult:
-    """Compare controllers on one scenario, or several scenarios, trial by trial with the same samples and seeds.
-
-    What `undertow compare` does, with the same numbers, and without its files.
-
-    Args:
-        scenario: a scenario file or a scenario as data; several scenario files; or a campaign file.
-        controllers: such as `["robust", "pid", "./mine.py:smc", "runs/heavy-tuned/tuned.yaml"]`, or name -> entry,
-            where an entry may also be a mapping such as `{"kind": "pid", "frequency": 2}`.
-        trials: samples for each; None for 20, or the number of the campaign file. One where nothing is random.
-        tune: evaluations with which the gains of every controller are tuned first; None to compare them as they are.
-        workers: number of threads; None for all cores.
-        allow_code: whether the Python code that an earlier run.nc names may run; that of a .yaml file may.
-
-    Raises:
-        BadInput: anything wrong with the scenario, the controllers or the number of trials.
-    """
-
+    """Run a comparison without leaving files; arguments and errors are those of `ut.compare`."""
     sources: Any = scenario
     if isinstance(scenario, str | Path):
         sources = [Path(scenario)]

@@ -55,6 +55,11 @@ def tuning_note(
     return TuningNote(f"default gains of `{short}`, not tuned", False)
 
 
+def tells_of_search(sentence: str) -> bool:
+    """Whether a sentence on gains says that they were searched for: by `undertow tune`, or with an equal budget."""
+    return sentence.startswith("tuned ")
+
+
 def _given(
     part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path
 ) -> tuple[str, str | None, dict[str, Any], str | None]:
