@@ -22,7 +22,7 @@ def answer_of_campaign(results: Results, summary: Mapping[str, Any]) -> PlainAns
     """
     good = _good(summary)
     lines = (
-        *_requirements(summary),
+        *_requirements(results, summary),
         *_errors(results, summary),
         *_causes(summary),
         *_remarks(summary),
@@ -70,7 +70,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     return f"{ended}; {within} of {within + missed} kept to the criterion of success."
 
 
-def _requirements(summary: Mapping[str, Any]) -> Iterator[str]:
+def _requirements(results: Results, summary: Mapping[str, Any]) -> Iterator[str]:
     """The verdict on each requirement; the worst of many combinations."""
     order = {"fails": 0, "open": 1}
     verdicts = sorted(_verdicts(summary), key=lambda pair: (order.get(pair[1]["verdict"], 2), pair[1]["kept"]))
@@ -78,9 +78,9 @@ def _requirements(summary: Mapping[str, Any]) -> Iterator[str]:
         low, high = requirement["interval"]
         of = f" ({where})" if where else ""
         name, formula = requirement["metric"], requirement["formula"]
-        bound = f"{name} < {requirement['below']:g}" if formula is None else f"{name} ({formula})"
+        bound = f"< {quantity(requirement['below'], results.unit(name))}" if formula is None else f"({formula})"
         yield (
-            f"Requirement {bound}{of} {_VERDICTS[requirement['verdict']]}: "
+            f"Requirement {name} {bound}{of} {_VERDICTS[requirement['verdict']]}: "
             f"{quantity(requirement['kept'], '')} of the trials keep it, "
             f"95 % interval {100 * low:.1f} to {100 * high:.1f} %; {quantity(requirement['share'], '')} are required."
         )
