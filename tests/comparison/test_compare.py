@@ -66,6 +66,18 @@ def test_command(scenario, own_law, capsys):
         assert words in page
 
 
+def test_a_law_that_was_edited_is_compared_as_it_is_now(scenario, own_law):
+    """As in a notebook: the text of the comparison is the same, and the file that it names has other contents."""
+    file = Path("mine.py")
+    errors = []
+    for slope in ("2.0", "4.0", "2.0"):
+        file.write_text(re.sub(r"slope=[\d.]+", f"slope={slope}", file.read_text()))
+        with pytest.warns(UserWarning, match="smc is not tuned"):
+            comparison = ut.compare(scenario(), {"smc": "./mine.py:smc", "pid": "pid"}, trials=1)
+        errors.append(comparison.dataset["position_rms"].sel(controller="smc").item())
+    assert errors[0] == errors[2] != errors[1]
+
+
 @pytest.mark.slow
 def test_figures_repetition_and_further_trials(scenario, own_law, whole_figures, capsys):
     path, out = scenario(), Path("out")

@@ -54,6 +54,7 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
     check_kind(campaign_trials.scenario, "scenario", source.where(("scenario",)))
     text = whole(campaign, campaign_trials.scenario.data)
     folder = campaign_trials.scenario.folder
+    tasks.task_context.cache_clear()  # files that it names may have changed since this process last read them
     context = tasks.task_context(text, str(folder))
     firsts = [_first(campaign_trials, context, combination) for combination in range(len(campaign_trials.combinations))]
     with error_location(location=source.location):
