@@ -3,6 +3,7 @@
 What the reference says about parts, keys, metrics, commands and classes is made from the code by the modules in `_ext`.
 """
 
+import hashlib
 import importlib.metadata
 import sys
 from pathlib import Path
@@ -19,7 +20,7 @@ release = importlib.metadata.version("undertow")
 html_title = f"undertow {release}"
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
@@ -29,11 +30,23 @@ extensions = [
     "reference",
     "api",
 ]
-exclude_patterns = ["_build", "gallery/GALLERY_HEADER.rst"]
+# The gallery also writes its examples as notebooks to download; its pages are the .rst files.
+exclude_patterns = ["_build", ".jupyter_cache", "gallery/GALLERY_HEADER.rst", "gallery/*.ipynb"]
 
 # Pages are Markdown with mathematics between dollar signs; every heading down to the third level can be linked to.
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+
+# Notebooks are kept without outputs and executed by the build, in a temporary folder, because they write files. What
+# was executed is kept until the notebook or undertow changes. An exercise stands as the reader finds it.
+_CODE = hashlib.sha256(b"".join(path.read_bytes() for path in sorted((HERE.parent / "undertow").rglob("*.py"))))
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / ".jupyter_cache" / _CODE.hexdigest()[:16])
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 900  # s for each cell
+nb_merge_streams = True
+nb_ipywidgets_js = {}  # no notebook shows a widget, whose scripts would be loaded from a network
 
 # Everything that the pages load is part of the site: it opens from disk, without a network.
 html_theme = "furo"
