@@ -14,7 +14,7 @@ pytestmark = pytest.mark.docs
 ROOT = Path(__file__).parents[2]
 TEXTS_OF_THE_PROJECT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "paper.md", ".github")
 SEARCHED = ("undertow", "soak", "docs", "examples", "benchmarks", *TEXTS_OF_THE_PROJECT)
-SUFFIXES = {".py", ".md", ".yaml", ".yml", ".css", ".html", ".cff"}
+SUFFIXES = {".py", ".md", ".ipynb", ".yaml", ".yml", ".css", ".html", ".cff"}
 
 # Retired word (a regular expression) -> the field's word.
 RETIRED = {
@@ -109,7 +109,7 @@ def files() -> list[Path]:
     """Every text file that is searched; not those that the build of the site makes."""
     roots = [ROOT / name for name in SEARCHED]
     found = [path for root in roots for path in ([root] if root.is_file() else root.rglob("*"))]
-    made = {ROOT / "docs" / "_build", ROOT / "docs" / "gallery"}
+    made = {ROOT / "docs" / name for name in ("_build", "gallery", ".jupyter_cache")}
     return sorted(path for path in found if path.suffix in SUFFIXES and not made & set(path.parents))
 
 
