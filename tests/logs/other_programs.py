@@ -1,7 +1,7 @@
 """Files as other programs write them, made byte by byte from the description of their formats.
 
 ArduPilot: libraries/AP_Logger/LogStructure.h (FMT, FMTU, and the messages). PX4: docs.px4.io/main/en/dev_log/
-ulog_file_format. ROS 2: rosbags, a package of others. MAVLink: frames by pymavlink, and before each its time.
+ulog_file_format. ROS 1 and 2: rosbags, a package of others. MAVLink: frames by pymavlink, and before each its time.
 """
 
 import json
@@ -60,47 +60,65 @@ def px4_ulg(topics):
     return out + b"".join(body for _, body in sorted(data, key=lambda one: one[0]))
 
 
+def _ros_message(store, kind, ns, given):
+    """An Odometry or Float64MultiArray message of ROS 1 or 2, whose headers differ."""
+    make = lambda name, *parts: store.types[name](*parts)
+    vector = lambda values: make("geometry_msgs/msg/Vector3", *map(float, values))
+    if kind == "nav_msgs/msg/Odometry":
+        stamp = make("builtin_interfaces/msg/Time", ns // 10**9, ns % 10**9)
+        count = [7] if "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__ else []
+        point = make("geometry_msgs/msg/Point", *map(float, given["position"]))
+        w, x, y, z = map(float, given["quaternion"])
+        pose = make("geometry_msgs/msg/Pose", point, make("geometry_msgs/msg/Quaternion", x, y, z, w))
+        twist = make("geometry_msgs/msg/Twist", vector(given["linear"]), vector(given["angular"]))
+        zero = np.zeros(36)
+        return make(
+            kind,
+            make("std_msgs/msg/Header", *count, stamp, "odom"),
+            "base_link",
+            make("geometry_msgs/msg/PoseWithCovariance", pose, zero),
+            make("geometry_msgs/msg/TwistWithCovariance", twist, zero),
+        )
+    layout = make("std_msgs/msg/MultiArrayLayout", [], 0)
+    return make(kind, layout, np.asarray(given["data"], dtype=float))
+
+
 def ros2_bag(folder, storage, messages):
-    """A bag of Odometry, Imu and Float64MultiArray messages: (topic, ns, {...}) each."""
+    """A bag of Odometry and Float64MultiArray messages: (topic, type, ns, {...}) each."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.LATEST)
-    types = store.types
-    make = lambda name, *parts: types[name](*parts)
-
-    def header(ns, frame):
-        stamp = make("builtin_interfaces/msg/Time", ns // 10**9, ns % 10**9)
-        return make("std_msgs/msg/Header", stamp, frame)
-
-    def vector(values):
-        return make("geometry_msgs/msg/Vector3", *map(float, values))
-
-    def built(kind, ns, given):
-        if kind == "nav_msgs/msg/Odometry":
-            point = make("geometry_msgs/msg/Point", *map(float, given["position"]))
-            w, x, y, z = map(float, given["quaternion"])
-            pose = make("geometry_msgs/msg/Pose", point, make("geometry_msgs/msg/Quaternion", x, y, z, w))
-            twist = make("geometry_msgs/msg/Twist", vector(given["linear"]), vector(given["angular"]))
-            zero = np.zeros(36)
-            covered = make("geometry_msgs/msg/PoseWithCovariance", pose, zero)
-            return make(
-                kind,
-                header(ns, "odom"),
-                "base_link",
-                covered,
-                make("geometry_msgs/msg/TwistWithCovariance", twist, zero),
-            )
-        layout = make("std_msgs/msg/MultiArrayLayout", [], 0)
-        return make(kind, layout, np.asarray(given["data"], dtype=float))
-
     plugin = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}[storage]
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections = {}
         for topic, kind, ns, given in messages:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], ns, store.serialize_cdr(built(kind, ns, given), kind))
+            writer.write(connections[topic], ns, store.serialize_cdr(_ros_message(store, kind, ns, given), kind))
+
+
+def ros1_bag(path, messages, compression="none", chunk_size=2**20, definitions=()):
+    """A bag of ROS 1: (topic, type, ns, {...}) each, or bytes in place of {...}. `definitions`: text by type."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name, text in dict(definitions).items():
+        store.register(get_types_from_msg(text, name))
+    writer = Writer(path)
+    if compression != "none":
+        writer.set_compression(Writer.CompressionFormat[compression.upper()])
+    writer.chunk_threshold = chunk_size
+    with writer:
+        connections = {}
+        for topic, kind, ns, given in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            is_bytes = isinstance(given, bytes)
+            data = given if is_bytes else store.serialize_ros1(_ros_message(store, kind, ns, given), kind)
+            writer.write(connections[topic], ns, data)
+    return path
 
 
 def json_mcap(path, channels, encoding="json"):

@@ -9,7 +9,7 @@ from other_programs import json_mcap, ros2_bag
 from test_hostile_files import mcap_of_chunk, record, zstd
 
 from undertow.core.errors import BadInput
-from undertow.logs import ros2_bag as bag_reader
+from undertow.logs import ros_bag as bag_reader
 from undertow.logs.mapping import mapping_of
 from undertow.logs.message_fields import MOST_FIELDS, MessageFields
 from undertow.logs.read import read_log

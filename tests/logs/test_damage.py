@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from other_programs import json_mcap
-from test_log_formats import bag, bin_file, ulg_file
+from other_programs import json_mcap, ros1_bag
+from test_log_formats import bag, bin_file, ros_messages, ulg_file
 from test_mavlink_logs import tlog_file
 
 from undertow.core.errors import BadInput
@@ -73,6 +73,8 @@ def good_file(kind, folder):
     if kind in ("db3", "ros_mcap"):
         made = bag(folder / "bag", {"db3": "sqlite3", "ros_mcap": "mcap"}[kind])
         return next(one for one in made.iterdir() if one.suffix in (".db3", ".mcap")), None
+    if kind.startswith("ros1"):
+        return ros1_bag(folder / "a.bag", ros_messages(), kind.partition(".")[2] or "none", 2**13), None
     if kind == "tlog":
         return tlog_file(folder / "a.tlog"), None
     if kind == "bin":
@@ -99,7 +101,7 @@ def damaged(whole, chance):
     return bytes(data)
 
 
-KINDS = ("mcap", "csv", "json", "db3", "ros_mcap", "bin", "tlog", "ulg", "odometry.ulg")
+KINDS = ("mcap", "csv", "json", "db3", "ros_mcap", "ros1", "ros1.lz4", "bin", "tlog", "ulg", "odometry.ulg")
 
 
 @pytest.mark.full
@@ -118,7 +120,9 @@ def test_damaged_files(tmp_path, kind, capsys):
             assert path.name in str(error) and "\n" not in str(error), str(error)
         else:
             assert isinstance(log, Log) and repr(log)
-    assert refused > (0 if kind == "tlog" else 10)  # frames of telemetry are whole or not, each for itself
+    assert refused > (
+        0 if kind in ("tlog", "ros1", "ros1.lz4") else 10
+    )  # whose frames and records stand for themselves
     assert not any(capsys.readouterr())
 
 

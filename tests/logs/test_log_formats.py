@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from other_programs import ardupilot_bin, json_mcap, px4_ulg, ros2_bag
+from other_programs import ardupilot_bin, json_mcap, px4_ulg, ros1_bag, ros2_bag
 from scipy.spatial.transform import Rotation
 
 from undertow.core.errors import BadInput
@@ -116,7 +116,8 @@ def test_old_px4(tmp_path):
         close(read_log(tmp_path / "old.ulg")["angular_velocity"], expected)
 
 
-def bag(folder, storage):
+def ros_messages():
+    """Odometry and pulses, in the axes of ROS."""
     quaternion = np.roll(Rotation.from_matrix(ENU_OF_NED @ TURNED.as_matrix() @ FLU_OF_FRD).as_quat(), 1, axis=1)
     start = 1_700_000_000 * 10**9
     messages = []
@@ -129,7 +130,11 @@ def bag(folder, storage):
         }
         messages.append(("/odom", "nav_msgs/msg/Odometry", start + ns, given))
         messages.append(("/thrusters", "std_msgs/msg/Float64MultiArray", start + ns, {"data": PULSES[i]}))
-    ros2_bag(folder, storage, messages)
+    return messages
+
+
+def bag(folder, storage):
+    ros2_bag(folder, storage, ros_messages())
     return folder
 
 
@@ -219,21 +224,36 @@ def test_px4_odometry_says_its_frame(tmp_path, frame, read):
         assert "vehicle_odometry is not read as velocity: its velocity_frame is 2, not 1" in log.notes
 
 
+THRUSTERS = {"input": {"topic": "/thrusters", "columns": ["data[0]..data[7]"], "unit": "us", "supply": 16}}
+
+
+def same_motion_of_ros(path):
+    """East, north, up and forward, port, up become ours; times begin at the first message."""
+    log = read_log(path, mapping_of({"signals": THRUSTERS}))
+    np.testing.assert_allclose(log["position"].time, TIME, atol=1e-9)
+    close(log["position"], POSITION, 1e-12)
+    same_turn(log["attitude"], 1e-9)
+    close(log["body_velocity"], BODY_VELOCITY, 1e-12)
+    close(log["angular_velocity"], RATES, 1e-12)
+    offset = PULSES - 1500
+    close(log["input"], np.where(abs(offset) > 25, offset / 25, 0.0), 1e-12)
+    assert not log.notes
+    return log
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_ros2(tmp_path, storage):
-    """East, north, up and forward, port, up become ours; times begin at the first message."""
     folder = bag(tmp_path / "bag", storage)
-    signals = {"input": {"topic": "/thrusters", "columns": ["data[0]..data[7]"], "unit": "us", "supply": 16}}
     file = next(one for one in folder.iterdir() if one.suffix in (".mcap", ".db3"))
     for path in (folder, file):
-        log = read_log(path, mapping_of({"signals": signals}))
-        np.testing.assert_allclose(log["position"].time, TIME, atol=1e-9)
-        close(log["position"], POSITION, 1e-12)
-        same_turn(log["attitude"], 1e-9)
-        close(log["body_velocity"], BODY_VELOCITY, 1e-12)
-        close(log["angular_velocity"], RATES, 1e-12)
-        assert log["input"].values.shape == (ROWS, 8)
+        assert same_motion_of_ros(path).format == "ROS 2 bag"
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_ros1(tmp_path, compression):
+    path = ros1_bag(tmp_path / "dive.bag", ros_messages(), compression, chunk_size=2**14)
+    assert same_motion_of_ros(path).format == "ROS 1 bag"
 
 
 def test_csv_with_any_header(tmp_path):

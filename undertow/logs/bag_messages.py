@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from undertow.core.errors import BadInput
 from undertow.logs.mcap_reader import records
-from undertow.logs.ros2_types import Definition
+from undertow.logs.ros_types import Definition
 from undertow.logs.unfinished_database import consistent_database
 from undertow.logs.unpacking import unpacked, unpacked_file
 

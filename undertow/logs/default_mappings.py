@@ -1,7 +1,7 @@
-"""What the messages of ArduPilot, PX4 and ROS 2 mean, from their definitions.
+"""What the messages of ArduPilot, PX4 and ROS mean, from their definitions.
 
 ArduPilot: ardupilot.org/sub/docs/logmessages.html and the LogStructure.h of each library. PX4: docs.px4.io/main/en/
-msg_docs. ROS 2: REP 103 (units, axes) and nav_msgs/Odometry, whose twist is in the axes of the body.
+msg_docs. ROS 1 and 2: REP 103 (units, axes) and nav_msgs/Odometry, whose twist is in the axes of the body.
 """
 
 from undertow.logs.ardupilot_parameters import barometers, motor_channels, primary_barometer, pulse_columns
@@ -78,7 +78,7 @@ PX4 = LogMapping(
 
 _ODOMETRY, _IMU = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu"
 _TWIST = "twist.twist"
-ROS2 = LogMapping(
+ROS = LogMapping(
     {
         "position": (SignalMapping(_xyz("pose.pose.position"), _ODOMETRY, frame=_ENU),),
         "quaternion": (
@@ -121,7 +121,7 @@ MAVLINK = LogMapping(
     }
 )
 
-DEFAULTS = {"ArduPilot": ARDUPILOT, "PX4": PX4, "ROS 2 bag": ROS2, "MAVLink": MAVLINK}
+DEFAULTS = {"ArduPilot": ARDUPILOT, "PX4": PX4, "ROS 1 bag": ROS, "ROS 2 bag": ROS, "MAVLink": MAVLINK}
 
 
 def usual_mapping(recording: Recording) -> tuple[LogMapping, tuple[str, ...]]:

@@ -29,9 +29,10 @@ def attitudes(angles: np.ndarray, world: str, body: str) -> np.ndarray:
 
 
 def attitudes_of_quaternions(quaternions: np.ndarray, world: str, body: str) -> np.ndarray:
-    """Roll, pitch, yaw (rad) of FRD in NED from quaternions (w, x, y, z), body to world, of any length."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    """Roll, pitch, yaw (rad) of FRD in NED from quaternions (w, x, y, z), body to world, of any finite length."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        length = np.linalg.norm(quaternions, axis=1, keepdims=True)
+        w, x, y, z = (quaternions / np.where(np.isfinite(length), length, np.nan)).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],

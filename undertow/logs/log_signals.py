@@ -75,7 +75,7 @@ class LogSignals:
         signals: by name; see `undertow.logs.known_signals` for the names of what other programs measure. A run of
             undertow has those of its result file.
         source: the file.
-        format: `undertow`, `CSV`, `MCAP`, `ROS 2 bag`, `ArduPilot`, `MAVLink` or `PX4`.
+        format: `undertow`, `CSV`, `MCAP`, `ROS 1 bag`, `ROS 2 bag`, `ArduPilot`, `MAVLink` or `PX4`.
         notes: what a reader should know: a file without its end, samples left out, frames converted.
         facts: further text by name, such as the scenario of a run.
     """

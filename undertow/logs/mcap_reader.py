@@ -18,9 +18,9 @@ from undertow.logs.mcap_writer import METADATA
 from undertow.logs.message_fields import MessageFields
 from undertow.logs.messages import is_ours, number, signals_of
 from undertow.logs.recording import Recording
+from undertow.logs.unpacking import unpacked_chunk
 
 _LARGEST = 2**28  # bytes of a record; none of ours comes near
-_LARGEST_CHUNK = 2**26  # bytes of an unpacked chunk: small files can be made that unpack to any size
 
 _HEAD = struct.Struct("<BQ")  # of a record: its kind, and the bytes that follow
 _DATA_END, _IN_CHUNKS = 0x0F, (0x03, 0x04, 0x05)  # kinds; chunks hold schemas, channels and messages
@@ -215,29 +215,11 @@ def _broken_up(chunk: Any) -> list[Any]:
     """
     from mcap.stream_reader import breakup_chunk
 
-    size = chunk.uncompressed_size
-    if size > _LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes, more than the {_LARGEST_CHUNK} that are read")
-    data = _unpacked(chunk.compression, chunk.data, size)
-    if len(data) != size:
-        raise ValueError(f"a chunk of {'more' if len(data) > size else 'fewer'} than the {size} bytes that it declares")
+    data = unpacked_chunk(chunk.compression, chunk.data, chunk.uncompressed_size)
     offset = _first_other(data, 0, _IN_CHUNKS)
     if offset < len(data):
         raise ValueError(f"a record of kind {data[offset]} in a chunk, where there is none of it")
     return breakup_chunk(dataclasses.replace(chunk, compression="", data=data), validate_crc=True)
-
-
-def _unpacked(compression: str, data: bytes, size: int) -> bytes:
-    """The data of a chunk, or one byte more than the size that it declares, which may be a lie."""
-    if compression == "zstd":
-        import zstandard
-
-        return zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
-    if compression == "lz4":
-        import lz4.frame
-
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-    return data
 
 
 def _damaged(path: Path, what: str) -> BadInput:

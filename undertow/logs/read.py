@@ -10,7 +10,7 @@ from undertow.core.errors import BadInput, error_location
 from undertow.logs.ardupilot import read_ardupilot
 from undertow.logs.bag_messages import STORAGE_FILES
 from undertow.logs.csv_reader import read_csv
-from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS2, usual_mapping
+from undertow.logs.default_mappings import DEFAULTS, MAVLINK, ROS, usual_mapping
 from undertow.logs.log import Log
 from undertow.logs.mapped_log import log_of, suited
 from undertow.logs.mapping import LogMapping
@@ -18,7 +18,8 @@ from undertow.logs.mavlink_log import read_mavlink
 from undertow.logs.mcap_reader import has_ros_messages, read_mcap
 from undertow.logs.px4 import read_px4
 from undertow.logs.recording import Recording, TopicMessages
-from undertow.logs.ros2_bag import read_ros2_bag
+from undertow.logs.ros1_messages import ROS1_SUFFIXES
+from undertow.logs.ros_bag import read_ros_bag
 from undertow.logs.run_log import read_run
 
 _SHOWN_TOPICS, _SHOWN_COLUMNS = 4, 6  # in an error
@@ -28,8 +29,8 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
     """The log in a file.
 
     Args:
-        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .tlog (MAVLink), .ulg (PX4), .db3, or the folder of a bag of
-            ROS 2.
+        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .tlog (MAVLink), .ulg (PX4), .bag (ROS 1), .db3, or the
+            folder of a bag of ROS 2.
         mapping: where signals stand; they go before those that the format itself explains.
         location: file and line of a key of the mapping.
 
@@ -51,7 +52,7 @@ def read_log(path: Path, mapping: LogMapping | None = None, location: Callable[[
 def _names(mapping: LogMapping | None) -> set[str]:
     """Topics and types that are looked for in a bag or a telemetry log; "" where the only topic is meant."""
     entries_of_mapping = () if mapping is None else mapping.signals.values()
-    usual = (ROS2.signals.values(), MAVLINK.signals.values())
+    usual = (ROS.signals.values(), MAVLINK.signals.values())
     return {
         entry.topic for entries in (*entries_of_mapping, *usual[0], *usual[1]) for entry in entries if not entry.motors
     }
@@ -108,12 +109,12 @@ def _reader(path: Path, names: Collection[str]) -> Callable[[Path], Log | Record
         files = " ".join(file.name for file in path.iterdir())
         if not any(name in files for name in ("metadata.yaml", *STORAGE_FILES)):
             raise BadInput("log", "be a file, or the folder of a bag of ROS 2", f"{path}, without .mcap or .db3 files")
-        return functools.partial(read_ros2_bag, names=names)
+        return functools.partial(read_ros_bag, names=names)
     suffix = path.suffix.lower()
     if suffix == ".mcap":
-        return functools.partial(read_ros2_bag, names=names) if has_ros_messages(path) else read_mcap
+        return functools.partial(read_ros_bag, names=names) if has_ros_messages(path) else read_mcap
     readers = {".csv": read_csv, ".txt": read_csv, ".nc": read_run, ".bin": read_ardupilot, ".ulg": read_px4}
-    readers |= {".db3": functools.partial(read_ros2_bag, names=names)}
+    readers |= dict.fromkeys((".db3", *ROS1_SUFFIXES), functools.partial(read_ros_bag, names=names))
     readers |= {".tlog": functools.partial(read_mavlink, names=names)}
     if suffix not in readers:
         raise BadInput("log", f"be one of .mcap, {', '.join(readers)}, or the folder of a bag", path.name)

@@ -18,8 +18,8 @@ def read_log(
     """The log in a file of undertow or of another program, in our frames and units.
 
     Args:
-        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .tlog (MAVLink), .ulg (PX4), .db3, or the folder of a bag of
-            ROS 2.
+        path: .mcap, .csv, .nc (a run), .bin (ArduPilot), .tlog (MAVLink), .ulg (PX4), .bag (ROS 1), .db3, or the
+            folder of a bag of ROS 2.
         mapping: which columns are which signal: a .yaml file, or the same as a mapping. None for a format that says so
             itself. Its signals go before those of the format.
         folder: where relative paths start; None for the current one.

@@ -14,9 +14,10 @@ from undertow.cli.options.shared import AllowCode
 class LogsCommand(Command):
     """Show what is in a log, and convert it.
 
-    The command reads MCAP, CSV, run.nc, bags of ROS 2, .bin files of ArduPilot and .ulg files of PX4, and shows the
-    signals with unit, rate and gaps. `undertow logs score SCENARIO FILE` starts the model of the vehicle every 5 s from
-    the logged motion, drives it with the logged commands, and reports how far it is from the log after 1, 5 and 10 s.
+    The command reads MCAP, CSV, run.nc, bags of ROS 1 and 2, .bin files of ArduPilot, .tlog files of MAVLink and .ulg
+    files of PX4, and shows the signals with unit, rate and gaps. `undertow logs score SCENARIO FILE` starts the model
+    of the vehicle every 5 s from the logged motion, drives it with the logged commands, and reports how far it is from
+    the log after 1, 5 and 10 s.
     """
 
     runs: ClassVar = "undertow.cli.logs:logs"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from undertow.core.errors import BadInput
 from undertow.logs.bag_messages import StoredMessage, stored_messages
-from undertow.logs.ros2_types import Decoder
+from undertow.logs.ros_types import Decoder
 from undertow.outside.ros2.frames import between_attitudes, between_frd_and_flu
 from undertow.outside.ros2.from_messages import SECOND, Frames, motion_of, target_of, wrench_from
 

@@ -1,4 +1,4 @@
-"""Tables of the numbers in a bag of ROS 2. Messages are decoded by rosbags."""
+"""Tables of the numbers in a bag of ROS 1 or ROS 2. Messages are decoded by rosbags."""
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -11,12 +11,13 @@ from undertow.logs.bag_messages import StoredMessage, stored_messages
 from undertow.logs.extra import check_installed, quiet, reason_of
 from undertow.logs.message_fields import MessageFields
 from undertow.logs.recording import Recording
-from undertow.logs.ros2_types import Decoder
+from undertow.logs.ros1_messages import ROS1_SUFFIXES, ros1_messages
+from undertow.logs.ros_types import Decoder
 
 _LONGEST = 64  # numbers of an array that become columns; images and point clouds have more
 
 
-def read_ros2_bag(path: Path, names: Collection[str] = ("",)) -> Recording:
+def read_ros_bag(path: Path, names: Collection[str] = ("",)) -> Recording:
     """Tables of the numbers of each topic, by path: `pose.pose.position.x`, `data[3]`.
 
     Times are those of the header where a message has a stamp, otherwise those of recording; both since the first.
@@ -31,25 +32,27 @@ def read_ros2_bag(path: Path, names: Collection[str] = ("",)) -> Recording:
     check_installed("rosbags", "rosbags")
     notes: list[str] = []
     topics = _Topics(names)
+    is_ros1 = path.suffix.lower() in ROS1_SUFFIXES
+    messages_of, ros = (ros1_messages, "ROS 1") if is_ros1 else (stored_messages, "ROS 2")
     try:
         with quiet(notes):
-            for message in stored_messages(path, topics.requested, notes):
+            for message in messages_of(path, topics.requested, notes):
                 topics.add(message)
     except BadInput:
         raise
     except Exception as error:  # whatever bytes may cause
         got = f"{path.name}, {topics.place}: {reason_of(error)}"
-        raise BadInput("log", "be an undamaged bag of ROS 2", got) from None
+        raise BadInput("log", f"be an undamaged bag of {ros}", got) from None
     left_out = topics.left_out()
     notes += [f"{topic} is left out: {reason}" for topic, reason in left_out.items()]
     notes += topics.partly()
     if not topics.fields:
         reasons = "; ".join(f"{topic}: {reason}" for topic, reason in left_out.items())
-        got = f"{path.name}, which has {reasons or 'none'}"
+        got = f"{path.name}, which has {'; '.join([reasons or 'none', *notes])}"
         raise BadInput("log", "have messages that can be decoded", got)
     start = topics.start()
     tables = {topic: fields.table(start) for topic, fields in topics.fields.items()}
-    return Recording(tables, path.name, "ROS 2 bag", tuple(notes), left_out=left_out)
+    return Recording(tables, path.name, f"{ros} bag", tuple(notes), left_out=left_out)
 
 
 class _Topics:
