@@ -105,7 +105,11 @@ def _log(chance: random.Random, material: Mapping[str, bytes]) -> tuple[dict[str
     if name.startswith("bag/"):
         bag = {file_name: data for file_name, data in material.items() if file_name.startswith("bag/")}
         return {**bag, name: spoilt_bytes(material[name], chance), "bag": None}, ["logs", "bag"]
-    suffix = Path(name).suffix if chance.random() < 0.95 else chance.choice((".mcap", ".ulg", ".bin", ".db3", ".csv"))
+    suffix = (
+        Path(name).suffix
+        if chance.random() < 0.95
+        else chance.choice((".mcap", ".ulg", ".bin", ".db3", ".csv", ".bag"))
+    )
     log_name = f"log{suffix}"
     out = ["--out", chance.choice(("x.csv", "x.mcap"))] if chance.random() < 0.2 else []
     return {log_name: spoilt_bytes(material[name], chance)}, ["logs", log_name, *out]

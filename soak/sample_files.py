@@ -15,7 +15,7 @@ Run = Callable[[Sequence[str]], int]
 
 
 def material(run: Run) -> dict[str, bytes]:
-    """Bytes of every file, by name: run.nc, run.mcap, run.csv, log.bin, log.ulg, bag/..., store/...
+    """Bytes of every file, by name: run.nc, run.mcap, run.csv, log.bin, log.ulg, log.bag, bag/..., store/...
 
     Args:
         run: `undertow` with arguments, in this process.
@@ -98,3 +98,23 @@ def _bag(folder: Path) -> bool:
             message = store.types[kind](layout, np.arange(6.0) + i)
             writer.write(connection, 100_000_000 * i, store.serialize_cdr(message, kind))
     return True
+
+
+def _ros1_bag(path: Path) -> bytes:
+    """A small bag of ROS 1, compressed, with positions."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    kind = "nav_msgs/msg/Odometry"
+    writer = Writer(path)
+    writer.set_compression(Writer.CompressionFormat.LZ4)
+    writer.chunk_threshold = 2**12
+    with writer:
+        connection = writer.add_connection("/odom", kind, typestore=store)
+        for i in range(20):
+            header = struct.pack("<III", i, i, 0) + struct.pack("<I", 4) + b"odom" + struct.pack("<I", 0)
+            pose = struct.pack("<7d", i, -i, 0.5 * i, 0, 0, 0, 1) + bytes(8 * 36)
+            twist = struct.pack("<6d", 1, -1, 0.5, 0, 0, 0) + bytes(8 * 36)
+            writer.write(connection, 10**9 * i, header + pose + twist)
+    return path.read_bytes()
