@@ -112,6 +112,23 @@ def test_types_of_a_bag_and_stamps(tmp_path):
     assert len(log.notes) == 1 and log.notes[0].startswith("/odd is left out: messages of type std_msgs/msg/Float64")
 
 
+def test_imu_is_read_without_a_mapping(tmp_path):
+    """In forward, port, up of REP 103, which become forward, starboard, down."""
+    rows = []
+    for k in range(10):
+        head = struct.pack("<III", k, 1_700_000_000 + k, 0) + struct.pack("<I", 3) + b"imu"
+        turn, rates, force = (0.0, 0.0, 0.0, 1.0), (1.0, 2.0, 3.0 + k), (0.1, 0.2, 9.8)
+        covariance = bytes(8 * 9)
+        data = head + b"".join(struct.pack(f"<{len(v)}d", *v) + covariance for v in (turn, rates, force))
+        rows.append(("/imu", "sensor_msgs/msg/Imu", START + k * 10**9, data))
+    log = read_log(ros1_bag(tmp_path / "a.bag", rows))
+    np.testing.assert_array_equal(log["angular_velocity"].values, [(1, -2, -3 - k) for k in range(10)])
+    np.testing.assert_array_equal(log["specific_force"].values, [(0.1, -0.2, -9.8)] * 10)
+    np.testing.assert_allclose(
+        log["attitude"].values, [(0, 0, np.pi / 2)] * 10, atol=1e-12
+    )  # east is a yaw of 90 degrees
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
 def test_as_rosbags_reads_it(tmp_path, compression):
