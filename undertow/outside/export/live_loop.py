@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.control.supervision.supervised_controller import unsupervised
 from undertow.core.arrays import in_present_precision
 from undertow.core.contracts import AbstractReference, Target
 from undertow.core.errors import BadInput
@@ -28,6 +29,7 @@ from undertow.scenario.reading import from_data
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.recording import instant
+from undertow.simulation.loop.simd_batch import realized_disturbance
 
 NEVER = 1e9  # s, the time of what does not happen
 
@@ -77,7 +79,7 @@ class LoopInput(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """What the seed realizes, and what changes from step to step."""
+    """What the seed realizes of navigation and faults, and what changes from step to step."""
 
     realized: tuple[Any, ...]
     carry: tuple[Any, ...]
@@ -129,11 +131,11 @@ def live_loop(source: Mapping[str, Any]) -> LiveLoop:
         raise BadInput("loop", must, f"{settings.kind}, {settings.method}")
     data, places = _with_switches(data, plant.inputs())
     built = build(data)
-    base = _arrays(built.closed_loop)
+    base = _numbers_of(built)
     switches = [Switch(label, _leaf_of(data, key, base), thruster) for label, key, thruster in places]
     dials = _dials(data, built, base)
     leaves = sorted({switch.leaf for switch in switches} | {leaf for dial in dials for leaf in dial.tables})
-    return LiveLoop(built, dials, switches, leaves, _system(built, leaves))
+    return LiveLoop(built, dials, switches, leaves, _system(built, base, leaves))
 
 
 def _with_switches(data: dict[str, Any], thrusters: int) -> tuple[dict[str, Any], list[tuple[str, str, int | None]]]:
@@ -150,19 +152,25 @@ def _with_switches(data: dict[str, Any], thrusters: int) -> tuple[dict[str, Any]
     return data | {"faults": faults, "disturbance": loads}, places
 
 
-def _arrays(loop: ClosedLoop) -> list[np.ndarray]:
-    return [np.asarray(leaf) for leaf in jax.tree.leaves(eqx.filter(loop, eqx.is_array))]
+def _numbers_of(built: Built) -> list[np.ndarray]:
+    """The arrays of the loop, and behind them those that its seed realizes of the disturbance.
+
+    The latter are made as a simulation makes them, because the C code would round them in another way.
+    """
+    loop = in_present_precision(built.closed_loop)
+    random = realized_disturbance(loop, key_of_seed(built.scenario.seed))
+    return [np.asarray(leaf) for leaf in (*jax.tree.leaves(eqx.filter(loop, eqx.is_array)), *jax.tree.leaves(random))]
 
 
-def _changed(data: Mapping[str, Any], key: str, value: Any) -> ClosedLoop:
+def _changed(data: Mapping[str, Any], key: str, value: Any) -> Built:
     changed = copy.deepcopy(dict(data))
     put_value(changed, key, value)
-    return build(from_data(changed)).closed_loop
+    return build(from_data(changed))
 
 
 def _leaf_of(data: Mapping[str, Any], key: str, base: list[np.ndarray]) -> int:
     """The array of the loop that holds a time of the scenario."""
-    other = _arrays(_changed(data, key, NEVER / 2))
+    other = _numbers_of(_changed(data, key, NEVER / 2))
     (leaf,) = (i for i, (one, two) in enumerate(zip(base, other, strict=True)) if not np.array_equal(one, two))
     return leaf
 
@@ -178,18 +186,28 @@ def _dials(data: Mapping[str, Any], built: Built, base: list[np.ndarray]) -> lis
             wanted.append(("current", "m/s", f"disturbance.{number}.velocity", part["velocity"], current))
         if part.get("kind") == "waves":
             wanted.append(("wave height", "m", f"disturbance.{number}.height", part["height"], waves))
-    bandwidth = built.resolved["controller"].get("bandwidth")
-    if isinstance(bandwidth, float):
-        wanted.append(("bandwidth of the controller", "rad/s", "controller.bandwidth", bandwidth, gain))
+    if "bandwidth" in built.resolved["controller"]:
+        bandwidth = built.resolved["controller"]["bandwidth"] or _bandwidth_of_rule(built.closed_loop)
+        if bandwidth is not None:
+            wanted.append(("bandwidth of the controller", "rad/s", "controller.bandwidth", bandwidth, gain))
     dials, taken = [], set()
     for label, unit, key, value, factors in wanted:
         tables = _tables(data, key, value, factors, base)
         if tables is not None and not taken & set(tables):
-            size = float(np.linalg.norm(np.asarray(value, dtype=float)))
+            sizes = np.asarray(value, dtype=float)
+            size = float(np.linalg.norm(sizes) if label == "current" else sizes.max())
             shown = [round(factor * size, 4) for factor in factors]
             dials.append(Dial(label, unit, shown, factors.index(1.0), tables))
             taken |= set(tables)
     return dials
+
+
+def _bandwidth_of_rule(loop: ClosedLoop) -> list[float] | None:
+    """The bandwidth that a rule has chosen, of each axis, rad/s; None for a law that does not keep it."""
+    law = unsupervised(loop.controller)
+    holder = getattr(law, "estimator", law)
+    bandwidth = getattr(holder, "bandwidth", None)
+    return None if bandwidth is None else np.asarray(bandwidth, dtype=float).tolist()
 
 
 def _tables(
@@ -200,7 +218,7 @@ def _tables(
     for factor in factors:
         scaled = (np.asarray(value, dtype=float) * factor).tolist()
         try:
-            arrays = base if factor == 1.0 else _arrays(_changed(data, key, scaled))
+            arrays = base if factor == 1.0 else _numbers_of(_changed(data, key, scaled))
         except BadInput:
             return None
         if [leaf.shape for leaf in arrays] != [leaf.shape for leaf in base]:
@@ -210,11 +228,11 @@ def _tables(
     return {i: [at[i] for at in positions] for i in changed}
 
 
-def _system(built: Built, leaves: list[int]) -> System:
+def _system(built: Built, base: list[np.ndarray], leaves: list[int]) -> System:
     settings, initial = built.scenario.loop, built.scenario.initial
     loop = in_present_precision(built.closed_loop)
     arrays, static = eqx.partition(loop, eqx.is_array)
-    base, form = jax.tree.flatten(arrays)
+    form_of_loop = jax.tree.structure(arrays)
     key, dt = key_of_seed(built.scenario.seed), jnp.asarray(settings.dt, dtype=float)
     start = loop.outputs_at_start(initial.position, initial.velocity)
     integrate = COMPACT_METHODS[settings.method]
@@ -222,16 +240,22 @@ def _system(built: Built, leaves: list[int]) -> System:
     numbers = tuple(np.asarray(base[leaf]) for leaf in leaves)
     example = LoopInput(numbers, np.zeros((), dtype=np.int32), Target(zero, zero, zero))
 
-    def loop_of(inputs: LoopInput) -> ClosedLoop:
-        changed = list(base)
+    form_of_random = jax.tree.structure(jax.eval_shape(loop.disturbance.realize, key))
+
+    def parts_of(inputs: LoopInput) -> tuple[ClosedLoop, Any]:
+        """The loop, and what is random of its disturbance."""
+        changed = [jnp.asarray(leaf) for leaf in base]
         for leaf, number in zip(leaves, inputs.numbers, strict=True):
             changed[leaf] = number
-        ready = eqx.combine(jax.tree.unflatten(form, changed), static).starting_at(initial.position)
-        return dataclasses.replace(ready, reference=_Steered(ready.reference, inputs.steered))
+        count = form_of_loop.num_leaves
+        ready = eqx.combine(jax.tree.unflatten(form_of_loop, changed[:count]), static).starting_at(initial.position)
+        steered = dataclasses.replace(ready, reference=_Steered(ready.reference, inputs.steered))
+        return steered, jax.tree.unflatten(form_of_random, changed[count:])
 
     def begun(inputs: LoopInput) -> tuple[Any, Any]:
-        realization = loop_of(inputs).realize(key)
-        return realization[1:], sampled.begin(realization, start, ())
+        steered, random = parts_of(inputs)
+        realization = steered.realized_with(random, key)
+        return realization[2:], sampled.begin(realization, start, ())
 
     def shown(realization: Realization, carry: Any, k: Any) -> dict[str, Any]:
         (x, z, measuring), _, ending = carry
@@ -252,13 +276,13 @@ def _system(built: Built, leaves: list[int]) -> System:
 
     def first(inputs: LoopInput):
         realized, carry = begun(inputs)
-        realization = Realization(loop_of(inputs), *realized)
+        realization = Realization(*parts_of(inputs), *realized)
         blank = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(shown, realization, carry, 0))
         return flat((realized, carry)), blank
 
     def step(state: LoopState, inputs: LoopInput):
         realized, carry = (jax.tree.unflatten(form, part) for form, part in zip(forms, state, strict=True))
-        realization = Realization(loop_of(inputs), *realized)
+        realization = Realization(*parts_of(inputs), *realized)
         output = shown(realization, carry, inputs.k)
         after = sampled.control_step(realization, (), dt, integrate, settings.substeps, carry, inputs.k)
         return flat((realized, after)), output
@@ -271,4 +295,5 @@ def _system(built: Built, leaves: list[int]) -> System:
         "step": "Records the loop at step input->k, and takes that step.",
     }
     about = made_from("Closed loop", built.scenario.description)
-    return System("loop", about, meanings, first, step, example, lambda _, k: example._replace(k=np.int32(k)), settings.dt)
+    sample = lambda _, k: example._replace(k=np.asarray(max(k - 1, 0), dtype=np.int32))
+    return System("loop", about, meanings, first, step, example, sample, settings.dt)
