@@ -132,7 +132,8 @@ static double fused_float64(double x, double y, double z) {
 
 # The sum of an exact product and a number, as a double that is rounded to odd (S. Boldo, G. Melquiond, 2008).
 _FLOAT32 = """\
-#if defined(SOFTWARE_FMA) || defined(__wasm__) || (defined(_NEWLIB_VERSION) && !defined(__FP_FAST_FMAF))
+#if defined(SOFTWARE_FMA) || defined(QUICK_FMA) || defined(__wasm__) || \\
+    (defined(_NEWLIB_VERSION) && !defined(__FP_FAST_FMAF))
 static float fused_float32(float x, float y, float z) {
     const double p = (double)x * y, sum = p + z, part = sum - p;
     const double rest = (p - (sum - part)) + (z - part);
