@@ -51,7 +51,7 @@ def check_wasm_compiler() -> None:
         BadInput: it is not.
     """
     if importlib.util.find_spec("ziglang") is None:
-        hint = "Run: pip install ziglang"
+        hint = "In the folder of undertow, run: pip install -c constraints.txt '.[wasm]'"
         raise BadInput("--wasm", "have a compiler", "without one: the package ziglang is not installed", hint=hint)
 
 
