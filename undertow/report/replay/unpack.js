@@ -45,12 +45,3 @@ function scalesOf(run) {
   const linear = usualSize(run, "uncertainty", 0, 3), angular = usualSize(run, "uncertainty", 3, 6);
   return [linear, linear, linear, angular, angular, angular].map((scale) => Math.max(scale, 1e-6));
 }
-
-function vector(numbers) {
-  return new THREE.Vector3(numbers[0], numbers[1], numbers[2]);
-}
-
-// three.js has the scalar part of a quaternion last.
-function quaternion(numbers) {
-  return new THREE.Quaternion(numbers[1], numbers[2], numbers[3], numbers[0]).normalize();
-}
