@@ -21,8 +21,7 @@ from undertow.core.numerics.random_keys import key_of_seed
 from undertow.outside.browser.live_numbers import LiveNumbers, live_numbers
 from undertow.outside.export.c_program import System, made_from
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
-from undertow.scenario.build import build
-from undertow.scenario.reading import Text
+from undertow.scenario.build import Built
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.recording import instant
@@ -64,20 +63,19 @@ class _Steered(AbstractReference):
         return Target(*(one + other for one, other in zip(self.inner.at(t), self.steered, strict=True)))
 
 
-def live_loop(text: Text) -> LiveLoop:
+def live_loop(built: Built) -> LiveLoop:
     """The closed loop of a scenario for a page, in the present precision, which is that of the scenario.
 
     Raises:
-        BadInput: the scenario is wrong, or none of a vehicle with thrusters in the sampled loop.
+        BadInput: the scenario is none of a vehicle with thrusters in the sampled loop.
     """
-    plain = build(text)
-    plant, settings = plain.closed_loop.plant, plain.scenario.loop
+    plant, settings = built.closed_loop.plant, built.scenario.loop
     if not isinstance(plant, HybridVehicle):
         raise BadInput("plant", "be a vehicle with thrusters for --wasm", type(plant).__name__)
     if settings.kind != "sampled" or settings.method not in COMPACT_METHODS:
         must = f"be the sampled loop with {' or '.join(COMPACT_METHODS)} for --wasm"
         raise BadInput("loop", must, f"{settings.kind}, {settings.method}")
-    numbers = live_numbers(text, plant.inputs())
+    numbers = live_numbers(built.text, plant.inputs())
     return LiveLoop(numbers, _system(numbers))
 
 

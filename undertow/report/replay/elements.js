@@ -1,4 +1,8 @@
-// Elements of a page.
+// Elements of a page, and bytes that it holds.
+
+function bytesOf(text) {
+  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+}
 
 function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);

@@ -206,3 +206,16 @@ function withDigits(value, scale) {
   const text = value.toFixed(Math.min(Math.max(2 - Math.floor(Math.log10(scale)), 0), 6));
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
 }
+
+function legend(runs, reference) {
+  const has = (name) => runs.some((run) => run.series[name]);
+  const limited = runs.every((run) => run.limited);
+  const entries = [
+    ["ramp", `thrust on the vehicle; colour: share of ${limited ? "its limit" : "the largest in this run"}`],
+    ["reference", reference],
+    ["uncertainty", `lumped uncertainty (translation)${has("estimate") ? "" : "; this law has no estimate"}`],
+    ...(has("estimate") ? [["estimate", "its estimate by the controller"]] : []),
+    ...(has("water") ? [["water", "velocity of the water"]] : []),
+  ];
+  return element("ul", { class: "legend" }, ...entries.map(([kind, text]) => element("li", { class: kind }, text)));
+}

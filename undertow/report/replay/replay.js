@@ -23,25 +23,12 @@ function buildPage(box, runs) {
   const readings = element("table", { class: "readings" });
   const panels = element("div", { class: "panels" }, readings);
   const controls = element("div", { class: "controls" }, play, slider, time);
-  box.replaceChildren(element("div", { class: "left" }, view, controls, options, legend(runs)), panels);
+  box.replaceChildren(element("div", { class: "left" }, view, controls, options, legend(runs, "reference: dashed path and transparent hull")), panels);
   box.tabIndex = 0;
   return {
     box, view, canvas, overlay, play, slider, time, speed, camera, which, readings, panels, start, end,
     labels: labels.input, forces: forces.input, places: new Map(),
   };
-}
-
-function legend(runs) {
-  const has = (name) => runs.some((run) => run.series[name]);
-  const limited = runs.every((run) => run.limited);
-  const entries = [
-    ["ramp", `thrust on the vehicle; colour: share of ${limited ? "its limit" : "the largest in this run"}`],
-    ["reference", "reference: dashed path and transparent hull"],
-    ["uncertainty", `lumped uncertainty (translation)${has("estimate") ? "" : "; this law has no estimate"}`],
-    ...(has("estimate") ? [["estimate", "its estimate by the controller"]] : []),
-    ...(has("water") ? [["water", "velocity of the water"]] : []),
-  ];
-  return element("ul", { class: "legend" }, ...entries.map(([kind, text]) => element("li", { class: kind }, text)));
 }
 
 // The first time at which the thrusters push half as hard as they ever do, s: at the start they often do not push at all.

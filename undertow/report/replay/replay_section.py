@@ -12,8 +12,8 @@ _THREE_JS = ("jupyter_threejs_sage", "static/r130/three.min.js")
 # One after the other they are one script; the first are those of any page with vehicles in three dimensions.
 _SCENE = ("elements.js", "scene.js", "panels.js")
 _SCRIPTS = ("unpack.js", "replay.js")
-_MISSING = (
-    "There is no replay: the package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
+MISSING_THREE_JS = (
+    "The package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
     "jupyter-threejs-sage==130"
 )
 _KEYS = (
@@ -31,7 +31,7 @@ def replay_section(replays: Sequence[ReplayData], caption: str = "") -> Html:
     """
     three = three_js()
     if three is None:
-        return section("replay", "Replay", tag("p", _MISSING))
+        return section("replay", "Replay", tag("p", f"There is no replay: {MISSING_THREE_JS}"))
     script = "\n".join([scene_script(), *(_text(name) for name in _SCRIPTS)])
     return section(
         "replay",

@@ -1,7 +1,7 @@
 // What `replay_data.py` has packed, unpacked: runs with series whose values can be asked for at any time.
 
 function unpackSeries(packed) {
-  const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
+  const bytes = bytesOf(packed.data);
   const whole = packed.bytes === 1 ? bytes : new Uint16Array(bytes.buffer);
   const width = packed.low.length, levels = 256 ** packed.bytes - 1;
   const values = new Float32Array(whole.length);
