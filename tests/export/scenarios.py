@@ -25,10 +25,9 @@ PENDULUM = {
     "initial": {"position": [0.05]},
     "loop": {"duration": 1.0, "dt": 0.001, "record": 0.001},
 }
-SUPERVISED = HEAVY | {
+NAVIGATED = HEAVY | {
     "description": "a vehicle that loses thrusters",
     "controller": "robust",
-    "supervisor": True,
     "navigation": {
         "kind": "observer",
         "sensors": ["imu", {"kind": "dvl", "delay": 0.05}, "depth", "compass", "position_fix"],

@@ -32,9 +32,13 @@ _SHOWN += ("lost_thrusters", "supervisor_state")
 
 
 class LoopInput(NamedTuple):
-    """Input of a step: arrays that dials and switches change, number of the step, and what steering adds."""
+    """Input of a step: arrays that dials and switches change, where it starts, number of the step, what steering adds.
+
+    The start is no constant, because a simulation computes with it in compiled code, which rounds in its own way.
+    """
 
     numbers: tuple[Any, ...]
+    start: tuple[Any, Any]
     k: Any
     steered: Target
 
@@ -82,7 +86,7 @@ def live_loop(built: Built) -> LiveLoop:
 def _system(numbers: LiveNumbers) -> System:
     base, leaves, scenario = numbers.base, numbers.leaves(), numbers.built.scenario
     settings, initial = scenario.loop, scenario.initial
-    loop = in_present_precision(numbers.built.closed_loop)
+    loop = in_present_precision(numbers.built.closed_loop).starting_at(initial.position)
     arrays, static = eqx.partition(loop, eqx.is_array)
     form_of_loop = jax.tree.structure(arrays)
     key, dt = key_of_seed(scenario.seed), jnp.asarray(settings.dt, dtype=float)
@@ -90,36 +94,39 @@ def _system(numbers: LiveNumbers) -> System:
     start = loop.outputs_at_start(initial.position, initial.velocity)
     integrate = COMPACT_METHODS[settings.method]
     zero = jnp.zeros(len(loop.plant.outputs))
-    example = LoopInput(tuple(base[leaf] for leaf in leaves), np.zeros((), dtype=np.int32), Target(zero, zero, zero))
+    numbers_at_start = tuple(base[leaf] for leaf in leaves)
+    example = LoopInput(numbers_at_start, start, np.zeros((), dtype=np.int32), Target(zero, zero, zero))
     example = jax.tree.map(np.asarray, example)
 
-    def parts_of(inputs: LoopInput) -> tuple[ClosedLoop, Any]:
+    def parts_of(arrays: list[Any], inputs: LoopInput) -> tuple[ClosedLoop, Any]:
         """The loop, and what is random of its disturbance."""
-        changed = [jnp.asarray(leaf) for leaf in base]
+        changed = list(arrays)
         for leaf, number in zip(leaves, inputs.numbers, strict=True):
             changed[leaf] = number
         count = form_of_loop.num_leaves
-        ready = eqx.combine(jax.tree.unflatten(form_of_loop, changed[:count]), static).starting_at(initial.position)
-        steered = dataclasses.replace(ready, reference=_Steered(ready.reference, inputs.steered))
+        loop = eqx.combine(jax.tree.unflatten(form_of_loop, changed[:count]), static)
+        steered = dataclasses.replace(loop, reference=_Steered(loop.reference, inputs.steered))
         return steered, jax.tree.unflatten(form_of_random, changed[count:])
 
-    def begun(inputs: LoopInput) -> tuple[Any, Any]:
-        steered, random = parts_of(inputs)
+    def begun(arrays: list[Any], inputs: LoopInput) -> tuple[Any, Any]:
+        steered, random = parts_of(arrays, inputs)
         realization = steered.realized_with(random, key)
-        return realization[2:], sampled.begin(realization, start, ())
+        return realization[2:], sampled.begin(realization, inputs.start, ())
 
-    shapes = jax.eval_shape(begun, example)
-    forms = [jax.tree.structure(part) for part in shapes]
+    forms = [jax.tree.structure(part) for part in jax.eval_shape(begun, base, example)]
     flat = lambda parts: LoopState(*(tuple(jax.tree.leaves(part)) for part in parts))
 
-    def first(inputs: LoopInput):
-        realized, carry = begun(inputs)
-        outputs = jax.eval_shape(_shown, Realization(*parts_of(inputs), *realized), carry, instant(0, dt))
+    # The arrays are arguments of these two, so that only the program computes with them, and rounds as a simulation.
+    @jax.jit
+    def first(arrays: list[Any], inputs: LoopInput):
+        realized, carry = begun(arrays, inputs)
+        outputs = jax.eval_shape(_shown, Realization(*parts_of(arrays, inputs), *realized), carry, instant(0, dt))
         return flat((realized, carry)), jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), outputs)
 
-    def step(state: LoopState, inputs: LoopInput):
+    @jax.jit
+    def step(arrays: list[Any], state: LoopState, inputs: LoopInput):
         realized, carry = (jax.tree.unflatten(form, part) for form, part in zip(forms, state, strict=True))
-        realization = Realization(*parts_of(inputs), *realized)
+        realization = Realization(*parts_of(arrays, inputs), *realized)
         output = _shown(realization, carry, instant(inputs.k, dt))
         after = sampled.control_step(realization, (), dt, integrate, settings.substeps, carry, inputs.k)
         return flat((realized, after)), output
@@ -133,7 +140,9 @@ def _system(numbers: LiveNumbers) -> System:
     }
     about = made_from("Closed loop", scenario.description)
     sample = lambda _, k: example._replace(k=np.asarray(max(k - 1, 0), dtype=np.int32))
-    return System("loop", about, meanings, first, step, example, sample, settings.dt)
+    start_of = lambda inputs: first(base, inputs)
+    step_of = lambda state, inputs: step(base, state, inputs)
+    return System("loop", about, meanings, start_of, step_of, example, sample, settings.dt)
 
 
 def _shown(realization: Realization, carry: Any, t: Any) -> dict[str, Any]:

@@ -134,7 +134,7 @@ def _numbers_of(built: Built) -> list[np.ndarray]:
 
     The latter are made as a simulation makes them, because the C code would round them in another way.
     """
-    loop = in_present_precision(built.closed_loop)
+    loop = in_present_precision(built.closed_loop).starting_at(built.scenario.initial.position)
     random = realized_disturbance(loop, key_of_seed(built.scenario.seed))
     return [np.asarray(leaf) for leaf in (*jax.tree.leaves(eqx.filter(loop, eqx.is_array)), *jax.tree.leaves(random))]
 
