@@ -1,11 +1,11 @@
-"""How fast the page of `undertow export --wasm` runs in a headless Chromium, and how often it draws.
+"""How fast the page of `undertow export --wasm` runs in a headless Chromium, and how many pictures a second it shows.
 
     python benchmarks/browser_speed.py [--scenario FILE] [--slowdown 4] [--pictures FOLDER]
 
 It needs playwright and Chromium (`pip install playwright`) and prints, at 1280 and at 420 pixels, the speed of the loop
 alone and that of the whole page in multiples of real time, pictures a second, and when a killed thruster was found.
-Without a graphics card Chromium draws by software, on the same processor. `--slowdown` makes the processor slower by a
-factor, for an idea of a phone.
+Without a graphics card Chromium renders by software, on the same processor. `--slowdown` makes the processor slower
+by a factor, for an idea of a phone.
 """
 
 import argparse

@@ -13,7 +13,7 @@ from export.scenarios import NAVIGATED
 from undertow.outside.browser.browser_page import export_page
 from undertow.scenario.build import build
 
-# Runs of an engine, each with what is changed at a step: times of switches, positions of dials.
+# Runs of an engine, each with what is changed at a step: times of switches, positions of sliders.
 _RUNS = """
 const fs = require("fs");
 const [, , dataFile, runsFile, answersFile] = process.argv;
@@ -21,13 +21,13 @@ const data = JSON.parse(fs.readFileSync(dataFile)), runs = JSON.parse(fs.readFil
 startEngine(data).then((engine) => {
   const answers = runs.map(({ steps, changes }) => {
     for (const { member } of data.loop.switches) engine.putTime(member, data.loop.never);
-    for (const { base, tables } of data.loop.dials) for (const member in tables) engine.put(member, tables[member][base]);
+    for (const { base, tables } of data.loop.sliders) for (const member in tables) engine.put(member, tables[member][base]);
     engine.begin();
     const records = {};
     for (let k = 0; k < steps; k += 1) {
       for (const { at, label, time, position } of changes.filter((change) => change.at === k)) {
         if (time === undefined) {
-          const { tables } = data.loop.dials.find((dial) => dial.label === label);
+          const { tables } = data.loop.sliders.find((slider) => slider.label === label);
           for (const member in tables) engine.put(member, tables[member][position]);
         } else engine.putTime(data.loop.switches.find((one) => one.label === label).member, time);
         if (at) engine.renew();

@@ -21,7 +21,7 @@ COMPARED = ("position", "reference", "error", "acting_input", "uncertainty", "es
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """As it is; with a thruster that is killed; in lower waves from the start; with a payload that is picked up."""
-    wave = next(dial for dial in page_data()["loop"]["dials"] if dial["label"] == "wave height")
+    wave = next(slider for slider in page_data()["loop"]["sliders"] if slider["label"] == "wave height")
     changes = [
         [],
         [{"at": KILLED, "label": "thruster 3", "time": 0.01 * KILLED}],

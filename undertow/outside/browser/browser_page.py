@@ -13,7 +13,7 @@ from undertow.core.errors import BadInput
 from undertow.core.status import Status
 from undertow.outside.browser.live_loop import LiveLoop, live_loop
 from undertow.outside.browser.live_numbers import NEVER
-from undertow.outside.browser.wasm import Layout, check_wasm_compiler, compiled_to_wasm, layout_of
+from undertow.outside.browser.wasm import StructLayout, check_wasm_compiler, compiled_to_wasm, layout_of
 from undertow.outside.export.c_program import CProgram, Exported, check_compiler
 from undertow.report.formats import prose
 from undertow.report.page import Html, document, tag
@@ -47,7 +47,7 @@ def export_page(built: Built) -> Exported:
         live = live_loop(built)
         program = CProgram(live.system)
     data = _page_data(live, program, compiled_to_wasm(program))
-    title = built.scenario.description or "A vehicle in the sea"
+    title = built.scenario.description or "A vehicle in current and waves"
     page = document(
         title,
         tag("h1", prose(title)),
@@ -67,10 +67,10 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
     layouts = {struct: layout_of(program.fields[struct]) for struct in ("state", "input", "output")}
     leaves = live.numbers.leaves()
     member = lambda leaf: f"numbers_{leaves.index(leaf)}"
-    dials = [
-        {key: value for key, value in dial._asdict().items() if key != "tables"}
-        | {"tables": {member(leaf): [_encoded(array) for array in arrays] for leaf, arrays in dial.tables.items()}}
-        for dial in live.numbers.dials
+    sliders = [
+        {key: value for key, value in slider._asdict().items() if key != "tables"}
+        | {"tables": {member(leaf): [_encoded(array) for array in arrays] for leaf, arrays in slider.tables.items()}}
+        for slider in live.numbers.sliders
     ]
     switches = [
         {"label": switch.label, "member": member(switch.leaf), "thruster": switch.thruster}
@@ -81,7 +81,7 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
         "never": NEVER,
         "layouts": {struct: layout._asdict() for struct, layout in layouts.items()},
         "input": base64.b64encode(_input_bytes(live, layouts["input"])).decode(),
-        "dials": dials,
+        "sliders": sliders,
         "switches": switches,
     }
     plant = built.closed_loop.plant
@@ -100,7 +100,7 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
     }
 
 
-def _input_bytes(live: LiveLoop, layout: Layout) -> bytes:
+def _input_bytes(live: LiveLoop, layout: StructLayout) -> bytes:
     """The struct of the input at the start, byte by byte."""
     content = bytearray(layout.bytes)
     arrays = [np.asarray(leaf) for leaf in jax.tree.leaves(live.system.inputs) if leaf.size]

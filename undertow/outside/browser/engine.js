@@ -25,7 +25,7 @@ async function startEngine({ module, loop }) {
     output,
     steered: { position: input.steered_position, velocity: input.steered_velocity, acceleration: input.steered_acceleration },
     time: () => step * loop.period, // of the next step, s
-    // Set the array of a dial, given as base64; `renew` makes it known.
+    // Set the array of a slider, given as base64; `renew` makes it known.
     put: (name, text) => new Uint8Array(memory.buffer, input[name].byteOffset, input[name].byteLength).set(bytesOf(text)),
     putTime: (name, time) => input[name].fill(time),
     // What the seed realizes follows numbers that have changed; what was reached stays.

@@ -20,13 +20,13 @@ function buildLivePage(box, data, run, steering) {
   );
   const controls = element("div", { class: "controls" }, play, reset, time);
   const faults = element("div", { class: "faults", role: "group", "aria-label": "faults" });
-  const dials = element("div", { class: "dials" });
+  const sliders = element("div", { class: "sliders" });
   const panels = element("div", { class: "panels" });
   const drive = element("div", { class: "drive" }, steeringPad(steering), element("div", {}, controls, options));
-  const left = [view, happening, drive, faults, dials];
+  const left = [view, happening, drive, faults, sliders];
   box.replaceChildren(element("div", { class: "left" }, ...left), panels);
   return {
-    box, view, canvas, overlay, happening, play, reset, time, speed, camera, faults, dials, panels,
+    box, view, canvas, overlay, happening, play, reset, time, speed, camera, faults, sliders, panels,
     labels: labels.input, forces: forces.input, which: { value: 0 }, places: new Map(),
   };
 }
@@ -103,14 +103,14 @@ function buildFaults(page, data, act) {
   });
 }
 
-function buildDials(page, data, turn) {
-  for (const dial of data.loop.dials) {
-    const slider = element("input", { type: "range", min: 0, max: dial.shown.length - 1, step: 1, value: dial.base, "aria-label": dial.label });
+function buildSliders(page, data, turn) {
+  for (const slider of data.loop.sliders) {
+    const handle = element("input", { type: "range", min: 0, max: slider.shown.length - 1, step: 1, value: slider.base, "aria-label": slider.label });
     const shown = element("output");
-    const say = () => { shown.textContent = `${Number(dial.shown[slider.value].toPrecision(2))} ${dial.unit}`; };
-    slider.addEventListener("input", () => { say(); turn(dial, Number(slider.value)); });
+    const say = () => { shown.textContent = `${Number(slider.shown[handle.value].toPrecision(2))} ${slider.unit}`; };
+    handle.addEventListener("input", () => { say(); turn(slider, Number(handle.value)); });
     say();
-    page.dials.append(element("label", {}, element("span", {}, dial.label), slider, shown));
+    page.sliders.append(element("label", {}, element("span", {}, slider.label), handle, shown));
   }
 }
 
@@ -248,13 +248,13 @@ async function startLive(box) {
       story.watchError(now(), picksUp ? "the payload was picked up" : "the payload was dropped");
     },
   });
-  buildDials(page, data, (dial, position) => {
-    for (const [member, arrays] of Object.entries(dial.tables)) engine.put(member, arrays[position]);
+  buildSliders(page, data, (slider, position) => {
+    for (const [member, arrays] of Object.entries(slider.tables)) engine.put(member, arrays[position]);
     engine.renew();
-    story.say(now(), `${dial.label}: ${Number(dial.shown[position].toPrecision(2))} ${dial.unit} from now on.`);
+    story.say(now(), `${slider.label}: ${Number(slider.shown[position].toPrecision(2))} ${slider.unit} from now on.`);
   });
 
-  // From the start again, without faults; dials stay.
+  // From the start again, without faults; sliders stay.
   function reset() {
     for (const { member } of loop.switches) engine.putTime(member, loop.never);
     run.thrusters.forEach((thruster, i) => { thruster.name = run.names[i]; });

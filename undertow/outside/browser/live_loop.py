@@ -32,7 +32,7 @@ _SHOWN += ("lost_thrusters", "supervisor_state")
 
 
 class LoopInput(NamedTuple):
-    """Input of a step: arrays that dials and switches change, where it starts, number of the step, what steering adds.
+    """Input of a step: arrays that sliders and switches change, the start, number of the step, what steering adds.
 
     The start is no constant, because a simulation computes with it in compiled code, which rounds in its own way.
     """

@@ -1,6 +1,6 @@
-"""Numbers of a scenario that somebody changes while it runs: dials, and switches of what begins at a time.
+"""Numbers of a scenario that somebody changes while it runs: sliders, and switches of what begins at a time.
 
-Every position of a dial and every fault is a scenario, too. Its numbers are those arrays of the closed loop in which
+Every position of a slider and every fault is a scenario, too. Its numbers are those arrays of the closed loop in which
 the two scenarios differ, so that rules are kept: a wave height changes amplitudes, a bandwidth all gains that follow.
 """
 
@@ -24,7 +24,7 @@ from undertow.simulation.loop.simd_batch import realized_disturbance
 NEVER = 1e9  # s, the time of what does not happen
 
 
-class Dial(NamedTuple):
+class Slider(NamedTuple):
     """A number of the scenario that a visitor changes.
 
     Attributes:
@@ -57,7 +57,7 @@ class Switch(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """A dial before it is known which arrays it changes: the key of the scenario, and its value at each position."""
+    """A slider before it is known which arrays it changes: the key of the scenario, and its value at each position."""
 
     label: str
     unit: str
@@ -73,22 +73,22 @@ class LiveNumbers(NamedTuple):
     Attributes:
         built: the scenario with the parts that begin later.
         base: arrays of its loop, and behind them those that its seed realizes of the disturbance.
-        dials, switches: what a visitor changes.
+        sliders, switches: what a visitor changes.
     """
 
     built: Built
     base: list[np.ndarray]
-    dials: list[Dial]
+    sliders: list[Slider]
     switches: list[Switch]
 
     def leaves(self) -> list[int]:
         """Numbers of the arrays that change, in their order."""
-        of_dials = {leaf for dial in self.dials for leaf in dial.tables}
-        return sorted(of_dials | {switch.leaf for switch in self.switches})
+        of_sliders = {leaf for slider in self.sliders for leaf in slider.tables}
+        return sorted(of_sliders | {switch.leaf for switch in self.switches})
 
 
 def live_numbers(text: Text, thrusters: int) -> LiveNumbers:
-    """The dials and switches of a scenario of a vehicle with so many thrusters, in the present precision."""
+    """The sliders and switches of a scenario of a vehicle with so many thrusters, in the present precision."""
     text, keys = _with_switches(text, thrusters)
     built = build(text)
     base = _numbers_of(built)
@@ -97,14 +97,14 @@ def live_numbers(text: Text, thrusters: int) -> LiveNumbers:
         is_thruster = number < thrusters
         label = f"thruster {number + 1}" if is_thruster else "payload"
         switches.append(Switch(label, _leaf_of(text, key, base), number if is_thruster else None))
-    dials: list[Dial] = []
+    sliders: list[Slider] = []
     taken: set[int] = set()
     for change in _changes(text, built):
         tables = _tables(text, change, base)
         if tables is not None and not taken & set(tables):
-            dials.append(Dial(change.label, change.unit, change.shown, change.base, tables))
+            sliders.append(Slider(change.label, change.unit, change.shown, change.base, tables))
             taken |= set(tables)
-    return LiveNumbers(built, base, dials, switches)
+    return LiveNumbers(built, base, sliders, switches)
 
 
 def _with_switches(text: Text, thrusters: int) -> tuple[Text, list[str]]:
@@ -197,7 +197,7 @@ def _gain(built: Built, key: str) -> Any:
 
 
 def _tables(text: Text, change: _Change, base: list[np.ndarray]) -> dict[int, list[np.ndarray]] | None:
-    """Arrays that a dial decides, at each position; None where one gives no loop, or one of another structure."""
+    """Arrays that a slider decides, at each position; None where one gives no loop, or one of another structure."""
     positions = []
     for number, value in enumerate(change.values):
         try:

@@ -83,7 +83,7 @@ def compiled_to_wasm(program: CProgram) -> bytes:
         return (folder / "program.wasm").read_bytes()
 
 
-class Layout(NamedTuple):
+class StructLayout(NamedTuple):
     """Where the members of a struct lie in memory.
 
     Attributes:
@@ -95,7 +95,7 @@ class Layout(NamedTuple):
     members: dict[str, dict[str, Any]]
 
 
-def layout_of(members: list[Field]) -> Layout:
+def layout_of(members: list[Field]) -> StructLayout:
     """The layout of a struct: WebAssembly aligns numbers to their size, as the processors do that undertow runs on."""
     sized = [member for member in members if member.size]
     types = [(member.name, _CTYPES[member.dtype] * member.size) for member in sized]
@@ -104,4 +104,4 @@ def layout_of(members: list[Field]) -> Layout:
         member.name: {"offset": getattr(struct, member.name).offset, "type": member.dtype, "count": member.size}
         for member in sized
     }
-    return Layout(ctypes.sizeof(struct), places)
+    return StructLayout(ctypes.sizeof(struct), places)
