@@ -1,10 +1,15 @@
 """Fused products in C99 for libraries whose `fma` rounds twice, as newlib's does where the processor has none.
 
-A program that is compiled with -DSOFTWARE_FMA takes these everywhere, so that any machine can test them.
+A program that is compiled with -DSOFTWARE_FMA takes these everywhere, so that any machine can test them; and one with
+-DQUICK_FMA that of WebAssembly, which has fast sums and products of doubles and no fused one.
 """
 
-# The product has 106 bits and is exact in 128, with the sum's room above it and, below, a bit that stands for all that
-# was shifted out. Bits are lost only where the parts are so far from each other that at most one leading bit cancels.
+# In whole numbers, for processors without a unit for doubles. The product has 106 bits and is exact in 128, with the
+# sum's room above it and, below, a bit that stands for all that was shifted out. Bits are lost only where the parts
+# are so far from each other that at most one leading bit cancels.
+#
+# In doubles: the product as a sum of two (T. J. Dekker, 1971), and that plus the third by a sum that is rounded to odd
+# (S. Boldo, G. Melquiond, 2008). Where a part might leave the range, libm's own.
 _FLOAT64 = """\
 #if defined(SOFTWARE_FMA) || (defined(_NEWLIB_VERSION) && !defined(__FP_FAST_FMA))
 typedef struct {
@@ -96,13 +101,39 @@ static double fused_float64(double x, double y, double z) {
     (void)memcpy(&result, &bits, sizeof result);
     return result;
 }
+#elif defined(QUICK_FMA) || defined(__wasm__)
+static double odd_float64(double x, double y) {
+    const double sum = x + y, part = sum - x, lost = (x - (sum - part)) + (y - part);
+    int64_t bits;
+    (void)memcpy(&bits, &sum, sizeof bits);
+    if (lost != 0 && (bits & 1) == 0) {
+        bits += ((lost > 0) == (sum > 0)) ? 1 : -1;
+    }
+    double result;
+    (void)memcpy(&result, &bits, sizeof result);
+    return result;
+}
+
+static double fused_float64(double x, double y, double z) {
+    const double p = x * y, most = 0x1p900;
+    if (!(fabs(p) > 0x1p-900 && fabs(p) < most && fabs(x) < most && fabs(y) < most && fabs(z) < most)) {
+        return (x == 0 || y == 0) ? (p + z) : fma(x, y, z);
+    }
+    const double wide_x = 0x1.0000002p27 * x, wide_y = 0x1.0000002p27 * y;
+    const double x1 = wide_x - (wide_x - x), y1 = wide_y - (wide_y - y), x2 = x - x1, y2 = y - y1;
+    const double rest = ((x1 * y1 - p) + x1 * y2 + x2 * y1) + x2 * y2;
+    const double a = z + rest, a1 = a - z, a2 = (z - (a - a1)) + (rest - a1);
+    const double b = p + a, b1 = b - p, b2 = (p - (b - b1)) + (a - b1);
+    return b + odd_float64(a2, b2);
+}
 #else
 #define fused_float64 fma
 #endif"""
 
 # The sum of an exact product and a number, as a double that is rounded to odd (S. Boldo, G. Melquiond, 2008).
 _FLOAT32 = """\
-#if defined(SOFTWARE_FMA) || (defined(_NEWLIB_VERSION) && !defined(__FP_FAST_FMAF))
+#if defined(SOFTWARE_FMA) || defined(QUICK_FMA) || defined(__wasm__) || \\
+    (defined(_NEWLIB_VERSION) && !defined(__FP_FAST_FMAF))
 static float fused_float32(float x, float y, float z) {
     const double p = (double)x * y, sum = p + z, part = sum - p;
     const double rest = (p - (sum - part)) + (z - part);

@@ -33,6 +33,7 @@ KNOWN = {
     "non_affine": {},
     "large_scale": {},
     "bluerov2_heavy": {"position_rms": (0.01473, 0.05), "attitude_rms": (0.00257, 0.05)},
+    "browser": {},
     "thruster_failure": {"position_rms": (0.0017, 0.05), "saturated_fraction": (0.0, 1e-12)},
 }
 VEHICLES = ["my_rov"]  # not scenarios
@@ -41,6 +42,7 @@ VEHICLES = ["my_rov"]  # not scenarios
 # Vehicles that take longest. By default these are built; what they compute is compared in tests/loop and tests/paper.
 LONG = {
     "bluerov2_heavy",
+    "browser",
     "large_scale",
     "observer_based",
     "own_vehicle",

@@ -25,3 +25,13 @@ PENDULUM = {
     "initial": {"position": [0.05]},
     "loop": {"duration": 1.0, "dt": 0.001, "record": 0.001},
 }
+NAVIGATED = HEAVY | {
+    "description": "a vehicle that loses thrusters",
+    "controller": "robust",
+    "navigation": {
+        "kind": "observer",
+        "sensors": ["imu", {"kind": "dvl", "delay": 0.05}, "depth", "compass", "position_fix"],
+    },
+    "disturbance": [{"kind": "current", "velocity": [0.3, 0.2, 0]}, {"kind": "waves", "height": 0.5, "period": 5}],
+    "loop": {"duration": 6.0, "dt": 0.01, "record": 0.01},
+}

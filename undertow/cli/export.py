@@ -9,6 +9,7 @@ from undertow.cli.stages import stage
 from undertow.cli.tables import wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.outside.browser.browser_page import export_page
 from undertow.outside.export.c_program import Exported
 from undertow.outside.export.controller import export_controller
 from undertow.outside.export.fmu import export_fmu
@@ -21,15 +22,16 @@ _PARTS = ("controller", "navigation", "vehicle")
 
 
 def export(command: ExportCommand) -> int:
-    """Write a part of a scenario as C99, or controller and vehicle as FMUs, to folders; return the exit code.
+    """Write a part of a scenario as C99, controller and vehicle as FMUs, or a page; return the exit code.
 
     Raises:
         BadInput: no folder is given, or something cannot be exported.
     """
     c99, fmu, part, name, output = command.c99, command.fmu, command.part, command.name, command.output
     formats = {"precision": command.precision, "attitude": command.attitude, "velocity": command.velocity}
-    if c99 is None and fmu is None:
-        raise BadInput("--c99", "be given: the folder for the files", hint="Or --fmu for units of co-simulation")
+    if c99 is None and fmu is None and command.wasm is None:
+        hint = "Or --fmu for units of co-simulation, or --wasm for a page"
+        raise BadInput("--c99", "be given: the folder for the files", hint=hint)
     checks.choice("--part", part, _PARTS)
     if c99 is None and (part != "controller" or name):
         raise BadInput("--name" if name else "--part", "stand beside --c99", "without it")
@@ -55,6 +57,11 @@ def export(command: ExportCommand) -> int:
         say(f"{' and '.join(units.exported.files)}, {_kilobytes(units.exported)}: {fmu}")
         if units.without_library:
             say(f"They hold their sources only, because {units.without_library}. Compile these where they are used.")
+    if command.wasm is not None:
+        with stage(console, "C99 and WebAssembly"):
+            page = export_page(built)
+        page.write(command.wasm, command.overwrite, "--wasm")
+        say(f"{_kilobytes(page)}: {command.wasm / 'index.html'}")
     return DONE
 
 

@@ -15,7 +15,8 @@ class ExportCommand(Command):
     """Export the controller, the navigation filter and the vehicle of a scenario, to run them outside Python.
 
     The C code needs no heap and no library but libm, and in double precision it has the bits of a simulation: `make
-    test` in the folder compares them. The FMUs hold this code, and a library for Linux where there is a C compiler.
+    test` in the folder compares them. The FMUs hold this code, and a library for Linux where there is a C compiler. The
+    page holds the whole loop, compiled by the package ziglang, and opens from disk.
     """
 
     runs: ClassVar = "undertow.cli.export:export"
@@ -35,6 +36,14 @@ class ExportCommand(Command):
             "--fmu",
             metavar="DIR",
             help="Write controller.fmu and vehicle.fmu, FMI 2.0 co-simulation, into this folder.",
+        ),
+    ] = None
+    wasm: Annotated[
+        Path | None,
+        typer.Option(
+            "--wasm",
+            metavar="DIR",
+            help="Write index.html into this folder: a page in which a visitor drives the vehicle, by WebAssembly.",
         ),
     ] = None
     name: Annotated[

@@ -20,7 +20,8 @@ function clearCanvas(canvas, width, height) {
 // Places of a label beside its point, px: the first that is free is taken, and kept while it stays free.
 const PLACES = [[6, 0], [6, -14], [6, 14], [-6, 0], [-6, -14], [-6, 14], [6, -28], [6, 28], [-6, -28], [-6, 28], [6, -42], [6, 42]];
 
-function paintNames(page, scene, runs, time) {
+// `at` gives the components of a series of the run whose details are shown.
+function paintNames(page, scene, runs, at) {
   const width = page.view.clientWidth, height = page.view.clientHeight;
   const pen = clearCanvas(page.overlay, width, height);
   const taken = []; // boxes: left, top, right, bottom
@@ -29,12 +30,12 @@ function paintNames(page, scene, runs, time) {
     return seen.z > 1 ? null : [((seen.x + 1) * width) / 2, ((1 - seen.y) * height) / 2];
   };
   const write = (key, text, point, colour) => {
-    const at = seenAt(point);
-    if (!at) return;
+    const seen = seenAt(point);
+    if (!seen) return;
     const long = pen.measureText(text).width;
     const boxAt = ([right, down]) => {
-      const left = at[0] + (right < 0 ? right - long : right);
-      return [left, at[1] + down - 7, left + long, at[1] + down + 7];
+      const left = seen[0] + (right < 0 ? right - long : right);
+      return [left, seen[1] + down - 7, left + long, seen[1] + down + 7];
     };
     const free = (place) => taken.every((one) => apart(boxAt(place), one));
     const before = page.places.get(key);
@@ -59,7 +60,7 @@ function paintNames(page, scene, runs, time) {
   if (page.labels.checked) {
     const vehicle = scene.vehicles[Number(page.which.value)], { run } = vehicle; // several vehicles often coincide
     if (vehicle.water.visible) {
-      const speed = Math.hypot(...valueAt(run, "water", time));
+      const speed = Math.hypot(...at("water"));
       const tail = within(scene.world, vehicle.water.position.clone());
       write("water", `water ${speed.toFixed(2)} m/s`, tail, COLOUR.water);
     }
@@ -109,16 +110,17 @@ function paintCompass(pen, camera, height) {
   });
 }
 
-// A panel: a heading with the scale, and rows of bars. `paint` gets the pen, the run, its width and the time.
+// A panel: a heading with the scale, and rows of bars. `paint` gets the pen, the run, its width and `at`, which
+// gives the components of a series.
 function makePanel(page, title, rows, rowHeight, paint) {
   const heading = element("h3", {}, title), canvas = element("canvas", { class: "bars" });
   page.panels.append(heading, canvas);
-  return (run, time) => {
+  return (run, at) => {
     const count = rows(run), width = canvas.clientWidth, height = Math.max(count * rowHeight, 1);
     heading.hidden = canvas.hidden = !count;
     if (!count) return;
     canvas.style.height = `${height}px`;
-    paint(clearCanvas(canvas, width, height), run, width, time);
+    paint(clearCanvas(canvas, width, height), run, width, at);
   };
 }
 
@@ -147,8 +149,8 @@ function paintRow(pen, names, width, top, height, name, number) {
   };
 }
 
-function paintThrust(pen, run, width, time) {
-  const thrust = valueAt(run, "thrust", time), names = namesWidth(pen, run, width);
+function paintThrust(pen, run, width, at) {
+  const thrust = at("thrust"), names = namesWidth(pen, run, width);
   run.thrusters.forEach((thruster, i) => {
     const share = shareOfLimit(thruster, thrust[i]);
     const bar = paintRow(pen, names, width, 18 * i, 18, thruster.name, `${withDigits(thrust[i], thruster.limits[1])} N`);
@@ -156,9 +158,9 @@ function paintThrust(pen, run, width, time) {
   });
 }
 
-function paintUncertainty(pen, run, width, time) {
-  const actual = valueAt(run, "uncertainty", time);
-  const estimate = run.series.estimate ? valueAt(run, "estimate", time) : null, names = namesWidth(pen, run, width);
+function paintUncertainty(pen, run, width, at) {
+  const actual = at("uncertainty");
+  const estimate = run.series.estimate ? at("estimate") : null, names = namesWidth(pen, run, width);
   run.axes.forEach((axis, i) => {
     const bar = paintRow(pen, names, width, 20 * i, 20, axis, withDigits(actual[i], run.scale.uncertainty[i]));
     bar(actual[i] / run.scale.uncertainty[i], 3, 6, COLOUR.uncertainty);
@@ -167,8 +169,8 @@ function paintUncertainty(pen, run, width, time) {
 }
 
 // One column per rule: up or down by its weight, the darker the more it fires.
-function paintRules(pen, run, width, time) {
-  const weights = valueAt(run, "weights", time), firing = run.series.firing ? valueAt(run, "firing", time) : null;
+function paintRules(pen, run, width, at) {
+  const weights = at("weights"), firing = run.series.firing ? at("firing") : null;
   const height = 34, names = namesWidth(pen, run, width), column = (width - names) / run.rules;
   run.axes.forEach((axis, i) => {
     const rows = Array.from({ length: run.rules }, (_, rule) => i * run.rules + rule), top = i * height;
@@ -205,14 +207,15 @@ function withDigits(value, scale) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
 }
 
-function showReadings(page, runs, time) {
-  const named = (cells) => (runs.length > 1 ? cells : cells.slice(1));
-  const row = (kind, cells) => element("tr", {}, ...named(cells).map((cell) => element(kind, {}, cell)));
-  const head = ["", "|position error|, m", "|attitude error|, deg", "energy, J"];
-  const rows = runs.map((run) => {
-    const [position, attitude] = valueAt(run, "error", time), [energy] = valueAt(run, "energy", time);
-    const ended = time > run.end ? ` (${run.status.replace(/_/g, " ")})` : "";
-    return row("td", [`${run.label}${ended}`, withDigits(position, 0.1), withDigits(attitude, 1), withDigits(energy, 100)]);
-  });
-  page.readings.replaceChildren(row("th", head), ...rows);
+function legend(runs, reference) {
+  const has = (name) => runs.some((run) => run.series[name]);
+  const limited = runs.every((run) => run.limited);
+  const entries = [
+    ["ramp", `thrust on the vehicle; colour: share of ${limited ? "its limit" : "the largest in this run"}`],
+    ["reference", reference],
+    ["uncertainty", `lumped uncertainty (translation)${has("estimate") ? "" : "; this law has no estimate"}`],
+    ...(has("estimate") ? [["estimate", "its estimate by the controller"]] : []),
+    ...(has("water") ? [["water", "velocity of the water"]] : []),
+  ];
+  return element("ul", { class: "legend" }, ...entries.map(([kind, text]) => element("li", { class: kind }, text)));
 }

@@ -2,26 +2,6 @@
 
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 20];
 
-function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
-  return made;
-}
-
-function choice(name, options, chosen) {
-  const made = element("select", { "aria-label": name });
-  for (const [value, text] of options) made.append(element("option", { value }, text));
-  made.value = chosen;
-  return made;
-}
-
-function switchOf(text) {
-  const input = element("input", { type: "checkbox" });
-  input.checked = true;
-  return { input, label: element("label", {}, input, ` ${text}`) };
-}
-
 function buildPage(box, runs) {
   const start = Math.min(...runs.map((run) => run.start)), end = Math.max(...runs.map((run) => run.end));
   const canvas = element("canvas", { class: "scene", "aria-label": "three-dimensional view of the run" });
@@ -43,25 +23,12 @@ function buildPage(box, runs) {
   const readings = element("table", { class: "readings" });
   const panels = element("div", { class: "panels" }, readings);
   const controls = element("div", { class: "controls" }, play, slider, time);
-  box.replaceChildren(element("div", { class: "left" }, view, controls, options, legend(runs)), panels);
+  box.replaceChildren(element("div", { class: "left" }, view, controls, options, legend(runs, "reference: dashed path and transparent hull")), panels);
   box.tabIndex = 0;
   return {
     box, view, canvas, overlay, play, slider, time, speed, camera, which, readings, panels, start, end,
     labels: labels.input, forces: forces.input, places: new Map(),
   };
-}
-
-function legend(runs) {
-  const has = (name) => runs.some((run) => run.series[name]);
-  const limited = runs.every((run) => run.limited);
-  const entries = [
-    ["ramp", `thrust on the vehicle; colour: share of ${limited ? "its limit" : "the largest in this run"}`],
-    ["reference", "reference: dashed path and transparent hull"],
-    ["uncertainty", `lumped uncertainty (translation)${has("estimate") ? "" : "; this law has no estimate"}`],
-    ...(has("estimate") ? [["estimate", "its estimate by the controller"]] : []),
-    ...(has("water") ? [["water", "velocity of the water"]] : []),
-  ];
-  return element("ul", { class: "legend" }, ...entries.map(([kind, text]) => element("li", { class: kind }, text)));
 }
 
 // The first time at which the thrusters push half as hard as they ever do, s: at the start they often do not push at all.
@@ -72,13 +39,31 @@ function openingTime(run) {
   return run.start + (sizes.findIndex((size) => 2 * size >= most) / (frames - 1)) * (run.end - run.start);
 }
 
+function showReadings(page, runs, time) {
+  const named = (cells) => (runs.length > 1 ? cells : cells.slice(1));
+  const row = (kind, cells) => element("tr", {}, ...named(cells).map((cell) => element(kind, {}, cell)));
+  const head = ["", "|position error|, m", "|attitude error|, deg", "energy, J"];
+  const rows = runs.map((run) => {
+    const [position, attitude] = valueAt(run, "error", time), [energy] = valueAt(run, "energy", time);
+    const ended = time > run.end ? ` (${run.status.replace(/_/g, " ")})` : "";
+    return row("td", [`${run.label}${ended}`, withDigits(position, 0.1), withDigits(attitude, 1), withDigits(energy, 100)]);
+  });
+  page.readings.replaceChildren(row("th", head), ...rows);
+}
+
+// Show the path up to a time, s.
+function showPath({ run, path }, time) {
+  const share = (time - run.start) / Math.max(run.end - run.start, 1e-9);
+  path.geometry.instanceCount = Math.max(1, Math.ceil(Math.min(share, 1) * (run.series.position.frames - 1)));
+}
+
 function startReplay(box) {
   const source = JSON.parse(document.getElementById(box.dataset.source).textContent);
   const runs = source.runs.map(unpackRun).map((run) => ({ ...run, peak: peaksOf(run) }));
   const page = buildPage(box, runs);
   let scene;
   try {
-    scene = buildScene(page, runs);
+    scene = buildScene(page, runs, extentOf(runs));
   } catch (error) {
     page.view.textContent = "This browser offers no WebGL, so the replay cannot be shown. The figures show the same run.";
     return;
@@ -94,15 +79,19 @@ function startReplay(box) {
   let time = openingTime(runs[0]), untouched = true, playing = false, last = 0, asked = false;
 
   const detailed = () => runs[Number(page.which.value)];
-  const place = () => valueAt(detailed(), "position", time);
+  const at = (run) => (name) => valueAt(run, name, time);
+  const place = () => at(detailed())("position");
 
   function show() {
     asked = false;
     if (scene.followed) followVehicle(scene, place());
-    scene.vehicles.forEach((vehicle) => moveVehicle(vehicle, time, page.forces.checked));
+    scene.vehicles.forEach((vehicle) => {
+      moveVehicle(vehicle, at(vehicle.run), page.forces.checked);
+      showPath(vehicle, time);
+    });
     scene.renderer.render(scene.scene, scene.camera);
-    paintNames(page, scene, runs, time);
-    panels.forEach((panel) => panel(detailed(), time));
+    paintNames(page, scene, runs, at(detailed()));
+    panels.forEach((panel) => panel(detailed(), at(detailed())));
     showReadings(page, runs, time);
     page.slider.value = time;
     page.time.textContent = `${time.toFixed(2)} s of ${Number(page.end.toPrecision(6))} s`;

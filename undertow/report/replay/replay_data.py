@@ -143,18 +143,13 @@ def _replay_of(
     series |= {
         name: _finite_values(values.reshape(len(frames), -1)) for name, values in optional.items() if values is not None
     }
-    limits, limited = _limits(plant, thrust)
-    vehicle = plant.vehicle
-    positions = np.asarray(vehicle.thruster_positions)
     return ReplayData(
         label=label,
         status=str(run.attrs.get("status", "")),
         time=records["time"].values,
         size=size,
-        thrusters=Thrusters(vehicle.thruster_names(), positions, np.asarray(vehicle.thruster_directions), limits),
-        limited=limited,
-        body_axes=bool(loop.controller.model.coordinates.axes),
         series=series,
+        **_kept_of(loop, plant, thrust),
     )
 
 
@@ -229,8 +224,38 @@ def hull_size(vehicle: VehicleModel, dimensions: Sequence[float] | None) -> np.n
 
 def page_data(replays: Sequence[ReplayData]) -> str:
     """All that the script of the page needs, as JSON that may stand inside a script element."""
-    runs = [_described(replay, COLOURS[number % len(COLOURS)]) for number, replay in enumerate(replays)]
-    return json.dumps({"runs": runs}, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return page_json({"runs": [_described(replay, COLOURS[i % len(COLOURS)]) for i, replay in enumerate(replays)]})
+
+
+def page_json(data: Any) -> str:
+    """Plain data as JSON that may stand inside a script element."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def vehicle_alone(loop: ClosedLoop, hull: Sequence[float] | None) -> dict[str, Any]:
+    """What a script needs that shows a vehicle without a run: as a run of `page_data`, with no series."""
+    plant: Any = loop.plant
+    replay = ReplayData(
+        label="",
+        status="",
+        time=np.zeros(1),
+        size=hull_size(plant.vehicle, hull),
+        series={},
+        **_kept_of(loop, plant, np.zeros(plant.inputs())),
+    )
+    return _described(replay, COLOURS[0])
+
+
+def _kept_of(loop: ClosedLoop, plant: HybridVehicle, thrust: np.ndarray) -> dict[str, Any]:
+    """Fields of a replay that are of the vehicle and its controller."""
+    limits, limited = _limits(plant, thrust)
+    vehicle = plant.vehicle
+    positions, directions = np.asarray(vehicle.thruster_positions), np.asarray(vehicle.thruster_directions)
+    return {
+        "thrusters": Thrusters(vehicle.thruster_names(), positions, directions, limits),
+        "limited": limited,
+        "body_axes": bool(loop.controller.model.coordinates.axes),
+    }
 
 
 def _described(replay: ReplayData, colour: str) -> dict[str, Any]:

@@ -9,9 +9,11 @@ from undertow.report.page import Html, section, tag
 from undertow.report.replay.replay_data import ReplayData, page_data
 
 _THREE_JS = ("jupyter_threejs_sage", "static/r130/three.min.js")
-_SCRIPTS = ("unpack.js", "scene.js", "panels.js", "replay.js")  # one after the other they are one script
-_MISSING = (
-    "There is no replay: the package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
+# One after the other they are one script; the first are those of any page with vehicles in three dimensions.
+_SCENE = ("elements.js", "scene.js", "panels.js")
+_SCRIPTS = ("unpack.js", "replay.js")
+MISSING_THREE_JS = (
+    "The package jupyter_threejs_sage, which holds three.js, is not installed. Run: pip install "
     "jupyter-threejs-sage==130"
 )
 _KEYS = (
@@ -29,8 +31,8 @@ def replay_section(replays: Sequence[ReplayData], caption: str = "") -> Html:
     """
     three = three_js()
     if three is None:
-        return section("replay", "Replay", tag("p", _MISSING))
-    script = "\n".join(_text(name) for name in _SCRIPTS)
+        return section("replay", "Replay", tag("p", f"There is no replay: {MISSING_THREE_JS}"))
+    script = "\n".join([scene_script(), *(_text(name) for name in _SCRIPTS)])
     return section(
         "replay",
         "Replay",
@@ -51,6 +53,11 @@ def not_made(error: Exception, of: str = "") -> str:
 def replay_looks() -> str:
     """Style sheet of the replay."""
     return _text("replay.css")
+
+
+def scene_script() -> str:
+    """Script of the scene and of the panels beside it, for a page that shows vehicles at an instant."""
+    return "\n".join(_text(name) for name in _SCENE)
 
 
 def three_js() -> str | None:

@@ -3,6 +3,15 @@
 const COLOUR = { water: "#1695a3", uncertainty: "#222222", estimate: "#d1495b", faint: "#d9d9d9", ink: "#222222" };
 const UP = new THREE.Vector3(0, 1, 0);
 
+function vector(numbers) {
+  return new THREE.Vector3(numbers[0], numbers[1], numbers[2]);
+}
+
+// three.js has the scalar part of a quaternion last.
+function quaternion(numbers) {
+  return new THREE.Quaternion(numbers[1], numbers[2], numbers[3], numbers[0]).normalize();
+}
+
 // World axes (north, east, down) in those of the screen: x east, y up, z south. Nothing else changes axes: vehicles,
 // paths and arrows are in world axes, inside a group that this matrix turns.
 function worldToScreen() {
@@ -109,7 +118,8 @@ function makeGrid(extent) {
   return { grid, step };
 }
 
-function buildScene(page, runs) {
+// The scene of some runs inside a box, in the axes of the screen, with vehicles as long as `longest`.
+function buildScene(page, runs, { box, longest }) {
   const renderer = new THREE.WebGLRenderer({ canvas: page.canvas, antialias: true });
   renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
   const scene = new THREE.Scene();
@@ -118,7 +128,7 @@ function buildScene(page, runs) {
   const sun = new THREE.DirectionalLight("#ffffff", 0.5);
   sun.position.set(1, 3, 2);
   scene.add(sun);
-  const { box, longest } = extentOf(runs), { grid, step } = makeGrid(box);
+  const { grid, step } = makeGrid(box);
   const world = new THREE.Group();
   world.setRotationFromMatrix(worldToScreen());
   scene.add(grid, world);
@@ -129,7 +139,7 @@ function buildScene(page, runs) {
   controls.enableZoom = false; // a wheel over the view scrolls the page, until the view is clicked
   page.canvas.addEventListener("pointerdown", () => { controls.enableZoom = true; });
   page.view.addEventListener("pointerleave", (event) => { if (event.pointerType === "mouse") controls.enableZoom = false; });
-  return { renderer, scene, world, vehicles, camera, controls, box, longest, step };
+  return { renderer, scene, world, vehicles, camera, controls, grid, box, longest, step };
 }
 
 function screenPoint(worldPoint) {
@@ -182,8 +192,9 @@ function shareOfLimit(thruster, thrust) {
   return Math.abs(thrust) / Math.max(Math.abs(thruster.limits[thrust < 0 ? 0 : 1]), 1e-9);
 }
 
-function moveVehicle(vehicle, time, showForces) {
-  const { run } = vehicle, at = (name) => valueAt(run, name, time), thin = 0.03 * run.longest;
+// Move a vehicle and its arrows to an instant; `at` gives the components of a series there.
+function moveVehicle(vehicle, at, showForces) {
+  const { run } = vehicle, thin = 0.03 * run.longest;
   const position = vector(at("position")), attitude = quaternion(at("attitude"));
   vehicle.body.position.copy(position);
   vehicle.body.quaternion.copy(attitude);
@@ -205,6 +216,4 @@ function moveVehicle(vehicle, time, showForces) {
   const water = run.series.water ? vector(at("water")) : new THREE.Vector3();
   const above = position.clone().add(new THREE.Vector3(0, 0, -0.9 * run.longest));
   setArrow(vehicle.water, above, water, (water.length() / Math.max(run.scale.water, 1e-9)) * run.longest, 1.3 * thin);
-  const share = (time - run.start) / Math.max(run.end - run.start, 1e-9);
-  vehicle.path.geometry.instanceCount = Math.max(1, Math.ceil(Math.min(share, 1) * (run.series.position.frames - 1)));
 }

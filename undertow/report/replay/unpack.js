@@ -1,7 +1,7 @@
 // What `replay_data.py` has packed, unpacked: runs with series whose values can be asked for at any time.
 
 function unpackSeries(packed) {
-  const bytes = Uint8Array.from(atob(packed.data), (letter) => letter.charCodeAt(0));
+  const bytes = bytesOf(packed.data);
   const whole = packed.bytes === 1 ? bytes : new Uint16Array(bytes.buffer);
   const width = packed.low.length, levels = 256 ** packed.bytes - 1;
   const values = new Float32Array(whole.length);
@@ -44,13 +44,4 @@ function usualSize(run, name, first, last) {
 function scalesOf(run) {
   const linear = usualSize(run, "uncertainty", 0, 3), angular = usualSize(run, "uncertainty", 3, 6);
   return [linear, linear, linear, angular, angular, angular].map((scale) => Math.max(scale, 1e-6));
-}
-
-function vector(numbers) {
-  return new THREE.Vector3(numbers[0], numbers[1], numbers[2]);
-}
-
-// three.js has the scalar part of a quaternion last.
-function quaternion(numbers) {
-  return new THREE.Quaternion(numbers[1], numbers[2], numbers[3], numbers[0]).normalize();
 }
