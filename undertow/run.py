@@ -122,7 +122,10 @@ class Run:
 
     @property
     def success(self) -> Success | None:
-        """Whether control succeeded, by the scenario's criterion or the default one; None without one."""
+        """Whether control succeeded, by the scenario's criterion or the default one; None without one.
+
+        It is true where the run kept to its criterion, false where it did not.
+        """
         return self.result.success
 
     @property
