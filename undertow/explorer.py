@@ -15,6 +15,8 @@ from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.report.run_page import page_contents, shown_of
 from undertow.run import Run, simulate_scenario
 from undertow.scenario.reading import key_path
+from undertow.scenario.results.run_result import ScenarioResult
+from undertow.studies.tuning.problem import gain_in_force
 
 try:
     import ipywidgets as widgets
@@ -41,7 +43,7 @@ class Explorer:
     def __init__(self, run: Run, ranges: Mapping[str, Range]):
         assert widgets is not None
         self.run, self.values = run, {}
-        self._controls = {key: _control(key, choices, _stated(run, key)) for key, choices in ranges.items()}
+        self._controls = {key: _control(key, choices, _in_force(run, key)) for key, choices in ranges.items()}
         self._picture, self._replay = widgets.HTML(), widgets.HTML()
         show_replay = widgets.Button(description="Replay in 3D", tooltip="of the run that is shown")
         show_replay.on_click(lambda button: self._show_replay())
@@ -99,6 +101,9 @@ def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str,
             choices; or True or False for a switch. None for the numbers that the scenario states of its controller, its
             disturbances and its faults, from 0 to twice the value.
 
+    A slider starts at the value in force, also where that is a default or a gain by rule; one that differs by axis is shown
+    as the geometric mean.
+
     Raises:
         BadInput: the scenario or a key path is wrong, or ipywidgets is not installed.
     """
@@ -109,25 +114,28 @@ def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str,
     return Explorer(run, _ranges_of(run) if ranges is None else ranges)
 
 
-def _control(key: str, choices: Range, stated: Any) -> Any:
-    """A slider, a list of choices or a switch."""
+def _control(key: str, choices: Range, in_force: Any) -> Any:
+    """A slider, a list of choices or a switch, at the value in force.
+
+    Where that is unknown, a slider starts in its middle; of a list that does not have it, nothing is chosen.
+    """
     assert widgets is not None
     look = {"description": key, "style": {"description_width": "16em"}, "layout": widgets.Layout(width="48em")}
     if isinstance(choices, bool):
-        return widgets.Checkbox(value=choices if stated is None else bool(stated), **look)
+        return widgets.Checkbox(value=choices if in_force is None else bool(in_force), **look)
     if _is_range(choices):
         low, high = choices
         if not low < high:
             raise BadInput(key, "have a range from low to high", choices)
-        start = min(max(stated, low), high) if _is_number(stated) else (low + high) / 2
-        if isinstance(low, int) and isinstance(high, int) and isinstance(stated, int | None):
+        start = min(max(in_force, low), high) if _is_number(in_force) else (low + high) / 2
+        if isinstance(low, int) and isinstance(high, int) and (in_force is None or float(start).is_integer()):
             return widgets.IntSlider(value=round(start), min=low, max=high, **look)
         return widgets.FloatSlider(
             value=start, min=low, max=high, step=(high - low) / _STEPS, readout_format=".3g", **look
         )
     if not isinstance(choices, list) or not choices:
         raise BadInput(key, "have (lowest, highest), a list of choices, or a switch", choices)
-    return widgets.Dropdown(options=choices, value=stated if stated in choices else choices[0], **look)
+    return widgets.Dropdown(options=choices, value=in_force if in_force in choices else None, **look)
 
 
 def _is_number(value: Any) -> bool:
@@ -138,10 +146,24 @@ def _is_range(choices: Range) -> bool:
     return isinstance(choices, tuple) and len(choices) == 2 and all(map(_is_number, choices))
 
 
-def _stated(run: Run, key: str) -> Any:
-    """What the scenario states at a key path; None where it leaves it to a default."""
-    node: Any = run.scenario
-    for step in key_path(key):
+def _in_force(run: Run, key: str) -> Any:
+    """The value of a run at a key path: what the scenario states, else its default; None where neither is known.
+
+    A part is its name, and a gain that a rule sets is that of the law.
+    """
+    assert isinstance(run.result, ScenarioResult)
+    built, path = run.result.built, key_path(key)
+    value = _at(run.scenario, path)
+    if value is None:
+        value = _at(built.resolved, path)
+    if value is None and path[:1] == ("controller",) and len(path) == 2:
+        value = gain_in_force(built, str(path[1]))
+    return value.get("kind") if isinstance(value, dict) else value
+
+
+def _at(node: Any, path: Sequence[str | int]) -> Any:
+    """What stands at a key path; None where there is nothing."""
+    for step in path:
         if isinstance(node, dict):
             node = node.get(step)
         elif isinstance(node, list) and isinstance(step, int) and step < len(node):

@@ -60,6 +60,34 @@ def test_without_ranges_the_numbers_of_the_file_have_sliders():
     }
 
 
+def test_a_slider_starts_at_the_value_in_force():
+    """Defaults of the scenario and of its parts, and a gain by rule; what is stated as a name counts as that."""
+    ranges = {
+        "seed": (0, 9),
+        "controller.frequency": (0.1, 30.0),
+        "controller.damping": (0.0, 4.0),
+        "disturbance[0].frequency": (0.0, 8.0),
+        "loop.duration": (2, 10),
+        "loop.backend": ["xla", "simd"],
+        "controller": ["adrc", "pid"],
+        "reference.kind": ["line"],
+    }
+    disturbance = [{"kind": "sinusoid", "amplitude": 1.0}]
+    explorer = ut.explore({**SCENARIO, "controller": {"kind": "pid"}, "disturbance": disturbance}, ranges)
+    values = {name: control.value for name, control in controls(explorer).items() if name in ranges}
+    proportional = explorer.run.loop.controller.proportional  # the square of the frequency
+    assert values.pop("controller.frequency") == pytest.approx(np.sqrt(float(proportional)), rel=1e-12)
+    assert values == {
+        "seed": 0,
+        "controller.damping": 1.0,
+        "disturbance[0].frequency": 1.0,
+        "loop.duration": 4,
+        "loop.backend": "simd",
+        "controller": "pid",
+        "reference.kind": None,
+    }
+
+
 @pytest.mark.parametrize(
     "ranges, remedy",
     [
