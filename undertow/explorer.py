@@ -1,6 +1,7 @@
 """A scenario with sliders in a notebook: a compiled loop that is run again whenever one moves."""
 
 import html
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,9 @@ from undertow.studies.tuning.problem import gain_in_force
 
 try:
     import ipywidgets as widgets
+    from IPython.core.getipython import get_ipython
 except ImportError:
-    widgets = None
+    widgets = get_ipython = None
 
 Range = tuple[float, float] | Sequence[Any] | bool
 
@@ -101,16 +103,23 @@ def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str,
             choices; or True or False for a switch. None for the numbers that the scenario states of its controller, its
             disturbances and its faults, from 0 to twice the value.
 
-    A slider starts at the value in force, also where that is a default or a gain by rule; one that differs by axis is shown
-    as the geometric mean.
+    A slider starts at the value in force, also where that is a default or a gain by rule; of one that differs by axis,
+    at the geometric mean.
 
     Raises:
-        BadInput: the scenario or a key path is wrong, or ipywidgets is not installed.
+        BadInput: the scenario or a key path is wrong, the run is not one of a scenario, or ipywidgets is not installed.
     """
-    if widgets is None:
+    if widgets is None or get_ipython is None:
         remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[notebook]'"
         raise BadInput("", "", f"ipywidgets is not installed. {remedy}")
     run = scenario if isinstance(scenario, Run) else simulate_scenario(scenario)
+    if not isinstance(run.result, ScenarioResult):
+        hint = "Write it as a scenario, a file or a mapping, and give that to `ut.explore`"
+        raise BadInput("scenario", "be a scenario or a run of one", "a run of a closed loop made of objects", hint=hint)
+    if get_ipython() is None:
+        what = "`ut.explore` shows its sliders in a Jupyter notebook, which this is not"
+        instead = "Elsewhere, `run.again(controller__bandwidth=2.0)` runs the scenario of a run with other values"
+        warnings.warn(f"{what}. {instead}", stacklevel=2)
     return Explorer(run, _ranges_of(run) if ranges is None else ranges)
 
 

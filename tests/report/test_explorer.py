@@ -9,7 +9,7 @@ import undertow as ut
 from undertow.report.live_picture import live_picture
 from undertow.report.run_page import shown_of
 
-pytestmark = pytest.mark.full
+pytestmark = [pytest.mark.full, pytest.mark.filterwarnings("ignore:`ut.explore` shows its sliders:UserWarning")]
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20},
@@ -105,6 +105,13 @@ def test_a_run_of_objects_has_no_file_to_change():
     assert run.scenario == {}
     with pytest.raises(ut.BadInput, match="be of a run of a scenario"):
         run.again(seed=1)
+    with pytest.raises(ut.BadInput, match="Write it as a scenario, a file or a mapping, and give that"):
+        ut.explore(run, {"seed": (0, 9)})
+
+
+def test_outside_of_a_notebook_it_says_so():
+    with pytest.warns(UserWarning, match=r"which this is not\. Elsewhere, `run.again"):
+        ut.explore(SCENARIO, {"seed": (0, 9)})
 
 
 def test_the_picture_has_the_numbers_of_the_run():
