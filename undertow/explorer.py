@@ -50,6 +50,7 @@ class Explorer:
         show_replay = widgets.Button(description="Replay in 3D", tooltip="of the run that is shown")
         show_replay.on_click(lambda button: self._show_replay())
         for key, control in self._controls.items():
+            self.run.built_with({key: control.value if control.value is not None else control.options[0]})
             control.observe(lambda change, key=key: self._run_with(key, change["new"]), names="value")
         self.view = widgets.VBox([*self._controls.values(), self._picture, show_replay, self._replay])
         self._show()
@@ -84,6 +85,9 @@ class Explorer:
         page = document(self.run.result.facts.title, replay_section([contents.replay]), looks=replay_looks())
         frame = "width:100%;height:640px;border:0"
         self._replay.value = f"<iframe style='{frame}' srcdoc='{html.escape(page, quote=True)}'></iframe>"
+
+    def __repr__(self) -> str:
+        return f"Sliders of {', '.join(self._controls) or 'nothing'}, in a Jupyter notebook.\n{self.run}"
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         return self.view._repr_mimebundle_(**options)

@@ -70,7 +70,7 @@ def test_a_slider_starts_at_the_value_in_force():
         "loop.duration": (2, 10),
         "loop.backend": ["xla", "simd"],
         "controller": ["adrc", "pid"],
-        "reference.kind": ["line"],
+        "controller.delay": [0.01, 0.02],
     }
     disturbance = [{"kind": "sinusoid", "amplitude": 1.0}]
     explorer = ut.explore({**SCENARIO, "controller": {"kind": "pid"}, "disturbance": disturbance}, ranges)
@@ -84,7 +84,7 @@ def test_a_slider_starts_at_the_value_in_force():
         "loop.duration": 4,
         "loop.backend": "simd",
         "controller": "pid",
-        "reference.kind": None,
+        "controller.delay": None,
     }
 
 
@@ -92,6 +92,7 @@ def test_a_slider_starts_at_the_value_in_force():
     "ranges, remedy",
     [
         ({"controller.frequency": (4.0, 1.0)}, "have a range from low to high"),
+        ({"controller.frequncy": (1.0, 3.0)}, "Did you mean `frequency`"),
         ({"controller.frequency": 3}, r"have \(lowest, highest\), a list of choices, or a switch"),
     ],
 )
@@ -111,7 +112,8 @@ def test_a_run_of_objects_has_no_file_to_change():
 
 def test_outside_of_a_notebook_it_says_so():
     with pytest.warns(UserWarning, match=r"which this is not\. Elsewhere, `run.again"):
-        ut.explore(SCENARIO, {"seed": (0, 9)})
+        explorer = ut.explore(SCENARIO, {"seed": (0, 9)})
+    assert repr(explorer).startswith("Sliders of seed, in a Jupyter notebook.\nRun: completed")
 
 
 def test_the_picture_has_the_numbers_of_the_run():
