@@ -33,6 +33,7 @@ from undertow.logs.run_log import log_of_run
 from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.report import figures
 from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.run_page import page_contents, run_in_notebook, shown_of, write_run_page
@@ -243,6 +244,9 @@ def simulate(
     Raises:
         BadInput: something given cannot be used, or does not fit the rest.
     """
+    if isinstance(plant, VehicleModel):
+        hint = "Give it thrusters: `ut.HybridVehicle(vehicle, ut.thrusters.t200())`"
+        raise BadInput("plant", "be an AbstractPlant", "a VehicleModel", hint=hint)
     if isinstance(disturbance, list | tuple):
         disturbance = SumOfDisturbances(tuple(disturbance))
     acting: Any = none() if disturbance is None else disturbance

@@ -81,6 +81,12 @@ class HybridVehicle(AbstractPlant):
         ledger: bool | None = None,
         inflow_loss: Number | None = None,
     ):
+        for name, part, contract, example in (
+            ("vehicle", vehicle, VehicleModel, "ut.vehicles.bluerov2_heavy()"),
+            ("thruster", thruster, AbstractThruster, "ut.thrusters.t200()"),
+        ):
+            if not isinstance(part, contract):
+                raise BadInput(name, f"be a part, such as `{example}`", f"a {type(part).__name__}")
         kept = has_motor(thruster) if ledger is None else ledger
         self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, kept)
         self.power.check(thruster)
