@@ -99,6 +99,10 @@ class HybridVehicle(AbstractPlant):
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
         self.input_unit = thruster.input_unit
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the vehicle."""
+        return self.vehicle._repr_html_()
+
     def initial_state(self, position=None, velocity=None) -> VehicleState:
         outputs = given_or_zero(position, 6)
         attitude = quaternion_from_euler(outputs[3:])
