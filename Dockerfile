@@ -1,4 +1,4 @@
-# docker build -t undertow . && docker run --rm --user "$(id -u):$(id -g)" -v "$PWD":/work undertow simulate examples/own_vehicle.yaml
+# docker build -t undertow . && docker run --rm --user "$(id -u):$(id -g)" -v "$PWD":/work undertow simulate examples/thruster_failure.yaml
 #
 # The tag of the base image moves. To build the same image again, give its digest, which `docker pull python:3.12-slim` prints;
 # to refresh it, pull again: docker build --build-arg BASE=python:3.12-slim@sha256:... -t undertow .

@@ -1,6 +1,7 @@
 """A scenario with sliders in a notebook: a compiled loop that is run again whenever one moves."""
 
 import html
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,14 @@ from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.report.run_page import page_contents, shown_of
 from undertow.run import Run, simulate_scenario
 from undertow.scenario.reading import key_path
+from undertow.scenario.results.run_result import ScenarioResult
+from undertow.studies.tuning.problem import gain_in_force
 
 try:
     import ipywidgets as widgets
+    from IPython.core.getipython import get_ipython
 except ImportError:
-    widgets = None
+    widgets = get_ipython = None
 
 Range = tuple[float, float] | Sequence[Any] | bool
 
@@ -41,11 +45,12 @@ class Explorer:
     def __init__(self, run: Run, ranges: Mapping[str, Range]):
         assert widgets is not None
         self.run, self.values = run, {}
-        self._controls = {key: _control(key, choices, _stated(run, key)) for key, choices in ranges.items()}
+        self._controls = {key: _control(key, choices, _in_force(run, key)) for key, choices in ranges.items()}
         self._picture, self._replay = widgets.HTML(), widgets.HTML()
         show_replay = widgets.Button(description="Replay in 3D", tooltip="of the run that is shown")
         show_replay.on_click(lambda button: self._show_replay())
         for key, control in self._controls.items():
+            self.run.built_with({key: control.value if control.value is not None else control.options[0]})
             control.observe(lambda change, key=key: self._run_with(key, change["new"]), names="value")
         self.view = widgets.VBox([*self._controls.values(), self._picture, show_replay, self._replay])
         self._show()
@@ -81,6 +86,9 @@ class Explorer:
         frame = "width:100%;height:640px;border:0"
         self._replay.value = f"<iframe style='{frame}' srcdoc='{html.escape(page, quote=True)}'></iframe>"
 
+    def __repr__(self) -> str:
+        return f"Sliders of {', '.join(self._controls) or 'nothing'}, in a Jupyter notebook.\n{self.run}"
+
     def _repr_mimebundle_(self, **options: Any) -> Any:
         return self.view._repr_mimebundle_(**options)
 
@@ -99,35 +107,48 @@ def explore(scenario: str | Path | Mapping[str, Any] | Run, ranges: Mapping[str,
             choices; or True or False for a switch. None for the numbers that the scenario states of its controller, its
             disturbances and its faults, from 0 to twice the value.
 
+    A slider starts at the value in force, also where that is a default or a gain by rule; of one that differs by axis,
+    at the geometric mean.
+
     Raises:
-        BadInput: the scenario or a key path is wrong, or ipywidgets is not installed.
+        BadInput: the scenario or a key path is wrong, the run is not one of a scenario, or ipywidgets is not installed.
     """
-    if widgets is None:
+    if widgets is None or get_ipython is None:
         remedy = "In the folder of undertow, run: pip install -c constraints.txt '.[notebook]'"
         raise BadInput("", "", f"ipywidgets is not installed. {remedy}")
     run = scenario if isinstance(scenario, Run) else simulate_scenario(scenario)
+    if not isinstance(run.result, ScenarioResult):
+        hint = "Write it as a scenario, a file or a mapping, and give that to `ut.explore`"
+        raise BadInput("scenario", "be a scenario or a run of one", "a run of a closed loop made of objects", hint=hint)
+    if get_ipython() is None:
+        what = "`ut.explore` shows its sliders in a Jupyter notebook, which this is not"
+        instead = "Elsewhere, `run.again(controller__bandwidth=2.0)` runs the scenario of a run with other values"
+        warnings.warn(f"{what}. {instead}", stacklevel=2)
     return Explorer(run, _ranges_of(run) if ranges is None else ranges)
 
 
-def _control(key: str, choices: Range, stated: Any) -> Any:
-    """A slider, a list of choices or a switch."""
+def _control(key: str, choices: Range, in_force: Any) -> Any:
+    """A slider, a list of choices or a switch, at the value in force.
+
+    Where that is unknown, a slider starts in its middle; of a list that does not have it, nothing is chosen.
+    """
     assert widgets is not None
     look = {"description": key, "style": {"description_width": "16em"}, "layout": widgets.Layout(width="48em")}
     if isinstance(choices, bool):
-        return widgets.Checkbox(value=choices if stated is None else bool(stated), **look)
+        return widgets.Checkbox(value=choices if in_force is None else bool(in_force), **look)
     if _is_range(choices):
         low, high = choices
         if not low < high:
             raise BadInput(key, "have a range from low to high", choices)
-        start = min(max(stated, low), high) if _is_number(stated) else (low + high) / 2
-        if isinstance(low, int) and isinstance(high, int) and isinstance(stated, int | None):
+        start = min(max(in_force, low), high) if _is_number(in_force) else (low + high) / 2
+        if isinstance(low, int) and isinstance(high, int) and (in_force is None or float(start).is_integer()):
             return widgets.IntSlider(value=round(start), min=low, max=high, **look)
         return widgets.FloatSlider(
             value=start, min=low, max=high, step=(high - low) / _STEPS, readout_format=".3g", **look
         )
     if not isinstance(choices, list) or not choices:
         raise BadInput(key, "have (lowest, highest), a list of choices, or a switch", choices)
-    return widgets.Dropdown(options=choices, value=stated if stated in choices else choices[0], **look)
+    return widgets.Dropdown(options=choices, value=in_force if in_force in choices else None, **look)
 
 
 def _is_number(value: Any) -> bool:
@@ -138,10 +159,24 @@ def _is_range(choices: Range) -> bool:
     return isinstance(choices, tuple) and len(choices) == 2 and all(map(_is_number, choices))
 
 
-def _stated(run: Run, key: str) -> Any:
-    """What the scenario states at a key path; None where it leaves it to a default."""
-    node: Any = run.scenario
-    for step in key_path(key):
+def _in_force(run: Run, key: str) -> Any:
+    """The value of a run at a key path: what the scenario states, else its default; None where neither is known.
+
+    A part is its name, and a gain that a rule sets is that of the law.
+    """
+    assert isinstance(run.result, ScenarioResult)
+    built, path = run.result.built, key_path(key)
+    value = _at(run.scenario, path)
+    if value is None:
+        value = _at(built.resolved, path)
+    if value is None and path[:1] == ("controller",) and len(path) == 2:
+        value = gain_in_force(built, str(path[1]))
+    return value.get("kind") if isinstance(value, dict) else value
+
+
+def _at(node: Any, path: Sequence[str | int]) -> Any:
+    """What stands at a key path; None where there is nothing."""
+    for step in path:
         if isinstance(node, dict):
             node = node.get(step)
         elif isinstance(node, list) and isinstance(step, int) and step < len(node):

@@ -33,11 +33,12 @@ from undertow.logs.run_log import log_of_run
 from undertow.physics.disturbances.loads import SumOfDisturbances
 from undertow.physics.disturbances.none import none
 from undertow.physics.faults.mode import AbstractFault, name_of
+from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.report import figures
 from undertow.report.answers.run_answer import answer_of_run
 from undertow.report.run_page import page_contents, run_in_notebook, shown_of, write_run_page
 from undertow.scenario import factory
-from undertow.scenario.build import build, velocity_noise_of
+from undertow.scenario.build import Built, build, velocity_noise_of
 from undertow.scenario.changed_values import put_value
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.fault_injection import with_faults
@@ -82,14 +83,24 @@ class Run:
         Raises:
             BadInput: the run is not one of a scenario, or a key path or a value is wrong.
         """
+        return Run(run_scenario(self.built_with(values)), self._part_cache)
+
+    def built_with(self, values: Mapping[str, Any]) -> Built:
+        """Its scenario with other values, as `again` runs it, built and not run.
+
+        Args:
+            values: as those of `again`.
+
+        Raises:
+            BadInput: the run is not one of a scenario, or a key path or a value is wrong.
+        """
         if not isinstance(self.result, ScenarioResult):
             hint = "Write it as a scenario, and run that by `ut.simulate_scenario`"
             raise BadInput("again", "be of a run of a scenario", "of one of a closed loop made of objects", hint=hint)
         text, data = self.result.built.text, self.scenario
         for name, value in values.items():
             put_value(data, name.replace("__", "."), value)
-        changed = text._replace(data=from_data(data).data)
-        return Run(run_scenario(build(changed, self._part_cache)), self._part_cache)
+        return build(text._replace(data=from_data(data).data), self._part_cache)
 
     @property
     def scenario(self) -> dict[str, Any]:
@@ -122,7 +133,10 @@ class Run:
 
     @property
     def success(self) -> Success | None:
-        """Whether control succeeded, by the scenario's criterion or the default one; None without one."""
+        """Whether control succeeded, by the scenario's criterion or the default one; None without one.
+
+        It is true where the run kept to its criterion, false where it did not.
+        """
         return self.result.success
 
     @property
@@ -230,6 +244,9 @@ def simulate(
     Raises:
         BadInput: something given cannot be used, or does not fit the rest.
     """
+    if isinstance(plant, VehicleModel):
+        hint = "Give it thrusters: `ut.HybridVehicle(vehicle, ut.thrusters.t200())`"
+        raise BadInput("plant", "be an AbstractPlant", "a VehicleModel", hint=hint)
     if isinstance(disturbance, list | tuple):
         disturbance = SumOfDisturbances(tuple(disturbance))
     acting: Any = none() if disturbance is None else disturbance

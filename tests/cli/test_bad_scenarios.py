@@ -306,7 +306,9 @@ def test_file_that_is_not_text(refused, tmp_path):
 
 
 def test_file_that_is_missing(refused):
-    assert refused("simulate", "none.yaml") == "`none.yaml` must be an existing file, but is not"
+    assert refused("simulate", "none.yaml") == (
+        "`none.yaml` must be an existing file, but is not. `undertow init` writes a scenario to start from"
+    )
 
 
 @pytest.mark.parametrize(

@@ -30,18 +30,28 @@ def mine():
 def test_sound_vehicle_file(undertow):
     said = undertow("check", str(EXAMPLES / "my_rov.yaml"))
     assert said.code == 0 and said.err == ""
-    assert said.out.splitlines()[-1].endswith("my_rov.yaml: 0 errors, 0 pieces of advice")
+    answer = said.out[said.out.index("my_rov.yaml: 0 errors") :].splitlines()
+    assert answer == [
+        "my_rov.yaml: 0 errors, 0 pieces of advice. It can be used, and nothing in it is implausible.",
+        "Its mass is 13.5 kg. Without thrust it sinks: it is 0.98 N (0.74 %) heavier than the water it displaces.",
+        "Tilted by 10 degrees in roll or pitch, it is righted by 0.23 N m.",
+        "Its drag at 1 m/s is 155 N forward, 217 N sideways and 223 N vertically.",
+        "Its 8 thrusters control all six degrees of freedom.",
+        f"Next: `undertow init --vehicle {EXAMPLES / 'my_rov.yaml'}` writes a scenario for it.",
+    ]
     assert "righting moment" in said.out and "1.316" in said.out
 
 
 def test_vehicle_file_with_another_value(undertow):
     said = undertow("check", str(EXAMPLES / "my_rov.yaml"), "--option", "r_b=[0, 0, 0.01]", "--option", "mass=14")
     assert said.code == 2 and said.err == ""
-    first, *_, last = said.out.splitlines()
+    first, *_, verdict, begin, following = said.out.splitlines()
     assert first.startswith(
         "Error: `r_b` must be above the centre of gravity, but is 10 mm below it (my_rov.yaml, line 12)"
     )
-    assert last.endswith(": 1 error, 1 piece of advice")
+    assert verdict.endswith(": 1 error, 1 piece of advice. It cannot be used like this.")
+    assert begin == f"Begin with: {first.removeprefix('Error: ')}."
+    assert following == "Next: mend this, and check again."
 
 
 def test_buoyancy_that_follows_from_the_volume_has_its_line(undertow):
@@ -90,7 +100,7 @@ def test_scenario(undertow, tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO)
     said = undertow("check", "s.yaml")
     assert said.code == 0
-    assert said.out.count("torque constant / back-EMF constant is 117") == 1
+    assert said.out.count("Advice: torque constant / back-EMF constant is 117") == 1
     assert "odin (vehicle)" in said.out
 
 
@@ -101,7 +111,9 @@ def test_campaign(undertow, tmp_path):
     (tmp_path / "c.yaml").write_text("scenario: s.yaml\ntrials: 8\nrequirements: {position_rms: {below: 1}}\n")
     said = undertow("check", "c.yaml")
     assert said.code == 0 and said.out.startswith("Advice: `requirements.position_rms.share` is 0.95, which takes")
-    assert said.out.endswith("\nc.yaml: 0 errors, 1 piece of advice; 8 trials\n")
+    verdict, trials, following = said.out.splitlines()[1:]
+    assert verdict == "c.yaml: 0 errors, 1 piece of advice. It can be run, but look at the advice first."
+    assert trials == "It has 8 trials." and following == "Next: undertow campaign c.yaml"
     assert sorted(one.name for one in tmp_path.iterdir()) == ["c.yaml", "s.yaml"]
 
 
@@ -208,7 +220,9 @@ def test_a_law_that_prints_and_has_no_slope_gets_advice(undertow, tmp_path):
     smooth = TERMINAL.replace("print(", "repr((").replace("off.error)\n", "off.error))\n", 1)
     smooth = smooth.replace("jnp.sign(off.error) * jnp.abs(off.error) ** 0.6", "off.error")
     (tmp_path / "law.py").write_text(smooth)
-    assert undertow("check", "law.py:terminal").out.endswith("0 errors, 0 pieces of advice\n")
+    *_, verdict, following = undertow("check", "law.py:terminal").out.splitlines()
+    assert verdict.startswith("law.py:terminal: 0 errors, 0 pieces of advice. It can be used")
+    assert following.startswith("Next: write `controller: law.py:terminal` in a scenario")
 
 
 def test_part_from_a_file_that_is_none(refused, tmp_path):

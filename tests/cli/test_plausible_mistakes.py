@@ -58,6 +58,10 @@ ERRORS = {
     "scenario as the vehicle": (SIMULATE, "s.yaml", "vehicle: my_rov.yaml", "vehicle: other.yaml", ["s.yaml, line 2", "other.yaml, a scenario"]),
     "text file": (("simulate", "notes.txt"), "", "", "", ["`notes.txt`", "notes.yaml"]),
     "Python file to simulate": (("simulate", "law.py:my_controller"), "", "", "", ["`law.py:my_controller`", "named in a scenario, such as `controller: ./file.py:function`"]),
+    "log to simulate": (("simulate", "dive.csv"), "", "", "", ["`dive.csv`", "`undertow logs dive.csv`"]),
+    "log to check": (("check", "dive.csv"), "", "", "", ["`dive.csv`", "`undertow logs score SCENARIO dive.csv`"]),
+    "log without a mapping": (("logs", "dive.csv"), "", "", "", ["`mapping` must be given", "`--mapping FILE`", "columns (t, x"]),
+    "vehicle file without its ending": (("init", "--vehicle", "my_rv"), "", "", "", ["`--vehicle`", "Did you mean `my_rov.yaml`?"]),
     "text file to check": (("check", "notes.txt"), "", "", "", ["`notes.txt`", "notes.yaml"]),
     "ending left out to check": (("check", "my_rov"), "", "", "", ["`my_rov`", "Did you mean `my_rov.yaml`?"]),
     "file of another name to check": (("check", "vehicle.yaml"), "", "", "", ["`vehicle.yaml`", "Files there: binary.yaml, c.yaml"]),
@@ -145,6 +149,7 @@ def prepare(folder, monkeypatch, file, old, new):
     texts = {"s.yaml": SCENARIO, "other.yaml": SCENARIO, "c.yaml": CAMPAIGN, "mine.py": LAW, "notes.txt": SCENARIO}
     for name, text in (texts | {"empty.yaml": "# later\n"}).items():
         (folder / name).write_text(text)
+    (folder / "dive.csv").write_text("t,x\n0,1\n1,2\n")
     (folder / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\xff")
     (folder / "old").mkdir()
     (folder / "old" / "run.nc").touch()
@@ -160,6 +165,11 @@ def test_mistake_names_place_and_remedy(refused, tmp_path, monkeypatch, mistake)
     prepare(tmp_path, monkeypatch, file, old, new)
     said = refused(*arguments)
     assert [one for one in named if one not in said] == [], said
+
+
+@pytest.mark.parametrize("command", ["simulate", "analyze", "tune"])
+def test_an_empty_folder_has_a_way_out(refused, command):
+    assert refused(command, "scenario.yaml").endswith("but is not. `undertow init` writes a scenario to start from")
 
 
 WAYPOINTS = "{kind: waypoints, points: [[0, 0, 0], [20, 0, 0], [20, 20, 0]], speed: 0.5}"

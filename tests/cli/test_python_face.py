@@ -37,6 +37,8 @@ def test_run_has_series_metrics_figures_and_a_page(parts, tmp_path, monkeypatch)
     assert "position_rms" in repr(run) and "completed at 0.1 s" in repr(run)
     assert "tracking" in run.plot()
     run.save(tmp_path / "run.nc")
+    with pytest.raises(FileNotFoundError, match=r"The folder does not exist: .*none'$"):
+        run.save(tmp_path / "none" / "run.nc")
     assert (tmp_path / "run.nc").is_file()
     monkeypatch.setattr(writing, "svg", lambda figure: "<svg/>")
     monkeypatch.setattr(writing, "png", lambda figure: b"")
@@ -118,6 +120,15 @@ def test_bad_argument_is_one_line(parts, options, said):
     with pytest.raises(ut.BadInput) as caught:
         ut.simulate(*parts, **options)
     assert named(str(caught.value)) == named(said)
+
+
+def test_parts_that_are_none_are_told_what_is_meant(parts):
+    vehicle, reference = ut.vehicles.odin(), parts[2]
+    with pytest.raises(ut.BadInput, match=r"Give it thrusters: `ut\.HybridVehicle\(vehicle, ut\.thrusters"):
+        ut.simulate(vehicle, "pid", reference)
+    for arguments in (("odin", ut.thrusters.t200()), (vehicle, "t200")):
+        with pytest.raises(ut.BadInput, match=r"must be a part, such as `ut\..*`, but is a str"):
+            ut.HybridVehicle(*arguments)
 
 
 def test_public_names():

@@ -16,6 +16,7 @@ from undertow.scenario.reading import read
 pytestmark = pytest.mark.docs
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+README = EXAMPLES.parent / "README.md"
 
 # Exit code 0, and what else is known: metric -> (value, relative tolerance), over the steady window.
 KNOWN = {
@@ -60,7 +61,7 @@ def test_every_example_is_tested():
 @pytest.mark.parametrize("name", VEHICLES)
 def test_vehicle(name, capsys):
     assert run(["check", str(EXAMPLES / f"{name}.yaml")]) == 0
-    assert capsys.readouterr().out.endswith("0 errors, 0 pieces of advice\n")
+    assert capsys.readouterr().out.count(": 0 errors, 0 pieces of advice. It can be used") == 1
 
 
 @pytest.mark.parametrize("name", sorted(LONG))
@@ -69,8 +70,23 @@ def test_long_scenario_is_built(name):
     assert built.closed_loop.plant.inputs() in (8, 16) and built.scenario.loop.duration >= 10
 
 
+def answer_in_readme():
+    """Lines that README shows of what its first simulation prints."""
+    _, command, following = README.read_text(encoding="utf-8").partition(
+        "examples/thruster_failure.yaml --out runs/first"
+    )
+    assert command
+    return [
+        line.strip() for line in following.split("`runs/first/run.html`")[0].splitlines() if line.startswith("    ")
+    ]
+
+
+def test_readme_shows_an_answer():
+    assert len(answer_in_readme()) == 2
+
+
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in KNOWN])
-def test_scenario(name, tmp_path, monkeypatch):
+def test_scenario(name, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(writing, "svg", lambda figure: BLANK)
     monkeypatch.setattr(writing, "png", lambda figure: b"blank")
     monkeypatch.setattr(run_files, "small_png", lambda figure: b"blank")
@@ -79,6 +95,9 @@ def test_scenario(name, tmp_path, monkeypatch):
     steady = with_all_outputs(json.loads((tmp_path / "out" / "metrics.json").read_text())["steady"])
     for metric, (value, tolerance) in KNOWN[name].items():
         assert steady[metric] == pytest.approx(value, rel=tolerance)
+    if name == "thruster_failure":
+        printed = capsys.readouterr().out.splitlines()
+        assert [line for line in answer_in_readme() if line not in printed] == []
     if name == "voltage_limited":
         assert steady["saturated_fraction"] > 0.05
 

@@ -106,6 +106,7 @@ def test_what_exceeds_its_limit():
     failed = evaluate_success(criterion, None)
     assert not failed.within and not failed.exceeded
     assert evaluate_success({}, {"position_rms": 9.0}) is None
+    assert good and not bad and not undefined and not failed, "`if run.success:` asks whether it went well"
 
 
 SCENARIO = {

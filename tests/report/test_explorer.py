@@ -9,7 +9,7 @@ import undertow as ut
 from undertow.report.live_picture import live_picture
 from undertow.report.run_page import shown_of
 
-pytestmark = pytest.mark.full
+pytestmark = [pytest.mark.full, pytest.mark.filterwarnings("ignore:`ut.explore` shows its sliders:UserWarning")]
 
 SCENARIO = {
     "plant": {"kind": "double_integrator", "axes": 1, "limit": 20},
@@ -60,10 +60,39 @@ def test_without_ranges_the_numbers_of_the_file_have_sliders():
     }
 
 
+def test_a_slider_starts_at_the_value_in_force():
+    """Defaults of the scenario and of its parts, and a gain by rule; what is stated as a name counts as that."""
+    ranges = {
+        "seed": (0, 9),
+        "controller.frequency": (0.1, 30.0),
+        "controller.damping": (0.0, 4.0),
+        "disturbance[0].frequency": (0.0, 8.0),
+        "loop.duration": (2, 10),
+        "loop.backend": ["xla", "simd"],
+        "controller": ["adrc", "pid"],
+        "controller.delay": [0.01, 0.02],
+    }
+    disturbance = [{"kind": "sinusoid", "amplitude": 1.0}]
+    explorer = ut.explore({**SCENARIO, "controller": {"kind": "pid"}, "disturbance": disturbance}, ranges)
+    values = {name: control.value for name, control in controls(explorer).items() if name in ranges}
+    proportional = explorer.run.loop.controller.proportional  # the square of the frequency
+    assert values.pop("controller.frequency") == pytest.approx(np.sqrt(float(proportional)), rel=1e-12)
+    assert values == {
+        "seed": 0,
+        "controller.damping": 1.0,
+        "disturbance[0].frequency": 1.0,
+        "loop.duration": 4,
+        "loop.backend": "simd",
+        "controller": "pid",
+        "controller.delay": None,
+    }
+
+
 @pytest.mark.parametrize(
     "ranges, remedy",
     [
         ({"controller.frequency": (4.0, 1.0)}, "have a range from low to high"),
+        ({"controller.frequncy": (1.0, 3.0)}, "Did you mean `frequency`"),
         ({"controller.frequency": 3}, r"have \(lowest, highest\), a list of choices, or a switch"),
     ],
 )
@@ -77,6 +106,14 @@ def test_a_run_of_objects_has_no_file_to_change():
     assert run.scenario == {}
     with pytest.raises(ut.BadInput, match="be of a run of a scenario"):
         run.again(seed=1)
+    with pytest.raises(ut.BadInput, match="Write it as a scenario, a file or a mapping, and give that"):
+        ut.explore(run, {"seed": (0, 9)})
+
+
+def test_outside_of_a_notebook_it_says_so():
+    with pytest.warns(UserWarning, match=r"which this is not\. Elsewhere, `run.again"):
+        explorer = ut.explore(SCENARIO, {"seed": (0, 9)})
+    assert repr(explorer).startswith("Sliders of seed, in a Jupyter notebook.\nRun: completed")
 
 
 def test_the_picture_has_the_numbers_of_the_run():

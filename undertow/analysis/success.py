@@ -14,7 +14,7 @@ SATURATED = {"saturated_fraction": 0.25}
 
 
 class Success(NamedTuple):
-    """What was judged, and how.
+    """What was judged, and how; true where the run kept to its criterion, as in `if run.success`.
 
     Attributes:
         criterion: metric -> what its value in the steady window must stay below, in the unit of the metric.
@@ -25,6 +25,10 @@ class Success(NamedTuple):
     criterion: dict[str, float]
     exceeded: dict[str, float | None]
     within: bool
+
+    def __bool__(self) -> bool:
+        """Whether the run kept to its criterion; a tuple that is not empty would always be true."""
+        return self.within
 
 
 def criterion_of(criterion: Mapping[str, float] | None, metrics: Mapping[str, Metric]) -> dict[str, float]:

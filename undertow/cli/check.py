@@ -8,9 +8,12 @@ from rich.text import Text
 
 from undertow.cli.exit_codes import BAD_INPUT, DONE
 from undertow.cli.options.check import CheckCommand
-from undertow.cli.tables import titled, wide_console
+from undertow.cli.tables import print_lines, titled, wide_console
 from undertow.core.errors import BadInput
+from undertow.report.answers.check_answer import answer_of_check
 from undertow.scenario.checks import check as checks
+from undertow.scenario.checks.check import Report
+from undertow.scenario.checks.finding import Finding
 from undertow.scenario.reading import read
 from undertow.scenario.validation import kind_of
 from undertow.scenario.vehicle_file import is_vehicle_file
@@ -23,7 +26,8 @@ def check(command: CheckCommand) -> int:
     thing, options = command.thing, command.option or []
     if is_vehicle_file(thing) and Path(thing).is_file() and kind_of(read(Path(thing)).data) == "campaign":
         return _check_campaign(Path(thing), options, command.allow_code)
-    report = checks.check(thing, dict(map(_option, options)), command.allow_code)
+    values = dict(map(_option, options))
+    report = checks.check(thing, values, command.allow_code)
     console = wide_console()
     for sentence in report.sentences:
         print(sentence)
@@ -32,8 +36,7 @@ def check(command: CheckCommand) -> int:
         for row in rows:
             table.add_row(*map(Text, row))
         console.print(table)
-    advice = len(report.sentences) - report.errors
-    print(f"{thing}: {_counted(report.errors, 'error')}, {_counted(advice, 'piece')} of advice")
+    print_lines(console, answer_of_check(thing, report, values).text)
     return BAD_INPUT if report.errors else DONE
 
 
@@ -47,7 +50,9 @@ def _check_campaign(path: Path, options: Sequence[str], allow_code: bool) -> int
     number = prepared.trials.number
     combinations = len(prepared.trials.combinations)
     of = f" of {combinations} combinations" if combinations > 1 else ""
-    print(f"{path}: {_counted(0, 'error')}, {_counted(len(prepared.advice), 'piece')} of advice; {number} trials{of}")
+    found = tuple((Finding("advice", "campaign", "", sentence), "") for sentence in prepared.advice)
+    answer = answer_of_check(str(path), Report(found, kind="campaign"))
+    print_lines(wide_console(), [answer.verdict, f"It has {number} trials{of}.", *answer.lines])
     return DONE
 
 
@@ -57,7 +62,3 @@ def _option(text: str) -> tuple[str, Any]:
     if not equals or not key:
         raise BadInput("--option", "be KEY=VALUE", text)
     return key, load(value, "", "--option")[0]
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

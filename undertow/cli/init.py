@@ -12,8 +12,9 @@ from pathlib import Path
 from undertow.cli.options.init import InitCommand
 from undertow.core import catalogue
 from undertow.core.atomic_io import write_whole
-from undertow.core.errors import BadInput, did_you_mean
+from undertow.core.errors import BadInput, did_you_mean, joined
 from undertow.scenario.json_schema import scenario_schema
+from undertow.scenario.reading import nearest_file
 
 _SCHEMA, _VEHICLE, _CONTROLLER = "scenario.schema.json", "my_rov.yaml", "my_controller.py"
 
@@ -64,7 +65,8 @@ def _body(vehicle: str, folder: Path) -> str:
             raise BadInput("--vehicle", "be a vehicle file that is there", vehicle, hint=hint)
         return _quoted(_from_folder(vehicle, folder))
     if vehicle not in _THRUSTERS:
-        hint = f"{did_you_mean(vehicle, _THRUSTERS)}. For another vehicle, change `plant` of the file"
+        known = nearest_file(Path(vehicle)) or did_you_mean(vehicle, _THRUSTERS)
+        hint = joined(known, "For another vehicle, change `plant` of the file")
         must = "be a vehicle of the catalogue with more than one thruster, or a vehicle file"
         raise BadInput("--vehicle", must, vehicle, hint=hint)
     return vehicle

@@ -1,6 +1,7 @@
 """Safe writing: what is written is whole, and survives a power cut."""
 
 import contextlib
+import errno
 import os
 import secrets
 import shutil
@@ -16,6 +17,8 @@ def replacing(path: Path) -> Iterator[Path]:
     What was there stays until then, whatever happens, and gives its permissions. A link stays one, to its new file.
     """
     target = path.resolve()
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "The folder does not exist", str(path.parent))
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     try:

@@ -64,7 +64,7 @@ def _mapped(recording: Recording, mapping: LogMapping | None, location: Callable
     recording = recording._replace(notes=(*recording.notes, *guesses, *frames))
     if mapping is None:
         if not usual.signals:
-            hint = f"Give a mapping. It has {_listed(recording)}"
+            hint = f"Give a mapping (`--mapping FILE`). It has {_listed(recording)}"
             got = f"{recording.source}, a {recording.format} file whose columns may mean anything"
             if recording.format in DEFAULTS:
                 got = f"{recording.source}, which has none of the messages that are known"

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from undertow.report.page import Html, tag, text
+from undertow.report.page import Html
 from undertow.report.plotted import ERRORS, FLOORS, LEAST_PATH, Shown
+from undertow.report.svg import BLUE, GREY, RED, drawing, polyline, words
 from undertow.scenario.results.run_result import RunRecord
 
 _WIDTH, _HEIGHT = 960, 380
 _PATH, _LEFT, _FOOT, _GAP = 360, 56, 34, 30  # pixels
 _POINTS = 400  # of a curve; more are not seen
-_BLUE, _GREY, _RED = "#1f6f9f", "#9a9a9a", "#b3402a"
 _IN_DEGREES = {"rad": ("deg", 180 / np.pi)}  # unit of outputs -> unit that is shown, and factor
 
 
@@ -29,13 +29,13 @@ class _Panel(NamedTuple):
     across: tuple[float, float]
     up: tuple[float, float]
 
-    def points(self, x: np.ndarray, y: np.ndarray) -> str:
-        """Corners of a polyline; what is not finite is left out, what is far outside is cut off."""
+    def line(self, x: np.ndarray, y: np.ndarray, colour: str, dashed: bool = False) -> Html:
+        """A curve; what is not finite is left out, what is far outside is cut off."""
         (left, right), (low, high) = self.across, self.up
         known = np.isfinite(x) & np.isfinite(y)
         across = self.left + self.width * (x[known] - left) / (right - left)
         up = self.top + self.height * np.clip((high - y[known]) / (high - low), -1, 2)
-        return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across.tolist(), up.tolist(), strict=True))
+        return polyline(list(zip(across.tolist(), up.tolist(), strict=True)), colour, dashed)
 
 
 def live_picture(run: RunRecord, shown: Shown) -> Html:
@@ -52,8 +52,8 @@ def live_picture(run: RunRecord, shown: Shown) -> Html:
     height = (_HEIGHT - _FOOT - _GAP * len(curves)) / len(curves)
     for row, curve in enumerate(curves):
         parts += _over_time(values["time"], *curve, top=_GAP + row * (height + _GAP), height=height)
-    parts.append(_words(_PATH + _LEFT, _HEIGHT - 6, f"time, 0 to {values['time'][-1]:g} s"))
-    return tag("svg", *parts, viewBox=f"0 0 {_WIDTH} {_HEIGHT}", style="width:100%;max-width:60em;background:#fff")
+    parts.append(words(_PATH + _LEFT, _HEIGHT - 6, f"time, 0 to {values['time'][-1]:g} s"))
+    return drawing(_WIDTH, _HEIGHT, *parts)
 
 
 def _errors(error: np.ndarray, units: Sequence[str], shown: Shown) -> list[tuple[str, np.ndarray, float | None, float]]:
@@ -86,8 +86,8 @@ def _path(values: dict[str, np.ndarray], names: Sequence[str]) -> list[Html]:
         end = max(float(values["time"][-1]), 1e-9)
         spans = (0.0, end), (float(both.min()) - margin, float(both.max()) + margin)
     panel = _Panel(*box, *spans)
-    lines = [_line(panel, *way, colour) for way, colour in zip(ways, (_GREY, _BLUE), strict=True)]
-    return [*_frame(panel, heading), *lines, _words(panel.left, _HEIGHT - 6, f"{foot}; grey: desired".lstrip("; "))]
+    lines = [panel.line(*way, colour) for way, colour in zip(ways, (GREY, BLUE), strict=True)]
+    return [*_frame(panel, heading), *lines, words(panel.left, _HEIGHT - 6, f"{foot}; grey: desired".lstrip("; "))]
 
 
 def _square(points: np.ndarray, shape: float) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -101,7 +101,7 @@ def _square(points: np.ndarray, shape: float) -> tuple[tuple[float, float], tupl
 
 
 def _over_time(
-    time: np.ndarray, words: str, size: np.ndarray, limit: float | None, floor: float, top: float, height: float
+    time: np.ndarray, heading: str, size: np.ndarray, limit: float | None, floor: float, top: float, height: float
 ) -> list[Html]:
     """One curve from zero upwards, beside its limit."""
     settled = size[len(size) // 10 :]
@@ -109,9 +109,9 @@ def _over_time(
     most = max(1.1 * float(finite.max()) if finite.size else 0.0, floor, 1.15 * (limit or 0.0), 1e-12)
     end = max(float(time[-1]), 1e-9)
     panel = _Panel(_PATH + _LEFT, top, _WIDTH - _PATH - _LEFT - 10, height, (0.0, end), (0.0, most))
-    parts = [*_frame(panel, words), _line(panel, time, size, _BLUE)]
+    parts = [*_frame(panel, heading), panel.line(time, size, BLUE)]
     if limit is not None:
-        parts.append(_line(panel, np.array([0.0, end]), np.array([limit, limit]), _RED, dashed=True))
+        parts.append(panel.line(np.array([0.0, end]), np.array([limit, limit]), RED, dashed=True))
     return parts
 
 
@@ -119,17 +119,5 @@ def _frame(panel: _Panel, heading: str) -> list[Html]:
     """Axes, their extreme values, and what is shown."""
     left, top, width, height, _, (low, high) = panel
     frame = Html(f'<rect x="{left}" y="{top:.1f}" width="{width}" height="{height:.1f}" fill="none" stroke="#ccc"/>')
-    ends = [_words(left - 6, top + 9, f"{high:.3g}", "end"), _words(left - 6, top + height, f"{low:.3g}", "end")]
-    return [frame, _words(left, top - 8, heading), *ends]
-
-
-def _line(panel: _Panel, x: np.ndarray, y: np.ndarray, colour: str, dashed: bool = False) -> Html:
-    dashes = ' stroke-dasharray="6 3"' if dashed else ""
-    style = f'fill="none" stroke="{colour}" stroke-width="1.6"{dashes}'
-    clipped = panel.points(np.asarray(x, float), np.asarray(y, float))
-    return Html(f'<polyline points="{clipped}" {style}/>')
-
-
-def _words(x: float, y: float, words: str, anchor: str = "start") -> Html:
-    looks = f'font-family="sans-serif" font-size="12" text-anchor="{anchor}" fill="#333"'
-    return Html(f'<text x="{x:.0f}" y="{y:.0f}" {looks}>{text(words)}</text>')
+    ends = [words(left - 6, top + 9, f"{high:.3g}", "end"), words(left - 6, top + height, f"{low:.3g}", "end")]
+    return [frame, words(left, top - 8, heading), *ends]

@@ -212,6 +212,11 @@ def is_part(thing: Any) -> bool:
     return isinstance(thing, tuple(_CONTRACTS.values()))
 
 
+def kind_of_part(part: Any) -> str:
+    """Kind of a part, by the contract that it keeps."""
+    return next(kind for kind, contract in _CONTRACTS.items() if isinstance(part, contract))
+
+
 def _described(thing: Any) -> str:
     """An object that is no part, for messages: of a class of the user's own its name and place."""
     location = place_of(thing)

@@ -15,6 +15,7 @@ from undertow.scenario.yaml_text import load
 Path_ = tuple[str | int, ...]
 
 _YAML, _RESULT = (".yaml", ".yml"), ".nc"
+_LOGS = (".mcap", ".csv", ".bin", ".tlog", ".ulg", ".db3")
 _LISTED = 6  # files of a folder that a message names
 
 
@@ -120,7 +121,8 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
     if not folder.is_dir():
         return wrong_file(path, what, must, hint=f"The folder {folder} does not exist")
     files = _files_in(folder)
-    listing = f"Files there: {_listed(files)}" if files and not what else ""
+    listing = f"Files there: {_listed(files)}" if files else "`undertow init` writes a scenario to start from"
+    listing = "" if what else listing
     return wrong_file(path, what, must, "" if what else "not", hint=nearest_file(path) or listing)
 
 
@@ -145,6 +147,8 @@ def _rename(path: Path) -> str:
     """Remedy for a file with another ending."""
     if ".py" in path.name:
         return "Python code is named in a scenario, such as `controller: ./file.py:function`"
+    if path.suffix.lower() in _LOGS:
+        return f"A log is shown by `undertow logs {path}`, and scored by `undertow logs score SCENARIO {path}`"
     return f"If it holds YAML, rename it to {path.stem}.yaml"
 
 

@@ -22,6 +22,12 @@ from undertow.physics.plants.pulse_input import applied_voltage, pulse_driven
 from undertow.physics.power.esc import ESC
 from undertow.physics.power.esc import esc as usual_esc
 from undertow.physics.sensors.motion import motion_of
+from undertow.physics.vehicles.facts import facts_of
+from undertow.report.answers.check_answer import counted
+from undertow.report.answers.notebook import in_notebook
+from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.report.answers.vehicle_answer import vehicle_lines
+from undertow.report.vehicle_view import answer_with_drawing
 from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
 from undertow.scenario.reading import Text
@@ -192,7 +198,7 @@ class Vehicle(Uncopied):
         if not isinstance(built, Built):
             built = build(at_sampling_time(text_of(built, allow_code), sampling_time))
         settings = built.scenario.loop
-        self._loop = built.closed_loop
+        self._loop, self._title = built.closed_loop, built.scenario.description
         self.sampling_time = float(settings.dt if sampling_time is None else sampling_time)
         self.duration = float(settings.duration)
         self.plant, self.esc, self.unit = self._loop.plant, None, self._loop.plant.input_unit
@@ -244,6 +250,21 @@ class Vehicle(Uncopied):
         self._show(self._begin.outputs[1])
         self.output = self.output._replace(applied=None)
         self._since, self._steps, self._dt = 0.0, 0, self.sampling_time
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: where its run stands, what it takes, and of a vehicle its numbers and thrusters."""
+        verdict = f"It is at {self.time:g} s of {self.duration:g} s, and its state is valid."
+        if not self.going_on:
+            verdict = f"It ended: {self.output.status.word.replace('_', ' ')} at {self.time:g} s."
+        step = f"{1e3 * self.sampling_time:g} ms"
+        commands = f"{counted(self.thrusters, 'command')} ({self.unit})"
+        inputs = f"Each step takes {commands}, held for {step} or the time that is given."
+        good = None if self.going_on else False
+        if not isinstance(self.plant, HybridVehicle):
+            return in_notebook(self._title or type(self.plant).__name__, PlainAnswer(good, verdict, (inputs,)))
+        vehicle = self.plant.vehicle
+        lines = (inputs, *vehicle_lines(facts_of(vehicle)))
+        return answer_with_drawing(self._title or vehicle.name, PlainAnswer(good, verdict, lines), vehicle)
 
     @property
     def realization(self) -> Realization:

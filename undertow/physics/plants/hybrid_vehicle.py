@@ -81,6 +81,12 @@ class HybridVehicle(AbstractPlant):
         ledger: bool | None = None,
         inflow_loss: Number | None = None,
     ):
+        for name, part, contract, example in (
+            ("vehicle", vehicle, VehicleModel, "ut.vehicles.bluerov2_heavy()"),
+            ("thruster", thruster, AbstractThruster, "ut.thrusters.t200()"),
+        ):
+            if not isinstance(part, contract):
+                raise BadInput(name, f"be a part, such as `{example}`", f"a {type(part).__name__}")
         kept = has_motor(thruster) if ledger is None else ledger
         self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, kept)
         self.power.check(thruster)
@@ -92,6 +98,10 @@ class HybridVehicle(AbstractPlant):
         self.outputs = BODY_OUTPUTS
         self.output_units = ("m", "m", "m", "rad", "rad", "rad")
         self.input_unit = thruster.input_unit
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the vehicle."""
+        return self.vehicle._repr_html_()
 
     def initial_state(self, position=None, velocity=None) -> VehicleState:
         outputs = given_or_zero(position, 6)

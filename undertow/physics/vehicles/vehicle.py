@@ -1,6 +1,7 @@
 """A vehicle as data: published numbers with their sources, and derived matrices."""
 
 import dataclasses
+import importlib
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -92,6 +93,11 @@ class VehicleModel(eqx.Module):
             norms = np.linalg.norm(np.asarray(self.thruster_directions), axis=1)
             for j in np.flatnonzero(~(np.abs(norms - 1) < 1e-6)):
                 raise BadInput(f"thruster_directions[{j}]", "have length 1", f"{norms[j]:.6g} long")
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: what its numbers mean, and a drawing of its thrusters."""
+        # Pages stand above the physics, which imports none of them: a notebook that asks loads them.
+        return importlib.import_module("undertow.report.vehicle_view").vehicle_in_notebook(self)
 
     @property
     def thrusters(self) -> int:

@@ -38,7 +38,9 @@ class Report(NamedTuple):
     """Result of a check."""
 
     found: tuple[tuple[Finding, str], ...]  # with its location, when known
-    tables: tuple[tuple[str, Rows], ...]  # title, and numbers derived from the data
+    tables: tuple[tuple[str, Rows], ...] = ()  # title, and numbers derived from the data
+    kind: str = ""  # `scenario`, `campaign`, `vehicle file`, or the kind of the part
+    vehicle: Facts | None = None  # numbers of the vehicle, where there is one
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -70,7 +72,7 @@ def check(thing: str, options: Mapping[str, Any], allow_code: bool = False) -> R
     reports = [_of_part(name, part)]
     if isinstance(part, AbstractController) and not reports[0].errors:
         reports.append(_of_feedback(make, len(part.model.coordinates.angles)))
-    return _joined(reports)
+    return _joined(reports, factory.kind_of_part(part))
 
 
 def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Report:
@@ -80,10 +82,10 @@ def _check_file(path: Path, options: Mapping[str, Any], allow_code: bool) -> Rep
         hint = did_you_mean(next(iter(text.data), ""), {*KEYS, *Scenario.model_fields})
         raise BadInput(str(path), "be a vehicle, scenario or campaign file", "without a key of any", hint=hint)
     if kind == "vehicle file":
-        return _joined([_of_vehicle_file(path, options)])
+        return _joined([_of_vehicle_file(path, options)], kind)
     if options:
         raise BadInput("--option", "be left out for a scenario", next(iter(options)))
-    return _joined(_of_scenario(text))
+    return _joined(_of_scenario(text), kind)
 
 
 def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
@@ -95,7 +97,7 @@ def _of_vehicle_file(path: Path, options: Mapping[str, Any]) -> Report:
 
 
 def _of_vehicle(facts: Facts, where: Callable[[str], str] = lambda key: "") -> Report:
-    return _report(lint(facts), where, f"{facts.name} (vehicle)", derived(facts))
+    return _report(lint(facts), where, f"{facts.name} (vehicle)", derived(facts))._replace(vehicle=facts)
 
 
 def _of_part(name: str, part: Any) -> Report:
@@ -234,7 +236,9 @@ def _report(
     return Report(located_findings, ((title, rows),) if rows else ())
 
 
-def _joined(reports: list[Report]) -> Report:
+def _joined(reports: list[Report], kind: str) -> Report:
     """All reports as one; of equal findings the later one is kept, which has the location."""
     by_sentence = {finding.says: (finding, where) for report in reports for finding, where in report.found}
-    return Report(tuple(by_sentence.values()), tuple(table for report in reports for table in report.tables))
+    tables = tuple(table for report in reports for table in report.tables)
+    vehicle = next((report.vehicle for report in reports if report.vehicle is not None), None)
+    return Report(tuple(by_sentence.values()), tables, kind, vehicle)
