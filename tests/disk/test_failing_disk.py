@@ -67,6 +67,7 @@ IN_PLACE = {
     "undertow/studies/speed/waiting.py": "a temporary folder",
     "undertow/core/process_setup.py": "its own file, which takes another's place, before JAX is imported",
     "undertow/outside/export/fmu.py": "a temporary folder for the compiler",
+    "undertow/outside/browser/wasm.py": "a temporary folder for the compiler",
     "undertow/logs/csv_writer.py": "`Log.save` gives it a new file",
     "undertow/logs/mcap_writer.py": "`Log.save` gives it a new file; a log that is being written has a new name",
     "undertow/simulation/checkpoint.py": "lines are added; one that is incomplete is left out",

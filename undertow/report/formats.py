@@ -116,7 +116,7 @@ CRITERION = (
 def meets_default_criterion(steady: Mapping[str, Any] | None) -> bool | None:
     """Whether the metrics of a steady window keep to the default criterion; None without any, as in a failed run."""
     verdict = evaluate_success(DEFAULT, steady) if steady else None
-    return verdict and verdict.within
+    return None if verdict is None else verdict.within
 
 
 def outcome(words: str, completed: bool, within: bool | None) -> Html:
