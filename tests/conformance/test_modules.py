@@ -89,11 +89,11 @@ def is_abstract_method(method):
 
 
 # Capabilities that a part may have, with the default of a part that has not:
-# a thruster that is commanded in newtons and not in volts, or whose motor is known;
+# a thruster that is commanded in newtons and not in volts, whose motor is known, or with a number for each of N;
 # a navigation filter that simulates sensors; faults that say what is random in them;
 # a controller that knows its acceleration, has knowledge to carry over, or can be restarted.
 CAPABILITIES = {
-    "AbstractThruster": ("limits", "terminal", "electrical_power", "actuator_model"),
+    "AbstractThruster": ("limits", "terminal", "electrical_power", "actuator_model", "count"),
     "AbstractFaults": ("sampled",),
     "AbstractNavigation": ("simulated_sensors",),
     "AbstractController": ("known_acceleration", "knowledge", "restarted"),

@@ -9,8 +9,12 @@ from undertow.core.runtime import double_outside_runs
 from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario.reading import Text, from_data, key_path, read, wrong_file
 from undertow.scenario.validation import kind_of
+from undertow.scenario.values import checked
+from undertow.scenario.vehicle_parameters import check_name, is_outside, with_parameters
 from undertow.scenario.vehicle_schema import INSTEAD, VehicleData, parse
+from undertow.scenario.vehicle_uncertainty import SECTION, VehicleUncertainty, uncertainty_of, without_deviations
 
+_VALUES = "values"  # key beside those of a vehicle file: other values of its parameters, by name
 _FROM = {"weight": "mass", "buoyancy": "volume"}  # where the key itself is not given
 
 
@@ -18,9 +22,12 @@ class VehicleFile(NamedTuple):
     """A vehicle file as read, some of its keys perhaps changed."""
 
     data: VehicleData
-    contents: dict[str, Any]  # plain data from which the same vehicle can be made again
+    contents: dict[
+        str, Any
+    ]  # plain data from which the same vehicle can be made again, all deviations in `uncertainty`
     text: Text
     changed: frozenset[str]  # keys that are no longer the file's
+    uncertainty: VehicleUncertainty | None  # of its numbers; None where the file has no deviations
 
     def location(self, name: str) -> str:
         """Location of a key in the file, also of one that is changed."""
@@ -47,8 +54,8 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
 
     Args:
         path: of the file.
-        changes: other values for some of its keys, as if they stood there; or `contents`, the whole of it, and the
-            file need not exist.
+        changes: other values for some of its keys, as if they stood there; `values`, others of its parameters, by the
+            names of `vehicle_parameters`; or `contents`, the whole of it, and the file need not exist.
         what: the key that names the file, for messages; "" for an argument.
 
     Raises:
@@ -56,6 +63,7 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     """
     changes = dict(changes or {})
     stored_contents = changes.pop("contents", None)
+    values = _flat(_VALUES, changes.pop(_VALUES, {}))
     if stored_contents is not None and not isinstance(stored_contents, Mapping):
         raise BadInput("contents", "be a mapping, as in a vehicle file", stored_contents)
     text = read(path, what) if stored_contents is None else from_data(stored_contents)
@@ -65,9 +73,36 @@ def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str
     forgotten = {alternative for key in changes for alternative in INSTEAD.get(key, ())} - set(changes)
     contents = {"name": path.stem, **text.data, **changes}
     contents = {key: value for key, value in contents.items() if key not in forgotten}
-    changed = frozenset(changes)
+    changed = frozenset([*changes, *([_VALUES] if values else [])])
     with error_location(location=_location(text, changed)):
-        return VehicleFile(parse(contents), contents, text, changed)
+        contents, deviations = without_deviations(contents)
+        data = parse(contents)
+        uncertainty = uncertainty_of(contents, deviations, data.hull)
+        if uncertainty is not None:
+            contents[SECTION] = uncertainty.section()
+        if values:
+            contents = with_parameters(contents, data.hull, values)
+            data = parse(contents)
+        return VehicleFile(data, contents, text, changed, uncertainty)
+
+
+def _flat(location: str, values: Any) -> dict[str, float]:
+    """Values of parameters by name: `{added_mass: {surge: 6}}` is that of `added_mass.surge`."""
+    if not isinstance(values, Mapping):
+        raise BadInput(location, "be a mapping of parameters of the vehicle to numbers", values)
+    flat: dict[str, float] = {}
+    for key, value in values.items():
+        inner = f"{location}.{key}"
+        if isinstance(value, Mapping):
+            flat |= {f"{key}.{name}": number for name, number in _flat(inner, value).items()}
+        else:
+            flat[str(key)] = checked(inner, value, float, 0.0)
+    if location == _VALUES:
+        for name in flat:
+            check_name(f"{location}.{name}", name)
+            if is_outside(name):
+                raise BadInput(f"{location}.{name}", "be given at `plant.thruster`", flat[name])
+    return flat
 
 
 def vehicle_location(scenario: Text) -> Callable[[str], str]:

@@ -35,7 +35,10 @@ _IN_WORDS = {
     "quadratic_damping": "N s^2/m^2 and N m s^2, six diagonal entries (zero where there is none) or a 6 x 6 matrix",
     "thrusters": "a list with one entry per thruster, {position: [...], direction: [...]}",
 }
-KEYS = ("name", "source", "inertia_about", *SCALARS, *VECTORS, *MATRICES, "thrusters", "thruster_matrix")
+KEYS = (
+    *("name", "source", "inertia_about", *SCALARS, *VECTORS, *MATRICES, "thrusters", "thruster_matrix"),
+    *("uncertainty", "identified"),
+)
 
 # Alternatives: where one is given, the others must not be.
 INSTEAD = {
@@ -275,12 +278,15 @@ class VehicleData(NamedTuple):
 
 
 def parse(contents: Mapping[str, Any]) -> VehicleData:
-    """A vehicle file from its contents.
+    """A vehicle file from its contents, in which numbers stand without deviations.
 
     Raises:
         BadInput: unknown or missing key, wrong type, length or sign; key names are those of the file.
     """
     check_keys(contents)
+    identified = contents.get("identified", {})
+    if not isinstance(identified, Mapping):
+        raise BadInput("identified", "be a mapping, such as {date: ..., logs: [...]}", identified)
     numbers = {key: number_at(contents, key) for key in SCALARS if key in contents}
     vectors = {key: vector_at(contents, key) for key in VECTORS if key in contents}
     matrices = {key: matrix_at(contents, key) for key in MATRICES}

@@ -87,6 +87,7 @@ class HybridVehicle(AbstractPlant):
         ):
             if not isinstance(part, contract):
                 raise BadInput(name, f"be a part, such as `{example}`", f"a {type(part).__name__}")
+        _check_count(thruster, vehicle.thrusters)
         kept = has_motor(thruster) if ledger is None else ledger
         self.vehicle, self.thruster, self.power = vehicle, thruster, HybridPower(battery, esc, kept)
         self.power.check(thruster)
@@ -214,6 +215,7 @@ class HybridVehicle(AbstractPlant):
                 vehicle with another number of thrusters.
         """
         nominal = self.thruster if thruster is None else thruster
+        _check_count(nominal, self.inputs())
         known = self if vehicle is None else HybridVehicle(vehicle, nominal)
         if speed_sensor and not affine:
             hint = "Leave one of them out"
@@ -243,6 +245,12 @@ class HybridVehicle(AbstractPlant):
             curve = nominal.actuator_model(self.inputs(), False).quasi_static()
             dynamics = NonAffineHybridDynamics(dynamics, curve, self.inflow_loss)
         return Model(dynamics, EulerCoordinates(), DirectActuator())
+
+
+def _check_count(thruster: AbstractThruster, thrusters: int) -> None:
+    """Check that parameters with one entry per thruster have as many entries as there are thrusters."""
+    if thruster.count() not in (None, thrusters):
+        raise BadInput("thruster", f"have parameters for {thrusters} thrusters", f"for {thruster.count()}")
 
 
 def _possible_wrenches(thruster_matrix, rank: int):

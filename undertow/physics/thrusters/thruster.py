@@ -103,6 +103,10 @@ class AbstractThruster(eqx.Module):
     def advice(self) -> tuple[str, ...]:
         """Advice on implausible parameters."""
 
+    def count(self) -> int | None:
+        """How many thrusters there must be, where parameters have one entry per thruster; None for any number."""
+        return None
+
     def limits(self) -> tuple[PerThruster, PerThruster]:
         """Smallest and largest command of the drive, V."""
         return -self.supply, self.supply

@@ -13,19 +13,20 @@ from undertow.physics.thrusters.motor import DCMotor
 from undertow.physics.thrusters.thruster import AbstractThruster, Powers, PropellerReport
 from undertow.scenario.checks.finding import Finding, advice, error, is_a, same_structure, shaped
 
-_COUNT = 3  # thrusters at once: no other size that a part may happen to have
+_COUNT = 3  # thrusters at once, where any number will do: no other size that a part may happen to have
 _VOLTAGE = 10.0  # V, where a thruster has no limit
 _LONG = 60.0  # s, by when every thruster has settled
 _FACTOR = 3.0  # between the gain the model takes and that at full voltage
 
 
 def check_thruster(thruster: AbstractThruster) -> Iterator[Finding]:
-    """Findings from every method, for three thrusters at different voltages."""
-    volts = _full_voltage(thruster) * jnp.array([0.4, -0.7, 1.0])
-    state = thruster.initial_state(_COUNT)
+    """Findings from every method, for three thrusters at different voltages, or as many as it has parameters for."""
+    count = thruster.count() or _COUNT
+    volts = _full_voltage(thruster) * jnp.resize(jnp.array([0.4, -0.7, 1.0]), (count,))
+    state = thruster.initial_state(count)
     jax.eval_shape(thruster.dynamics, state, volts)  # raises if it does not compile
     jax.eval_shape(thruster.thrust, state, volts)
-    per_thruster, scalar = (_COUNT,), ()
+    per_thruster, scalar = (count,), ()
     powers, report = thruster.powers(state, volts), thruster.report(state)
     findings = [
         *same_structure("dynamics", thruster.dynamics(state, volts), state, "have the form of the state"),
@@ -73,15 +74,17 @@ def _full_voltage(thruster: AbstractThruster) -> float:
 
 
 def _settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, float]:
-    """Steady thrust, N, of a voltage within the limits, and of its opposite."""
-    volts = jnp.clip(jnp.array([voltage, -voltage]), *thruster.limits())
-    start = thruster.initial_state(2)
-    flat, tree = ravel_pytree(start)
+    """Steady thrust, N, of a voltage within the limits, and of its opposite; the mean of thrusters that differ."""
+    count = thruster.count() or 1
+    volts = [jnp.clip(jnp.full(count, side * voltage), *thruster.limits()) for side in (1, -1)]
+    states = [thruster.initial_state(count) for _ in volts]
+    flat, tree = ravel_pytree(states)
     if flat.size:
-        rate = jax.jit(lambda x: ravel_pytree(thruster.dynamics(tree(x), volts))[0])
+        rates = lambda x: [thruster.dynamics(state, volt) for state, volt in zip(tree(x), volts, strict=True)]
+        rate = jax.jit(lambda x: ravel_pytree(rates(x))[0])
         end = solve_ivp(lambda t, x: np.asarray(rate(x)), (0, _LONG), np.asarray(flat), method="LSODA").y[:, -1]
-        start = tree(jnp.asarray(end))
-    forward, reverse = np.asarray(thruster.thrust(start, volts)).tolist()
+        states = tree(jnp.asarray(end))
+    forward, reverse = (float(np.mean(thruster.thrust(state, volt))) for state, volt in zip(states, volts, strict=True))
     return forward, reverse
 
 

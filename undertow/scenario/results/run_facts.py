@@ -85,6 +85,8 @@ class RunFacts(NamedTuple):
         """Supply voltage of the thrusters, V; None where the scenario has none, or one that changes."""
         plant = self.scenario.get("plant")
         thruster = plant.get("thruster") if isinstance(plant, Mapping) else None
+        while isinstance(thruster, Mapping) and "thruster" in thruster:  # of one that wraps another
+            thruster = thruster["thruster"]
         supply = thruster.get("supply") if isinstance(thruster, Mapping) else None
         return float(supply) if isinstance(supply, int | float) and math.isfinite(supply) else None
 

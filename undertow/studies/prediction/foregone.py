@@ -6,7 +6,7 @@ import numpy as np
 from undertow.analysis.linearization.jacobians import without
 from undertow.core.arrays import as_array
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
-from undertow.physics.thrusters.quasi_static import AbstractQuasiStaticThruster
+from undertow.physics.thrusters.thruster import AbstractThruster
 from undertow.scenario.results.run_result import ScenarioResult
 
 _SATURATED = 0.1  # share of the time, from which on a loop without limits says nothing about the run
@@ -30,7 +30,7 @@ def _flat_thrust(result: ScenarioResult) -> str:
     rest, and the linear loop would need impossible voltages.
     """
     plant = result.built.of_the_law().closed_loop.plant
-    if not (isinstance(plant, HybridVehicle) and isinstance(plant.thruster, AbstractQuasiStaticThruster)):
+    if not isinstance(plant, HybridVehicle) or _has_state(plant.thruster, plant.inputs()):
         return ""
     supply = np.asarray(plant.thruster.supply, dtype=float)
     if not np.isfinite(supply).all():
@@ -51,3 +51,8 @@ def _flat_thrust(result: ScenarioResult) -> str:
         "dead zone, or where force grows with its square), so that no linear model describes the loop there. The run "
         "itself is not affected"
     )
+
+
+def _has_state(thruster: AbstractThruster, count: int) -> bool:
+    """Whether thrust has dynamics; a thruster that wraps another one has those of the inner one."""
+    return any(leaf.size for leaf in jax.tree.leaves(thruster.initial_state(count)))
