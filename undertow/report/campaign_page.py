@@ -289,6 +289,10 @@ def _words(spread: Distribution) -> str:
         return "normal, mean {:g}, standard deviation {:g}".format(*spread.normal)
     if spread.uniform is not None:
         return "uniform, {:g} to {:g}".format(*spread.uniform)
+    if spread.log_normal is not None:
+        return "log-normal, median {:g}, standard deviation of the logarithm {:g}".format(*spread.log_normal)
+    if spread.cut_normal is not None:
+        return "normal, mean {:g}, standard deviation {:g}, at least {:g}".format(*spread.cut_normal)
     return "log-uniform, {:g} to {:g}".format(*(spread.log_uniform or ()))
 
 

@@ -41,9 +41,9 @@ def keys(model: type[BaseModel] = Scenario, prefix: str = "", defaults: BaseMode
 def _type_name(annotation: Any) -> str:
     if annotation is Part:
         return "part"
+    annotation = without_none(annotation)
     if typing.get_origin(annotation) is Literal:
         return " or ".join(typing.get_args(annotation))
-    annotation = without_none(annotation)
     if typing.get_origin(annotation) is Annotated:
         annotation = typing.get_args(annotation)[0]
     words = {

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core.errors import BadInput
+from undertow.scenario.correlation import correlated, square_root
 from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
 from undertow.scenario.vehicle_file import VehicleFile
 from undertow.scenario.vehicle_parameters import NOT_NEGATIVE, POSITIVE, sign_of, with_parameters
@@ -49,7 +50,7 @@ def sample(
     factor = square_root(uncertainty.correlation)
     names, samples = list(uncertainty.numbers), []
     for _ in range(_TRIES):
-        deviates = generator.standard_normal((count - len(samples), len(names))) @ factor.T
+        deviates = correlated(generator.standard_normal((count - len(samples), len(names))), factor)
         columns = [from_deviate(name, uncertainty.numbers[name], deviates[:, i]) for i, name in enumerate(names)]
         rows = np.stack(columns, axis=1)
         samples += [row for row in rows if _is_possible(vehicle_file, dict(zip(names, row.tolist(), strict=True)))]
@@ -65,12 +66,6 @@ def from_deviate(name: str, number: UncertainNumber, deviate: Float[np.ndarray, 
         return number.value * np.exp(log_deviation(number) * deviate)
     values = number.value + number.deviation * deviate
     return np.maximum(values, 0.0) if sign_of(name) == NOT_NEGATIVE else values
-
-
-def square_root(correlation: Float[np.ndarray, "P P"]) -> Float[np.ndarray, "P P"]:
-    """F with F F' = correlation, which may be singular."""
-    eigenvalues, vectors = np.linalg.eigh(correlation)
-    return vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
 
 
 def _is_possible(vehicle_file: VehicleFile, values: Mapping[str, float]) -> bool:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from undertow.core import checks
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.physics.vehicles.published import Hull
+from undertow.scenario.correlation import correlation_matrix, lower_triangle
 from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
 from undertow.scenario.values import checked
 from undertow.scenario.vehicle_parameters import (
@@ -26,7 +27,6 @@ SECTION = "uncertainty"
 _KEYS = ("parameters", "deviations", "correlation", "values")
 _TEXTS = ("name", "source", "inertia_about", SECTION, "identified")
 _AGREED = 1e-6  # relative, between a deviation beside its number and in the section
-_SINGULAR = 1e-9  # eigenvalue of a correlation matrix, per row, that counts as zero
 
 
 class VehicleUncertainty(NamedTuple):
@@ -50,7 +50,7 @@ class VehicleUncertainty(NamedTuple):
         if outside:
             section["values"] = outside
         if np.any(self.correlation != np.eye(len(names))):
-            section["correlation"] = [self.correlation[i, : i + 1].tolist() for i in range(len(names))]
+            section["correlation"] = lower_triangle(self.correlation)
         return section
 
 
@@ -113,7 +113,9 @@ def uncertainty_of(
         numbers[name] = UncertainNumber(value, deviation)
     correlation = np.eye(len(both))
     if section is not None and "correlation" in section:
-        correlation[: len(in_section), : len(in_section)] = _correlation(section["correlation"], len(in_section))
+        correlation[: len(in_section), : len(in_section)] = correlation_matrix(
+            f"{SECTION}.correlation", section["correlation"], len(in_section)
+        )
     return VehicleUncertainty(numbers, correlation)
 
 
@@ -167,25 +169,3 @@ def _values_in(section: Any) -> dict[str, float]:
         checked(location, value, float, 0.0)
         checks.not_negative(location, value)
     return {name: float(value) for name, value in values.items()}
-
-
-def _correlation(rows: Any, size: int) -> Float[np.ndarray, "P P"]:
-    """A correlation matrix from its lower triangle, checked."""
-    location = f"{SECTION}.correlation"
-    is_triangle = isinstance(rows, list) and [len(row) if isinstance(row, list) else 0 for row in rows] == [
-        *range(1, size + 1)
-    ]
-    if not is_triangle:
-        raise BadInput(location, f"be {size} rows of 1 to {size} numbers: the lower triangle, with ones at the ends")
-    matrix = np.zeros((size, size))
-    for i, row in enumerate(rows):
-        matrix[i, : i + 1] = checked(f"{location}[{i}]", row, None, 0.0)
-        if row[-1] != 1:
-            raise BadInput(f"{location}[{i}]", "end with 1", row[-1])
-        if np.abs(matrix[i]).max() > 1:
-            raise BadInput(f"{location}[{i}]", "hold numbers from -1 to 1", row)
-    matrix = matrix + np.tril(matrix, -1).T
-    least = float(np.linalg.eigvalsh(matrix).min())
-    if least < -_SINGULAR * size:
-        raise BadInput(location, "be positive definite", f"of least eigenvalue {least:.3g}")
-    return matrix

@@ -4,6 +4,7 @@ The text is composed from the parser's events, so that a file that is too large 
 aliases, a few lines can stand for billions of entries.
 """
 
+import functools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -26,6 +27,7 @@ from undertow.scenario.yaml_mistakes import mistake_of
 Path_ = tuple[str | int, ...]
 
 _MOST, _DEEPEST = 50_000, 20
+_REMEMBERED = 8  # texts
 _BITS = 1024  # of an integer: larger ones are no floating-point numbers either
 
 _PREFIX = "tag:yaml.org,2002:"
@@ -61,12 +63,18 @@ def load(text: str, name: str, what: str) -> tuple[Any, dict[Path_, int]]:
         BadInput: malformed, tagged, or too large.
     """
     try:
-        tree = _Composer(text).document()
+        tree = _tree(text)
     except Malformed as error:
         where = f"{name}, line {error.line}" if error.line and name else name
         raise BadInput(what, error.must, error.got, where=where, hint=error.hint) from None
     lines: dict[Path_, int] = {}
     return _plain(tree, (), lines), lines
+
+
+@functools.lru_cache(_REMEMBERED)
+def _tree(text: str) -> _Node:
+    """The document of a text, composed once: the trials of a campaign read the same vehicle file."""
+    return _Composer(text).document()
 
 
 def _plain(node: _Node, path: Path_, lines: dict[Path_, int]) -> Any:

@@ -264,7 +264,7 @@ def _possible_wrenches(thruster_matrix, rank: int):
 @kept_program
 def _static(inverse_mass, thruster_matrix, voltage_gain):
     """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""
-    per_volt = thruster_matrix * voltage_gain
+    per_volt = thruster_matrix * (voltage_gain[None, :] if voltage_gain.ndim else voltage_gain)
     return inverse_mass @ per_volt, jnp.linalg.pinv(per_volt)
 
 

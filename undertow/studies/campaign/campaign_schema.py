@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from undertow.core.errors import BadInput
+from undertow.core.errors import BadInput, error_location, nearest
+from undertow.scenario.correlation import correlation_matrix
 from undertow.scenario.json_schema import scenario_schema
-from undertow.scenario.reading import Text, dump, parse, read
+from undertow.scenario.reading import Text, dump, key_path, parse, read
 from undertow.scenario.schema import RunRequirement, Scenario, Strict
 from undertow.scenario.validation import complaint, kind_of
 from undertow.studies.campaign.labels import by_name, words
@@ -18,6 +19,7 @@ from undertow.studies.campaign.labels import by_name, words
 _PATH = re.compile(r"[a-zA-Z_][\w-]*(\.[a-zA-Z_][\w-]*|\[\d+\])*")
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 # Tasks of a campaign, and trials of the smallest and the largest task, unless `chunk` is given.
@@ -33,6 +35,16 @@ class Distribution(Strict):
     log_uniform: Pair | None = Field(None, description="low, high, both positive")
     normal: Pair | None = Field(None, description="mean, standard deviation")
     choice: list[Any] | None = Field(None, min_length=1, description="one of these values, equally likely")
+    log_normal: Pair | None = Field(
+        None, description="median, which is positive, and standard deviation of the logarithm"
+    )
+    cut_normal: Triple | None = Field(
+        None, description="mean, standard deviation, and least value, which replaces smaller ones"
+    )
+    deviations: Literal["file"] | None = Field(
+        None,
+        description="of `plant.vehicle`: all parameters that have a deviation in the vehicle file, with correlations",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -46,15 +58,24 @@ class Distribution(Strict):
     def _one(self) -> "Distribution":
         distribution_names = [name for name in type(self).model_fields if getattr(self, name) is not None]
         if len(distribution_names) != 1:
-            raise ValueError("have one of uniform, log_uniform, normal, choice")
+            raise ValueError(f"have one of {', '.join(type(self).model_fields)}")
         pair = getattr(self, distribution_names[0])
         if distribution_names[0] in ("uniform", "log_uniform") and not pair[0] < pair[1]:
             raise ValueError("have low below high")
         if distribution_names[0] == "log_uniform" and not pair[0] > 0:
             raise ValueError("have positive bounds")
-        if distribution_names[0] == "normal" and not pair[1] >= 0:
+        if distribution_names[0] == "log_normal" and not pair[0] > 0:
+            raise ValueError("have a positive median")
+        if distribution_names[0] in ("normal", "log_normal", "cut_normal") and not pair[1] >= 0:
             raise ValueError("have a standard deviation that is not negative")
         return self
+
+
+class Correlation(Strict):
+    """How keys of `vary` go together: the correlation of the normal numbers that their distributions are made of."""
+
+    keys: list[str] = Field(min_length=2, description="key paths of `vary`")
+    rows: list[list[float]] = Field(description="lower triangle of the matrix, with ones at the ends of its rows")
 
 
 class CampaignRequirement(RunRequirement, title="Requirement"):
@@ -98,6 +119,7 @@ class Campaign(Strict):
     vary: dict[str, Distribution] = Field(
         default_factory=dict, description="Monte Carlo: key path of the scenario -> its distribution"
     )
+    correlation: Correlation | None = Field(None, description="correlation of keys of `vary`; independent by default")
     cross: dict[str, dict[str, Any]] = Field(
         default_factory=dict,
         description="sweep: key path -> values, as a list or by name; all combinations run the same samples and seeds",
@@ -166,6 +188,7 @@ class Campaign(Strict):
 # Keys of the sections that a campaign has several times, or not at all by default.
 SECTIONS = {
     "each distribution in `vary`": Distribution,
+    "`correlation`": Correlation,
     "each requirement": CampaignRequirement,
     "`series`": RecordedSignals,
 }
@@ -205,6 +228,8 @@ def validate(text: Text) -> Campaign:
     varied_keys = [key for _, key in pairs]
     for section, key in pairs:
         _check_key(section, key, varied_keys, text.where((section, key)))
+    if campaign.correlation is not None:
+        _check_correlation(campaign.correlation, campaign.vary, text)
     if campaign.variants and VARIANT in campaign.cross:
         raise BadInput(f"cross.{VARIANT}", "be left out beside `variants`", where=text.where(("cross", VARIANT)))
     for name, variant in campaign.variants.items():
@@ -232,6 +257,17 @@ def _check_key(section: str, key: str, varied_keys: list[str], where: str) -> No
     for other_key in varied_keys:
         if other_key.startswith((f"{key}.", f"{key}[")):
             raise BadInput(other_key, f"not be given together with {key}, which contains it", where=where)
+
+
+def _check_correlation(correlation: Correlation, vary: dict[str, Distribution], text: Text) -> None:
+    """Keys and matrix of a correlation."""
+    with error_location("correlation", lambda name: text.where(("correlation", *key_path(name)))):
+        for i, key in enumerate(correlation.keys):
+            if key not in vary or key in correlation.keys[:i]:
+                raise BadInput(f"keys[{i}]", "be a key of `vary`, named once", key, hint=nearest(key, vary))
+            if vary[key].choice is not None or vary[key].deviations is not None:
+                raise BadInput(f"keys[{i}]", "have numbers in order: not a choice", key)
+        correlation_matrix("rows", correlation.rows, len(correlation.keys))
 
 
 def _check_entries(key: str, entries: dict[str, Any], where: str) -> None:

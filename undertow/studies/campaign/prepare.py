@@ -51,6 +51,7 @@ def prepare_campaign(campaign: Campaign, source: Text, allow_code: bool = False)
         BadInput: anything wrong with the campaign or its scenario; none of the first trials can be built.
     """
     campaign_trials = trials(campaign, source, allow_code)
+    campaign = campaign_trials.campaign  # with the deviations of a vehicle file
     check_kind(campaign_trials.scenario, "scenario", source.where(("scenario",)))
     text = whole(campaign, campaign_trials.scenario.data)
     folder = campaign_trials.scenario.folder

@@ -1,14 +1,16 @@
 """Samples of a campaign: points of the unit cube, their seeds, and the parameter values they stand for."""
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt32
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from undertow.core.errors import BadInput
+from undertow.scenario.correlation import correlated, correlation_matrix, square_root
 from undertow.studies.campaign.campaign_schema import Campaign, Distribution
 
 # Streams of random numbers from one seed.
@@ -40,10 +42,18 @@ class Samples:
         self._block = campaign.trials if campaign.design == "latin" else _BLOCK
         self._points = functools.lru_cache(_KEPT)(self._make_points)
         self._seeds = functools.lru_cache(_KEPT)(self._make_seeds)
+        self._correlated, self._factor = [], np.zeros((0, 0))
+        if campaign.correlation is not None:
+            keys, rows = campaign.correlation.keys, campaign.correlation.rows
+            self._correlated = [list(campaign.vary).index(key) for key in keys]
+            self._factor = square_root(correlation_matrix("correlation.rows", rows, len(keys)))
 
     def points(self, samples: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n k"]:
         """Points of samples, in [0, 1), in the order of `vary`."""
-        return _entries(self._points, self._block, samples)
+        points = _entries(self._points, self._block, samples)
+        if self._correlated:
+            points[:, self._correlated] = ndtr(correlated(_normal(points[:, self._correlated]), self._factor))
+        return points
 
     def seeds(self, samples: Int[np.ndarray, " n"]) -> UInt32[np.ndarray, " n"]:
         """Seeds of all random numbers of samples."""
@@ -91,6 +101,17 @@ def quantiles(spread: Distribution, shares: Float[np.ndarray, " n"]) -> list[Any
         return [low * (high / low) ** share for share in shares.tolist()]
     if spread.normal is not None:
         mean, deviation = spread.normal
-        return (mean + deviation * ndtri(np.clip(shares, _EDGE, 1 - _EDGE))).tolist()
+        return (mean + deviation * _normal(shares)).tolist()
+    if spread.log_normal is not None:
+        median, deviation = spread.log_normal
+        return [median * math.exp(deviation * number) for number in _normal(shares).tolist()]
+    if spread.cut_normal is not None:
+        mean, deviation, least = spread.cut_normal
+        return np.maximum(mean + deviation * _normal(shares), least).tolist()
     choices = spread.choice or []
     return [choices[min(int(share * len(choices)), len(choices) - 1)] for share in shares.tolist()]
+
+
+def _normal(shares: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Quantiles of the standard normal distribution."""
+    return ndtri(np.clip(shares, _EDGE, 1 - _EDGE))

@@ -13,6 +13,7 @@ from undertow.studies.campaign.campaign_schema import VARIANT, Campaign
 from undertow.studies.campaign.labels import is_number, words
 from undertow.studies.campaign.sampling import Samples, quantiles
 from undertow.studies.campaign.varied_scenario import nominal_model_sentence, varied_scenario
+from undertow.studies.campaign.vehicle_deviations import with_vehicle_deviations
 
 # Trials of each combination that are built first, to find errors and the numbers that differ.
 _PROBES = 4
@@ -109,7 +110,10 @@ def trials(campaign: Campaign, text: Text, allow_code: bool = False) -> Trials:
     if campaign.number >= 2**31:
         raise BadInput("trials", "be less than 2^31 with all combinations of `cross`", campaign.number)
     combinations = tuple(itertools.product(*(entries.values() for entries in campaign.axes.values())))
-    return Trials(campaign, text, _scenario(campaign, text, allow_code), Samples(campaign), combinations)
+    scenario = _scenario(campaign, text, allow_code)
+    with error_location(location=text.location):
+        campaign = with_vehicle_deviations(campaign, scenario)
+    return Trials(campaign, text, scenario, Samples(campaign), combinations)
 
 
 def _scenario(campaign: Campaign, text: Text, allow_code: bool) -> Text:
