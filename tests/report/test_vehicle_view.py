@@ -1,4 +1,4 @@
-"""A vehicle in a notebook: what its numbers mean, and a drawing whose marks are where the thrusters are."""
+"""A vehicle in a notebook: what its numbers mean, and a picture whose marks are where the thrusters are."""
 
 import re
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import undertow as ut
-from undertow.report.vehicle_drawing import vehicle_drawing
+from undertow.report.vehicle_picture import vehicle_picture
 
 DOT = re.compile(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="3" [^>]*/><polyline points="([^"]+)"')
 RING = re.compile(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="7" ')
@@ -26,7 +26,7 @@ def test_marks_are_where_the_thrusters_are():
     """From above, bow to the right and starboard below; the four horizontal thrusters are arrows, the others rings."""
     vehicle = ut.vehicles.bluerov2_heavy()
     positions, directions = (np.asarray(each) for each in (vehicle.thruster_positions, vehicle.thruster_directions))
-    found, rings = arrows(str(vehicle_drawing(vehicle)))
+    found, rings = arrows(str(vehicle_picture(vehicle)))
     above, beside = found[:4], found[4:]
     assert len(beside) == 4 and len(rings) == 4, "from starboard, each two cover each other"
     starts = np.array([start for start, _ in above] + rings)
@@ -42,14 +42,14 @@ def test_marks_are_where_the_thrusters_are():
 def test_every_thruster_is_named_in_both_views():
     for make in (ut.vehicles.odin, ut.vehicles.bluerov2, ut.vehicles.rexrov, ut.vehicles.lauv):
         vehicle = make()
-        names = [name for names in NAMED.findall(str(vehicle_drawing(vehicle))) for name in names.split(", ")]
+        names = [name for names in NAMED.findall(str(vehicle_picture(vehicle))) for name in names.split(", ")]
         assert sorted(names) == sorted(2 * [f"T{number + 1}" for number in range(vehicle.thrusters)])
 
 
 def test_thrust_to_and_from_the_eye():
     """Four vertical thrusters push down in one published layout: a cross from above; up in the other: a dot."""
     markup = {
-        layout: str(vehicle_drawing(ut.vehicles.bluerov2_heavy(layout=layout)))
+        layout: str(vehicle_picture(ut.vehicles.bluerov2_heavy(layout=layout)))
         for layout in ("vonbenzon2022", "ardusub_gazebo")
     }
     assert markup["vonbenzon2022"].count('r="2"') == 4 and markup["ardusub_gazebo"].count('r="2"') == 0

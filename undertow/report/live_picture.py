@@ -10,7 +10,7 @@ import numpy as np
 
 from undertow.report.page import Html
 from undertow.report.plotted import ERRORS, FLOORS, LEAST_PATH, Shown
-from undertow.report.svg import BLUE, GREY, RED, drawing, polyline, words
+from undertow.report.svg import BLUE, GREY, RED, picture, polyline, words
 from undertow.scenario.results.run_result import RunRecord
 
 _WIDTH, _HEIGHT = 960, 380
@@ -53,7 +53,7 @@ def live_picture(run: RunRecord, shown: Shown) -> Html:
     for row, curve in enumerate(curves):
         parts += _over_time(values["time"], *curve, top=_GAP + row * (height + _GAP), height=height)
     parts.append(words(_PATH + _LEFT, _HEIGHT - 6, f"time, 0 to {values['time'][-1]:g} s"))
-    return drawing(_WIDTH, _HEIGHT, *parts)
+    return picture(_WIDTH, _HEIGHT, *parts)
 
 
 def _errors(error: np.ndarray, units: Sequence[str], shown: Shown) -> list[tuple[str, np.ndarray, float | None, float]]:

@@ -1,4 +1,4 @@
-"""Small drawings as SVG elements, made in a few milliseconds without Matplotlib."""
+"""Small pictures as SVG elements, made in a few milliseconds without Matplotlib."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from undertow.report.page import Html, tag, text
 BLUE, GREY, RED = "#1f6f9f", "#9a9a9a", "#b3402a"
 
 
-def drawing(width: float, height: float, *parts: Html) -> Html:
+def picture(width: float, height: float, *parts: Html) -> Html:
     """An SVG element of that size in pixels, which shrinks with the page."""
     look = f"width:100%;max-width:{width / 16:g}em;background:#fff"
     return tag("svg", *parts, viewBox=f"0 0 {width:g} {height:g}", style=look)

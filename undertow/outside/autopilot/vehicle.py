@@ -27,7 +27,7 @@ from undertow.report.answers.check_answer import counted
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.answers.vehicle_answer import vehicle_lines
-from undertow.report.vehicle_view import answer_with_drawing
+from undertow.report.vehicle_view import answer_with_picture
 from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time, text_of
 from undertow.scenario.reading import Text
@@ -264,7 +264,7 @@ class Vehicle(Uncopied):
             return in_notebook(self._title or type(self.plant).__name__, PlainAnswer(good, verdict, (inputs,)))
         vehicle = self.plant.vehicle
         lines = (inputs, *vehicle_lines(facts_of(vehicle)))
-        return answer_with_drawing(self._title or vehicle.name, PlainAnswer(good, verdict, lines), vehicle)
+        return answer_with_picture(self._title or vehicle.name, PlainAnswer(good, verdict, lines), vehicle)
 
     @property
     def realization(self) -> Realization:

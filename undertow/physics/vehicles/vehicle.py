@@ -95,7 +95,7 @@ class VehicleModel(eqx.Module):
                 raise BadInput(f"thruster_directions[{j}]", "have length 1", f"{norms[j]:.6g} long")
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: what its numbers mean, and a drawing of its thrusters."""
+        """What a notebook shows: what its numbers mean, and a picture of its thrusters."""
         # Pages stand above the physics, which imports none of them: a notebook that asks loads them.
         return importlib.import_module("undertow.report.vehicle_view").vehicle_in_notebook(self)
 

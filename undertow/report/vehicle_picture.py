@@ -9,11 +9,11 @@ from jaxtyping import Float
 from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.report.page import Html
 from undertow.report.replay.replay_data import hull_size
-from undertow.report.svg import BLUE, GREY, drawing, polyline, words
+from undertow.report.svg import BLUE, GREY, picture, polyline, words
 
 _WIDTH, _HEIGHT, _MARGIN, _TOP = 800, 320, 76, 30  # pixels
 _ARROW, _HEAD, _DOT = 36.0, 7.0, 7.0  # pixels: length in full view, its head, and radius of one seen from its end
-_NEAR = 4.0  # pixels between arrows that are drawn as one
+_NEAR = 4.0  # pixels between arrows that are plotted as one
 _SIDEWAYS = 0.4  # component to the side from which on a name stands beside its arrow
 _FACING = 0.9  # component along the line of sight from which on an arrow is seen from its end
 
@@ -32,7 +32,7 @@ class _View(NamedTuple):
 _VIEWS = (_View("from above", 0, 1, 2, 1.0), _View("from starboard", 0, 2, 1, -1.0))
 
 
-def vehicle_drawing(vehicle: VehicleModel) -> Html:
+def vehicle_picture(vehicle: VehicleModel) -> Html:
     """Hull, thrusters and the direction of their positive thrust, in equal scales; the bow is at the right.
 
     Args:
@@ -53,7 +53,7 @@ def vehicle_drawing(vehicle: VehicleModel) -> Html:
         parts += [words(float(middle[0]), 18, f"{view.title}, bow to the right", "middle"), _hull(middle, half)]
         points = middle + scale * (positions - center)[:, axes]
         parts += _thrusters(points, directions, view)
-    return drawing(_WIDTH, _HEIGHT, *parts)
+    return picture(_WIDTH, _HEIGHT, *parts)
 
 
 def _hull(middle: Float[np.ndarray, "2"], half: Float[np.ndarray, "2"]) -> Html:
