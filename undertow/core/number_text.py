@@ -49,6 +49,11 @@ def plain(value: float, digits: int = DIGITS) -> str:
     return with_minus(f"{value:.0f}" if is_integer else f"{value:#.{digits}g}".rstrip("."))
 
 
+def counted(number: int, what: str) -> str:
+    """A number of things, in words: `1 error`, `2 errors`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def with_minus(value: str) -> str:
     """With a typographic minus sign."""
     return value.replace("-", "\u2212")

@@ -13,6 +13,7 @@ import numpy as np
 from undertow.core import checks, runtime
 from undertow.core.checks import numbers
 from undertow.core.contracts import Measurement
+from undertow.core.number_text import counted
 from undertow.core.numerics.integrators import COMPACT_METHODS
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.status import Status
@@ -23,7 +24,6 @@ from undertow.physics.power.esc import ESC
 from undertow.physics.power.esc import esc as usual_esc
 from undertow.physics.sensors.motion import motion_of
 from undertow.physics.vehicles.facts import facts_of
-from undertow.report.answers.check_answer import counted
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.answers.vehicle_answer import vehicle_lines

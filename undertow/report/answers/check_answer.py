@@ -5,6 +5,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from undertow.core.number_text import counted
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.answers.vehicle_answer import vehicle_lines
 from undertow.scenario.checks.check import Report
@@ -36,11 +37,6 @@ def answer_of_check(thing: str, report: Report, options: Mapping[str, Any] | Non
     lines = (*_first(report), *_behaviour(report), *_next(thing, report, options or {}))
     good = False if report.errors else None if advice else True
     return PlainAnswer(good, f"{thing}: {counts}. {_verdict(report)}", lines)
-
-
-def counted(number: int, what: str) -> str:
-    """A number of things."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _verdict(report: Report) -> str:
