@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from undertow.core.errors import BadInput
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.run_answer import answer_of_run
@@ -17,7 +19,7 @@ from undertow.report.run_page import page_contents, shown_of
 from undertow.run import Run, simulate_scenario
 from undertow.scenario.reading import key_path
 from undertow.scenario.results.run_result import ScenarioResult
-from undertow.studies.tuning.problem import gain_in_force
+from undertow.studies.tuning.problem import gains_in_force
 
 try:
     import ipywidgets as widgets
@@ -170,8 +172,14 @@ def _in_force(run: Run, key: str) -> Any:
     if value is None:
         value = _at(built.resolved, path)
     if value is None and path[:1] == ("controller",) and len(path) == 2:
-        value = gain_in_force(built, str(path[1]))
+        gains = gains_in_force(built, str(path[1]))
+        value = None if gains is None else _mean(gains)
     return value.get("kind") if isinstance(value, dict) else value
+
+
+def _mean(gains: np.ndarray) -> float:
+    """Geometric mean over the axes, or that of numbers which are not positive."""
+    return float(np.exp(np.log(gains).mean())) if np.all(gains > 0) else float(gains.mean())
 
 
 def _at(node: Any, path: Sequence[str | int]) -> Any:

@@ -12,7 +12,6 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.control.supervision.supervised_controller import unsupervised
 from undertow.core.arrays import in_present_precision
 from undertow.core.errors import BadInput
 from undertow.core.numerics.random_keys import key_of_seed
@@ -20,6 +19,7 @@ from undertow.scenario.build import Built, build
 from undertow.scenario.changed_values import put_value
 from undertow.scenario.reading import Text
 from undertow.simulation.loop.simd_batch import realized_disturbance
+from undertow.studies.tuning.problem import gains_in_force
 
 NEVER = 1e9  # s, the time of what does not happen
 
@@ -191,9 +191,8 @@ def _gain(built: Built, key: str) -> Any:
     options = built.resolved["controller"]
     if options.get(key) is not None:
         return options[key]
-    law = unsupervised(built.closed_loop.controller)
-    chosen = getattr(getattr(law, "estimator", law), key, None) if key in options else None
-    return None if chosen is None else np.asarray(chosen, dtype=float).tolist()
+    gains = gains_in_force(built, key) if key in options else None
+    return None if gains is None else gains.tolist()
 
 
 def _tables(text: Text, change: _Change, base: list[np.ndarray]) -> dict[int, list[np.ndarray]] | None:

@@ -62,14 +62,16 @@ def is_tunable(built: Built) -> bool:
     return bool(scenario.tune.parameters or _law_of(built.of_the_law()).ranges(scenario.loop.dt))
 
 
-def gain_in_force(built: Built, option: str) -> float | None:
-    """A gain of the controller, also where a rule sets it: geometric mean over the axes; None where it is not known."""
+def gains_in_force(built: Built, option: str) -> np.ndarray | None:
+    """Gains of the controller, also where a rule sets them, one for all axes or one each; None where they are unknown.
+
+    Args:
+        built: scenario.
+        option: of the controller.
+    """
     built = built.of_the_law()
     value_in = _law_of(built).now.get(option)
-    if value_in is None:
-        return None
-    gains = np.asarray(value_in(built.closed_loop.controller), dtype=float)
-    return float(np.exp(np.log(gains).mean())) if np.all(gains > 0) else float(gains.mean())
+    return None if value_in is None else np.asarray(value_in(built.closed_loop.controller), dtype=float)
 
 
 def problem(text: Text) -> Problem:
