@@ -24,6 +24,8 @@ _UNITS |= {"r_b": ("m", "m"), "r_g": ("m", "m"), "command_delay": ("s", "s")}
 
 # Parameters of a vehicle with its thrusters that no key of a vehicle file holds, and their values unless given.
 _OUTSIDE = {"thruster_gain": 1.0, "reverse_gain": 1.0, "lag": 1.0, "command_delay": 0.0}
+# Those of all thrusters together, and the options of the thruster `adjusted` that they are.
+ADJUSTED_OPTIONS = {"thruster_gain": "gain", "reverse_gain": "reverse_gain", "lag": "lag"}
 
 NAMES = (
     "mass",

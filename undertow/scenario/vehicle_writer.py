@@ -14,7 +14,14 @@ from undertow.scenario.factory import INNER
 from undertow.scenario.reading import dump
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.scenario.vehicle_file import read_vehicle
-from undertow.scenario.vehicle_parameters import check_name, default_outside, is_outside, parameter_values, unit_of
+from undertow.scenario.vehicle_parameters import (
+    ADJUSTED_OPTIONS,
+    check_name,
+    default_outside,
+    is_outside,
+    parameter_values,
+    unit_of,
+)
 from undertow.scenario.vehicle_uncertainty import SECTION, VehicleUncertainty
 
 _HEAD = (
@@ -40,8 +47,6 @@ _COMMENTS = {
     SECTION: "standard deviations, and correlations: of a positive number those of its logarithm",
     "identified": "where these numbers come from",
 }
-# Parameters of all thrusters, and the options of `adjusted` that they are.
-_OPTIONS = {"thruster_gain": "gain", "reverse_gain": "reverse_gain", "lag": "lag"}
 
 
 def write_vehicle(
@@ -135,7 +140,7 @@ def plant_section(
             raise BadInput(f"thruster_gain.T{max(of_one)}", f"be of one of {thrusters} thrusters", max(of_one))
         gains = [float(of_one.get(j + 1, 1.0)) for j in range(thrusters)]
         thruster = {"kind": "adjusted", "thruster": thruster, "gain": gains}
-    options = {_OPTIONS[name]: float(values[name]) for name in _OPTIONS if name in values}
+    options = {option: float(values[name]) for name, option in ADJUSTED_OPTIONS.items() if name in values}
     if options or of_one:
         section["thruster"] = {"kind": "adjusted", "thruster": thruster, **options} if options else thruster
     return section

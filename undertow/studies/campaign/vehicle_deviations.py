@@ -13,13 +13,12 @@ from undertow.scenario.correlation import lower_triangle
 from undertow.scenario.reading import Text
 from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
 from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
-from undertow.scenario.vehicle_parameters import NOT_NEGATIVE, POSITIVE, is_outside, sign_of
+from undertow.scenario.vehicle_parameters import ADJUSTED_OPTIONS, NOT_NEGATIVE, POSITIVE, is_outside, sign_of
 from undertow.scenario.vehicle_uncertainty import VehicleUncertainty
 from undertow.studies.campaign.campaign_schema import Campaign, Correlation, Distribution
 
 _VEHICLE, _THRUSTER = "plant.vehicle", "plant.thruster"
 _NAME = f"vary.{_VEHICLE}"
-_OPTIONS = {"thruster_gain": "gain", "reverse_gain": "reverse_gain", "lag": "lag"}  # of `adjusted`
 _DELAY = "command_delay"  # no plant has one
 
 
@@ -84,11 +83,11 @@ def _key(name: str, scenario: Text) -> str:
         return f"{_VEHICLE}.values.{name}"
     outer: Any = scenario.data.get("plant", {}).get("thruster")
     if not isinstance(outer, Mapping) or outer.get("kind") != "adjusted":
-        hint = f"Write `thruster: {{kind: adjusted, thruster: ..., {_OPTIONS.get(name, 'gain')}: ...}}` there"
+        hint = f"Write `thruster: {{kind: adjusted, thruster: ..., {ADJUSTED_OPTIONS.get(name, 'gain')}: ...}}` there"
         must = f"be `adjusted`, because the vehicle file has a deviation of `{name}`"
         raise BadInput(_THRUSTER, must, hint=hint, where=scenario.location(_THRUSTER))
-    if name in _OPTIONS:
-        return f"{_THRUSTER}.{_OPTIONS[name]}"
+    if name in ADJUSTED_OPTIONS:
+        return f"{_THRUSTER}.{ADJUSTED_OPTIONS[name]}"
     inner = outer.get("thruster")
     is_nested = isinstance(inner, Mapping) and inner.get("kind") == "adjusted"
     number = int(name.partition(".T")[2])
