@@ -15,7 +15,7 @@ from undertow.scenario.yaml_text import load
 Path_ = tuple[str | int, ...]
 
 _YAML, _RESULT = (".yaml", ".yml"), ".nc"
-_LOGS = (".mcap", ".csv", ".bin", ".tlog", ".ulg", ".db3")
+_LOGS = (".mcap", ".csv", ".bin", ".tlog", ".ulg", ".bag", ".db3")
 _LISTED = 6  # files of a folder that a message names
 
 
@@ -121,8 +121,9 @@ def no_file(path: Path, what: str, must: str = "be an existing file") -> BadInpu
     if not folder.is_dir():
         return wrong_file(path, what, must, hint=f"The folder {folder} does not exist")
     files = _files_in(folder)
-    listing = f"Files there: {_listed(files)}" if files else "`undertow init` writes a scenario to start from"
-    listing = "" if what else listing
+    listing = ""
+    if not what:
+        listing = f"Files there: {_listed(files)}" if files else "`undertow init` writes a scenario to start from"
     return wrong_file(path, what, must, "" if what else "not", hint=nearest_file(path) or listing)
 
 
