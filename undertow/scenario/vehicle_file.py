@@ -22,9 +22,7 @@ class VehicleFile(NamedTuple):
     """A vehicle file as read, some of its keys perhaps changed."""
 
     data: VehicleData
-    contents: dict[
-        str, Any
-    ]  # plain data from which the same vehicle can be made again, all deviations in `uncertainty`
+    contents: dict[str, Any]  # plain data that make the same vehicle again; all deviations are in `uncertainty`
     text: Text
     changed: frozenset[str]  # keys that are no longer the file's
     uncertainty: VehicleUncertainty | None  # of its numbers; None where the file has no deviations

@@ -1,4 +1,4 @@
-"""Numbers of a vehicle by the names that identification has for them: `added_mass.surge`, `net_buoyancy`."""
+"""Numbers of a vehicle by name: `added_mass.surge`, `net_buoyancy`."""
 
 import re
 from collections.abc import Mapping

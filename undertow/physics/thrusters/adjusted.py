@@ -178,8 +178,7 @@ def adjusted(thruster: AbstractThruster, gain=1.0, reverse_gain=1.0, lag: float 
     """Another thruster as installed on a vehicle: its thrust times a gain, its time constants times a factor.
 
     Thrust on a vehicle differs from that on a test bench: the hull takes a part of it (thrust deduction), and so does
-    the wash of other propellers. `undertow identify` estimates these numbers from logs. Current, power and limits are
-    those of the other thruster. Laws know gains and lag.
+    the wash of other propellers. Current, power and limits are those of the other thruster. Laws know gains and lag.
 
     Args:
         thruster: the other one.
