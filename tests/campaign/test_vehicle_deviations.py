@@ -68,6 +68,7 @@ def files(tmp_path):
     return write
 
 
+@pytest.mark.full
 def test_every_parameter_has_its_distribution(files):
     campaign_trials = trials(*read_campaign(files(trials=4000)))
     campaign = campaign_trials.campaign

@@ -189,6 +189,7 @@ def test_deviations_in_two_places_agree(rov):
     )
 
 
+@pytest.mark.full
 def test_samples_have_the_distribution(rov):
     """Medians, deviations and correlations of 4,000 vehicles, positive numbers by their logarithms."""
     count = 4_000

@@ -17,8 +17,8 @@ from undertow.core.param import tuning_ranges
 
 # Their programs take longest to compile, and tests of their own check what they compute.
 HEAVY = {("navigation", "kalman"), ("supervision", "supervisor"), ("controllers", "nmpc")}
-# Laws have closed forms of their own in the quick set; their programs take longer than all others.
-IN_THE_FULL_SET = ("controllers", "navigation")
+# Laws and faults have closed forms of their own in the quick set; their programs take longer than all others.
+IN_THE_FULL_SET = ("controllers", "navigation", "faults")
 
 
 def values_of(pairs):

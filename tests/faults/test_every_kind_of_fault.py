@@ -229,6 +229,7 @@ def controlled(law, readings):
     return jax.lax.scan(step, law.init(row(0, readings), r), readings)[1]
 
 
+@pytest.mark.full
 @kinds_of("computation")
 def test_computation(kind):
     ks = np.arange(float(STEPS))[:, None]

@@ -91,21 +91,22 @@ def test_a_continuous_loop_has_no_faults():
         built(OFF, controller="paper", loop={"kind": "continuous", "duration": 1.0})
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("written", "target", "number"),
     [
         ({"target": "thruster 3"}, "thruster", 3),
-        pytest.param({"target": "Thruster_3"}, "thruster", 3, marks=pytest.mark.full),
-        pytest.param({"target": "thruster3"}, "thruster", 3, marks=pytest.mark.full),
+        ({"target": "Thruster_3"}, "thruster", 3),
+        ({"target": "thruster3"}, "thruster", 3),
         ({"target": "thruster", "number": 3}, "thruster", 3),
-        pytest.param({"target": "T3"}, "thruster", 3, marks=pytest.mark.full),
-        pytest.param({"target": "thruster", "number": "random"}, "thruster", "random", marks=pytest.mark.full),
-        pytest.param({"target": "dvl"}, "sensor dvl", None, marks=pytest.mark.full),
-        pytest.param({"target": "sensor dvl"}, "sensor dvl", None, marks=pytest.mark.full),
-        pytest.param({"target": "sensor_dvl"}, "sensor dvl", None, marks=pytest.mark.full),
-        pytest.param({"target": "sensor depth"}, "sensor depth", None, marks=pytest.mark.full),
+        ({"target": "T3"}, "thruster", 3),
+        ({"target": "thruster", "number": "random"}, "thruster", "random"),
+        ({"target": "dvl"}, "sensor dvl", None),
+        ({"target": "sensor dvl"}, "sensor dvl", None),
+        ({"target": "sensor_dvl"}, "sensor dvl", None),
+        ({"target": "sensor depth"}, "sensor depth", None),
         ({"target": "depth"}, "depth", None),
-        pytest.param({"target": "power"}, "bus", None, marks=pytest.mark.full),
+        ({"target": "power"}, "bus", None),
     ],
     ids=str,
 )
@@ -251,6 +252,7 @@ def test_list_is_machine_readable(capsys):
     assert f"{len(listed)} kinds" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_random_faults_follow_from_their_generator():
     loop = built(**KALMAN).closed_loop
     made = lambda seed: random_faults(np.random.default_rng(seed), loop.plant, loop.navigation, 10.0, 60)

@@ -92,6 +92,7 @@ def test_a_controller_that_overruns_holds_its_input():
     assert held.tolist() == [place % 3 != 2 for place in range(14)]
 
 
+@pytest.mark.full
 def test_a_random_thruster_with_random_onset_and_severity():
     """Different for every seed, and different thrusters within one run."""
     entry = {"target": "thruster", "number": "random", "mode": "scale", "severity": [0.1, 0.9], "onset": [2.0, 4.0]}

@@ -24,6 +24,7 @@ def compiled(request):
     return request.param(PENDULUM)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, pickle.dumps])
 def test_copying_is_refused_with_the_remedy(compiled, how):
     with pytest.raises(BadInput, match="must not be copied"):

@@ -83,6 +83,7 @@ def disk(monkeypatch):
         file.answers.set()
 
 
+@pytest.mark.full
 def test_a_disk_that_blocks_holds_up_no_step(tmp_path, disk):
     """Commands go on, and are those without a log; this thread never writes. Then the disk answers: all is there."""
     autopilot, silent, at = ut.Autopilot(AXIS, log=tmp_path / "a.mcap"), ut.Autopilot(AXIS), (np.ones(1), np.zeros(1))

@@ -182,6 +182,7 @@ def ros2_of_chunks(several):
     return magic + head + first + chunks + end
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("declared", [2**28, 100])
 def test_no_chunk_unpacks_freely(tmp_path, declared):
     """Nor one after the first channel, whether it admits its size or not; nor many that are small each."""

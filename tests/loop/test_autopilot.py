@@ -319,6 +319,7 @@ def test_what_an_autopilot_cannot_be_made_of():
         pendulum.start([0.0], [0.0], propellers=[1.0])
 
 
+@pytest.mark.full
 def test_gains_are_those_of_the_sampling_time():
     slow = PENDULUM | {"loop": {"duration": 1.0, "dt": 0.02, "record": 0.02}}
     given, of_scenario = ut.Autopilot(PENDULUM, sampling_time=0.02), ut.Autopilot(slow)

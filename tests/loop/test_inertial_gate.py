@@ -199,6 +199,7 @@ def test_most_sensors_are_right_against_the_filter():
     assert signals["rejected_readings"][-1] < 40
 
 
+@pytest.mark.full
 def test_one_sensor_alone_opens_no_gate_of_another():
     """Half a second of an inclination that is wrong by 0.5 rad, without a word of the gyroscopes."""
     speed, angle, _, signals = followed("kalman", glitch(0, 0.5, 50))

@@ -157,6 +157,7 @@ def test_the_covariance_spreads_as_the_matrix_exponential_says():
     np.testing.assert_array_equal(found, found.T)
 
 
+@pytest.mark.full
 def test_a_correction_is_that_of_the_textbook():
     """Entry by entry it gives what K = P H' (H P H' + R)^-1 gives for the whole reading."""
     own, quiet = kalman(ALL).filter, nothing(ALL)
@@ -231,6 +232,7 @@ def test_late_readings_count_as_much_as_their_age_says():
     assert np.abs(position).max() < 0.1  # the body moves 0.35 m in that second
 
 
+@pytest.mark.full
 def test_an_outlier_is_rejected_and_a_lasting_jump_is_believed_in_the_end():
     own = kalman(ALL).filter
     state = started(own, *LEVEL)

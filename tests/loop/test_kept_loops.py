@@ -69,6 +69,7 @@ def loops(folder):
 OTHER_NUMBERS = changed(controller={"frequency": 2.3}, plant={"limit": 15.0})
 
 
+@pytest.mark.full
 def test_a_later_process_finds_it_for_other_numbers(folder, later, monkeypatch):
     expected = position(simulate_scenario(OTHER_NUMBERS))
     monkeypatch.setattr(simd_batch, "_LOOPS", {})
@@ -80,6 +81,7 @@ def test_a_later_process_finds_it_for_other_numbers(folder, later, monkeypatch):
     np.testing.assert_array_equal(position(simulate_scenario(OTHER_NUMBERS)), expected)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "values",
     [
@@ -113,6 +115,7 @@ def test_other_sources_are_another_loop(folder, monkeypatch):
     assert len(loops(folder)) == 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("damage", ["cut off", "one bit", "empty", "of no use"])
 def test_a_damaged_entry_is_made_again(folder, monkeypatch, damage):
     expected = position(simulate_scenario(SCENARIO))
@@ -167,6 +170,7 @@ def test_again_says_what_is_wrong():
     assert isinstance(run.loop.plant, type(double_integrator()))
 
 
+@pytest.mark.full
 def test_steps_of_an_autopilot_are_found_by_a_later_process(folder, monkeypatch):
     """For other gains, without tracing."""
 

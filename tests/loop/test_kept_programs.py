@@ -152,6 +152,7 @@ def test_functions_of_others_are_compiled_and_not_kept(folder):
     assert not entries(folder)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("function", [pseudo_inverse, inverse])
 def test_programs_that_call_lapack_run_where_nothing_has_called_it(folder, function):
     """In a process of its own: JAX puts LAPACK in place when it lowers such a call, and a kept program lowers nothing."""

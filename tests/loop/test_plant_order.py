@@ -113,6 +113,7 @@ def swimming():
     return loop, np.full(6, 0.8)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "make", [swinging, *(pytest.param(make, marks=pytest.mark.slow) for make in (reaching, balancing, swimming))]
 )

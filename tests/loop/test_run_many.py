@@ -40,6 +40,7 @@ def assert_same(outcome, expected):
     jax.tree.map(np.testing.assert_array_equal, outcome, expected)
 
 
+@pytest.mark.full
 def test_mixed_runs_have_the_bits_of_each_alone_and_their_places():
     """Two structures, two lengths, several gains and seeds; in one thread, and in pieces of two in two threads."""
     other = {"plant": {"kind": "double_integrator", "axes": 2}, "reference": {"kind": "setpoint", "position": [1, 2]}}
@@ -81,6 +82,7 @@ def test_a_cache_without_probes_takes_no_constant_of_an_earlier_call():
             assert_same(outcome, alone(runs[place]))
 
 
+@pytest.mark.full
 def test_runs_given_as_arrays():
     """A batch whose first run is unlike the rest: only the arrays count."""
     runs = [prepared(2.0, seed) for seed in (1, 2, 3)]

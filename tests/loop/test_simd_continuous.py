@@ -45,6 +45,7 @@ def under(load):
     )
 
 
+@pytest.mark.full
 def test_figures_of_both_compilers_agree():
     loop = under(sinusoid(np.array([2.0, 1.0]), np.array([1.0, 5.0])))
     start = {"position": np.array([0.1, -0.1]), "velocity": np.array([0.0, 0.5])}

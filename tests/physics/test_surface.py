@@ -152,6 +152,7 @@ def test_energy_is_kept_at_the_surface():
     assert dry.min() < 0.01 and dry.max() > 0.8  # it went through the surface
 
 
+@pytest.mark.full
 def test_elevation_belongs_to_the_motion_of_the_water():
     """The surface moves with the water at it: the rate of the elevation is the upward velocity there."""
     sea = waves(height=1.0, depth=2.0, spreading=0.3)
@@ -187,6 +188,7 @@ def test_it_rides_on_long_waves():
     assert np.std(height - elevation) < 0.3 * np.std(elevation)
 
 
+@pytest.mark.full
 def test_depths_that_are_stated():
     """The first counts, elevations add, and a disturbance under a surface stays what it is."""
     sea = waves(depth=3.0)

@@ -53,6 +53,7 @@ def received(vehicle, seconds):
     return found
 
 
+@pytest.mark.full
 def test_it_is_silent_while_there_are_signs_of_life(vehicle):
     process = controller(vehicle, "control")
     try:
@@ -62,12 +63,15 @@ def test_it_is_silent_while_there_are_signs_of_life(vehicle):
         process.wait()
 
 
+@pytest.mark.full
 def test_it_is_silent_after_a_controller_that_is_done(vehicle):
     assert controller(vehicle, "done").wait(20) == 0
     assert received(vehicle, 0.5) == []
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
+@pytest.mark.parametrize(
+    "how", [signal.SIGKILL, *(pytest.param(one, marks=pytest.mark.full) for one in (signal.SIGTERM, signal.SIGSEGV))]
+)
 def test_it_stops_the_vehicle_of_a_controller_that_is_gone(vehicle, how):
     process = controller(vehicle, "control")
     os.kill(process.pid, how)

@@ -196,6 +196,7 @@ def test_noise_has_its_size_and_a_law_is_told_of_it():
     assert float(slow.velocity_noise(1e-3)) == pytest.approx(0.1)
 
 
+@pytest.mark.full
 def test_as_many_thrusters_fail_as_there_are_entries():
     entry = {"target": "thruster", "number": "random", "mode": "fraction", "severity": 0.25, "onset": 2.0}
     odin = {"kind": "hybrid_vehicle", "vehicle": "odin"}

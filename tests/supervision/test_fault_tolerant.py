@@ -115,6 +115,7 @@ def test_an_announced_failure_acts_at_once_and_ends_with_the_announcement():
     assert not healthy["lost_thrusters"].any()
 
 
+@pytest.mark.full
 def test_a_restarted_law_knows_what_is_lost():
     _, z, y, _ = stepped()
     again, first = restarted(knowing(z, [2]), y)

@@ -92,6 +92,7 @@ def each_lost(begin, factors):
     return jax.vmap(lambda factor: followed(*begin, WARM, 50, CHANGING, factor, NONE)[0].lost)(factors)
 
 
+@pytest.mark.full
 def test_the_residual_is_the_unexplained_acceleration_behind_two_low_passes():
     load, steps = np.array([0.2, -0.1, 0.3, 0.05, -0.4, 0.1]), 12
     state, _ = followed(*start(), 0, steps, np.stack([np.zeros(8), np.full(8, 3.0)]), np.ones(8), load)
@@ -129,6 +130,7 @@ def test_two_thrusters_that_are_off_at_once_are_both_found():
     assert found.sum() >= 24  # the others accelerate the vehicle as another pair does
 
 
+@pytest.mark.full
 def test_two_thrusters_that_fail_together_are_both_found():
     fails = np.isin(np.arange(8), (0, 5))
     state, _ = later(healthy(), 50, ~fails)

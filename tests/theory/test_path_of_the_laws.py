@@ -77,6 +77,7 @@ def paths():
     return jax.tree.map(np.asarray, step(jax.tree.map(jnp.asarray, states)))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", PATHS)
 def test_a_demand_beyond_the_limits(paths, name):
     """Forces by the inverse of the model, allocated; what limits took away returns to the integral."""
@@ -141,6 +142,7 @@ def regulator_of_scipy(w, h):
     return np.linalg.solve(h * np.eye(1) + b.T @ p @ b, b.T @ p @ a)[0]
 
 
+@pytest.mark.full
 def test_one_step_of_nmpc():
     """A plan in use, none yet, and one that is not finite; far from limits the new plan is that of the regulator."""
     model = linear_plant(G, limit=40.0).model()
