@@ -1,0 +1,1 @@
+"""Identification: the numbers of a vehicle from its logs, and how sure they are."""

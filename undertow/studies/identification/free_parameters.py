@@ -1,0 +1,194 @@
+"""The numbers of a vehicle that logs may determine: names, units, and what is thought of them beforehand.
+
+A parameter is estimated as a number z of which a value is made: value = prior exp(deviation z) where it must be positive
+and is compared by ratios, and value = prior + deviation z elsewhere. Beforehand z has mean 0 and variance 1, so that the
+information of the data is compared with what was known before in every parameter alike.
+"""
+
+import fnmatch
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.core.errors import BadInput, nearest
+from undertow.core.measurement import BODY_AXES
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+
+_MASS_UNITS = ("kg", "kg", "kg", "kg m^2", "kg m^2", "kg m^2")
+_LINEAR_UNITS = ("N s/m", "N s/m", "N s/m", "N m s", "N m s", "N m s")
+_QUADRATIC_UNITS = ("N s^2/m^2", "N s^2/m^2", "N s^2/m^2", "N m s^2", "N m s^2", "N m s^2")
+_GAIN_UNITS = ("N", "N", "N", "N m", "N m", "N m")  # per unit of the input of an axis
+
+# What is thought of numbers of a vehicle file that has no deviations: a share of the value.
+_SHARES = {"mass": 0.03, "inertia": 0.3, "added_mass": 0.5, "thruster_gain": 0.15, "reverse_gain": 0.15, "lag": 0.5}
+_TYPICAL_SPEED = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # m/s, rad/s; at which both kinds of damping are alike
+_DAMPING_SHARE = 1.0  # of the damping at that speed
+_ARM = 0.03  # m, of the centre of buoyancy
+_NET_WEIGHT = 0.02  # of the weight
+
+
+class FreeParameter(NamedTuple):
+    """A number that is estimated.
+
+    Attributes:
+        name: `quadratic_damping.surge`.
+        unit: of its value.
+        prior: value beforehand.
+        deviation: standard deviation beforehand: of the logarithm where `is_ratio`, else in the unit.
+        is_ratio: whether it must be positive and is compared by ratios.
+        least: smallest value; -infinity where any is possible.
+    """
+
+    name: str
+    unit: str
+    prior: float
+    deviation: float
+    is_ratio: bool = False
+    least: float = -math.inf
+
+    def value(self, z):
+        """Value of a number of prior variance 1; arrays go through."""
+        if self.is_ratio:
+            return self.prior * np.exp(self.deviation * z)
+        return self.prior + self.deviation * z
+
+    @property
+    def least_z(self) -> float:
+        """The number that belongs to the smallest value."""
+        return -math.inf if self.is_ratio else (self.least - self.prior) / self.deviation
+
+
+def parameters_of(plant: HybridVehicle) -> dict[str, FreeParameter]:
+    """All numbers of a vehicle that can be free, by name, with the deviations that are usual.
+
+    Args:
+        plant: vehicle with thrusters, whose values are the prior ones.
+    """
+    vehicle = plant.vehicle
+    numbers = [_ratio("mass", "kg", vehicle.mass)]
+    numbers += _diagonal("inertia", ("roll", "pitch", "yaw"), ("kg m^2",) * 3, vehicle.inertia)
+    numbers += _diagonal("added_mass", BODY_AXES, _MASS_UNITS, vehicle.added_mass)
+    numbers += _damping(vehicle)
+    numbers += [
+        FreeParameter(
+            "net_buoyancy", "N", float(vehicle.buoyancy - vehicle.weight), _NET_WEIGHT * float(vehicle.weight)
+        )
+    ]
+    numbers += [FreeParameter(f"r_b.{axis}", "m", float(vehicle.r_b[i]), _ARM) for i, axis in enumerate("xyz")]
+    numbers += [_ratio("thruster_gain", "", 1.0)]
+    numbers += [_ratio(f"thruster_gain.T{j + 1}", "", 1.0) for j in range(plant.inputs())]
+    numbers += [_ratio("reverse_gain", "", 1.0), _ratio("lag", "", 1.0)]
+    numbers += [FreeParameter("command_delay", "s", 0.0, 0.1, least=0.0)]
+    return {number.name: number for number in numbers}
+
+
+def axis_parameters(prior_gain: float = 50.0, lag: float = 0.15) -> dict[str, FreeParameter]:
+    """Gains and lags of inputs that push along the axes, where it is not known how they reach the thrusters.
+
+    Args:
+        prior_gain: force or moment per unit of input beforehand, N and N m; within a factor of e or so.
+        lag: of the force, s.
+    """
+    gains = [
+        FreeParameter(f"axis_gain.{axis}", unit, prior_gain * (1.0 if i < 3 else 0.2), 1.0, is_ratio=True)
+        for i, (axis, unit) in enumerate(zip(BODY_AXES, _GAIN_UNITS, strict=True))
+    ]
+    lags = [FreeParameter(f"axis_lag.{axis}", "s", lag, 0.7, is_ratio=True) for axis in BODY_AXES]
+    return {number.name: number for number in (*gains, *lags)}
+
+
+def _ratio(name: str, unit: str, value) -> FreeParameter:
+    return FreeParameter(name, unit, float(value), _SHARES[name.split(".")[0]], is_ratio=True)
+
+
+def _diagonal(name: str, axes: Sequence[str], units: Sequence[str], matrix) -> list[FreeParameter]:
+    """Those of a matrix with positive diagonal entries."""
+    entries = np.diagonal(np.asarray(matrix, dtype=float))
+    return [
+        FreeParameter(f"{name}.{axis}", unit, float(entry), _SHARES[name], is_ratio=True)
+        for axis, unit, entry in zip(axes, units, entries, strict=True)
+        if entry > 0
+    ]
+
+
+def _damping(vehicle) -> list[FreeParameter]:
+    """Those of damping, of which each kind may be zero: deviations are shares of both kinds together."""
+    linear = np.diagonal(np.asarray(vehicle.linear_damping, dtype=float))
+    quadratic = np.diagonal(np.asarray(vehicle.quadratic_damping, dtype=float))
+    together = linear + quadratic * _TYPICAL_SPEED
+    together = np.where(together > 0, together, np.diagonal(np.asarray(vehicle.mass_matrix(), dtype=float)))
+    free = []
+    for i, axis in enumerate(BODY_AXES):
+        deviation = _DAMPING_SHARE * float(together[i])
+        free.append(FreeParameter(f"linear_damping.{axis}", _LINEAR_UNITS[i], float(linear[i]), deviation, least=0.0))
+        deviation /= float(_TYPICAL_SPEED[i])
+        free.append(
+            FreeParameter(f"quadratic_damping.{axis}", _QUADRATIC_UNITS[i], float(quadratic[i]), deviation, least=0.0)
+        )
+    return free
+
+
+# Free where nothing else is asked for: mass and inertia of the dry vehicle are weighed, and cannot be told from the
+# added ones; single thrusters cannot be told from all of them without long logs.
+USUALLY_FREE = (
+    "added_mass.*",
+    "linear_damping.*",
+    "quadratic_damping.*",
+    "net_buoyancy",
+    "r_b.*",
+    "thruster_gain",
+    "reverse_gain",
+    "lag",
+    "axis_gain.*",
+    "axis_lag.*",
+)
+
+_PRIOR = re.compile(r"\s*([-+0-9.eE]+)\s*(?:\+-|±)\s*([0-9.eE]+)\s*(%?)\s*")
+
+
+def chosen(
+    known: Mapping[str, FreeParameter], free: Sequence[str] = (), priors: Mapping[str, str] | None = None
+) -> list[FreeParameter]:
+    """The parameters that are free, some with another prior.
+
+    Args:
+        known: all that can be.
+        free: names, groups (`added_mass`) or patterns (`*.yaw`); () for the usual ones.
+        priors: `value +- deviation` or `value +- share %` by name; these are free, too.
+
+    Raises:
+        BadInput: a name that means none, or a prior that cannot be read.
+    """
+    priors = dict(priors or {})
+    asked = tuple(free) or USUALLY_FREE
+    names: list[str] = []
+    for pattern in (*asked, *priors):
+        matching = [name for name in known if fnmatch.fnmatchcase(name, pattern) or _in_group(name, pattern)]
+        if not matching and (free or pattern in priors) and pattern not in USUALLY_FREE:
+            raise BadInput("free", "name parameters of the vehicle", pattern, hint=nearest(pattern, known))
+        names += [name for name in matching if name not in names]
+    return [_with_prior(known[name], priors[name]) if name in priors else known[name] for name in names]
+
+
+def _in_group(name: str, group: str) -> bool:
+    return name.startswith(f"{group}.") and not group == "thruster_gain"
+
+
+def _with_prior(parameter: FreeParameter, prior: str) -> FreeParameter:
+    found = _PRIOR.fullmatch(str(prior))
+    location = f"priors.{parameter.name}"
+    if not found:
+        raise BadInput(location, "be `value +- deviation` or `value +- share %`", prior)
+    value, deviation = float(found[1]), float(found[2])
+    if found[3]:
+        deviation *= abs(value) / 100
+    if not deviation > 0:
+        raise BadInput(location, "have a deviation above 0", prior, hint="A number without one is fixed")
+    if parameter.is_ratio:
+        if not value > 0:
+            raise BadInput(location, "be positive", prior)
+        return parameter._replace(prior=value, deviation=math.sqrt(math.log1p((deviation / value) ** 2)))
+    return parameter._replace(prior=value, deviation=deviation)

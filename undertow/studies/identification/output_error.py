@@ -1,0 +1,210 @@
+"""The estimate: output error over segments whose begin is free, by Levenberg and Marquardt's method.
+
+Unknown are some tens of numbers of all segments and twelve of each one. The twelve are eliminated from the normal
+equations segment by segment, so that an iteration costs what the derivatives cost. General solvers of least squares
+would store a matrix of all residuals by all unknowns, which is a gigabyte for ten minutes of a dive.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.studies.identification.dive import RESIDUALS, SENSOR_OF_RESIDUAL
+from undertow.studies.identification.model import (
+    IdentificationModel,
+    NormalEquations,
+    all_residuals,
+    normal_equations,
+    scores,
+)
+from undertow.studies.identification.segments import Segments
+
+_HUBER = 3.0  # standard deviations from which on a residual counts as an outlier
+_SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
+_FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
+_FASTEST = 2.0  # factor by which the noise may change in an iteration
+_ITERATIONS = 60
+_TRIES = 10  # dampings of a step
+_CONVERGED = 0.05  # largest change of an unknown, in standard deviations of its estimate
+_NOISE_CONVERGED = 0.02  # largest relative change of a noise
+
+
+class Fit(NamedTuple):
+    """An estimate.
+
+    Attributes:
+        z: unknowns.
+        starts: of the segments, (S, 12).
+        noise: standard deviation of each kind of residual, (13,); infinite without samples.
+        weights: of the residuals, (S, length, 13).
+        information: second derivative of half the sum of squares by the unknowns, the begins eliminated, prior
+            included, (P, P).
+        reduction: bb^-1 ab' of each segment.
+        residuals: (S, length, 13).
+        cost: half the sum of squares, priors included.
+        iterations: of the solver.
+        converged: whether it came to rest.
+    """
+
+    z: np.ndarray
+    starts: np.ndarray
+    noise: np.ndarray
+    weights: np.ndarray
+    information: np.ndarray
+    reduction: np.ndarray
+    residuals: np.ndarray
+    cost: float
+    iterations: int
+    converged: bool
+
+
+def fit(
+    model: IdentificationModel,
+    segments: Segments,
+    step: float,
+    z: np.ndarray,
+    least: np.ndarray,
+    watch: Callable[[int, float], None] = lambda iteration, cost: None,
+    noise: np.ndarray | None = None,
+) -> Fit:
+    """The unknowns that make predictions and measurements agree best, given what was known beforehand.
+
+    Args:
+        model: see there.
+        segments: of the dives.
+        step: s.
+        z: where to begin.
+        least: smallest numbers.
+        watch: called with the iteration and the cost.
+        noise: standard deviations to begin with.
+    """
+    starts = np.zeros((len(segments.dive), 12))
+    counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
+    z = np.maximum(z, least)
+    residuals = _residuals(model, segments, step, z, starts)
+    noise = _first_noise(counts) if noise is None else noise
+    damping, converged, iteration = 1e-3, False, 0
+    for iteration in range(1, _ITERATIONS + 1):
+        weights = _weights(residuals, counts, noise)
+        cost = _cost(residuals, weights, z, starts)
+        watch(iteration, cost)
+        parts = _evaluated(model, segments, weights, step, z, starts)
+        trial = _improved(model, segments, parts, weights, step, z, starts, least, damping, cost)
+        if trial is None:
+            converged = iteration > 1
+            break
+        deviations = np.sqrt(np.diagonal(np.linalg.inv(_reduced(parts, z, starts, 0.0)[0])))
+        change = (np.abs(trial.z - z) / deviations).max()
+        z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, max(trial.damping / 10, 1e-9)
+        new_noise = np.clip(_noise(residuals, counts), noise / _FASTEST, noise * _FASTEST)
+        finite = np.isfinite(new_noise)
+        steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
+        noise = new_noise
+        if steady and change < _CONVERGED:
+            converged = True
+            break
+    weights = _weights(residuals, counts, noise)
+    parts = _evaluated(model, segments, weights, step, z, starts)
+    information, _, reduction = _reduced(parts, z, starts, 0.0)
+    cost = _cost(residuals, weights, z, starts)
+    return Fit(z, starts, noise, weights, information, reduction, residuals, cost, iteration, converged)
+
+
+class _Trial(NamedTuple):
+    z: np.ndarray
+    starts: np.ndarray
+    residuals: np.ndarray
+    damping: float
+
+
+def _improved(model, segments, parts, weights, step, z, starts, least, damping: float, cost: float) -> _Trial | None:
+    """The first of some steps, ever shorter, that lowers the cost; None where none does."""
+    for _ in range(_TRIES):
+        new_z, new_starts = _step(parts, z, starts, damping, least)
+        residuals = _residuals(model, segments, step, new_z, new_starts)
+        new_cost = _cost(residuals, weights, new_z, new_starts)
+        if np.isfinite(new_cost) and new_cost <= cost:
+            return _Trial(new_z, new_starts, residuals, damping)
+        damping *= 10
+    return None
+
+
+def _residuals(model, segments, step, z, starts) -> np.ndarray:
+    return np.asarray(all_residuals(model, jnp.asarray(z), jnp.asarray(starts), segments, step))
+
+
+def _cost(residuals: np.ndarray, weights: np.ndarray, z: np.ndarray, starts: np.ndarray) -> float:
+    """Half the sum of squares, with what was known beforehand."""
+    squares = np.where(weights > 0, weights * residuals**2, 0.0).sum()
+    return float(0.5 * (squares + (z**2).sum() + (starts**2).sum()))
+
+
+def _evaluated(model, segments, weights, step, z, starts) -> NormalEquations:
+    parts = normal_equations(model, jnp.asarray(z), jnp.asarray(starts), segments, jnp.asarray(weights), step)
+    return NormalEquations(*(np.asarray(part) for part in parts))
+
+
+def _reduced(parts: NormalEquations, z, starts, damping: float):
+    """Information and gradient of the unknowns, with the begins of the segments eliminated, and the elimination."""
+    bb = parts.bb + np.eye(12)
+    bb = bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
+    reduction = np.linalg.solve(bb, parts.ab.transpose(0, 2, 1))
+    information = parts.aa.sum(axis=0) + np.eye(len(z)) - np.einsum("spq,sqr->pr", parts.ab, reduction)
+    b = parts.b + starts
+    gradient = parts.a.sum(axis=0) + z - np.einsum("spq,sq->p", parts.ab, np.linalg.solve(bb, b[..., None])[..., 0])
+    return information, gradient, reduction
+
+
+def _step(parts: NormalEquations, z, starts, damping: float, least: np.ndarray):
+    """The next unknowns; those at their smallest value that would become smaller stay there."""
+    information, gradient, _ = _reduced(parts, z, starts, damping)
+    information = information + damping * np.diag(np.diagonal(information))
+    free = np.ones(len(z), dtype=bool)
+    for _ in range(len(z)):
+        change = np.zeros(len(z))
+        change[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])
+        blocked = free & (z <= least) & (change < 0)
+        if not blocked.any():
+            break
+        free &= ~blocked
+    new_z = np.maximum(z + change, least)
+    bb = parts.bb + np.eye(12)
+    bb = bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
+    right = parts.b + starts + np.einsum("spq,p->sq", parts.ab, new_z - z)
+    return new_z, starts - np.linalg.solve(bb, right[..., None])[..., 0]
+
+
+def _first_noise(counts: np.ndarray) -> np.ndarray:
+    return np.where(counts.sum(axis=(0, 1)) > 0, _FIRST_NOISE, np.inf)
+
+
+def _noise(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Standard deviation of a single sample for each kind of residual, outliers cut at some of them."""
+    estimate = np.full(len(RESIDUALS), np.inf)
+    for i in range(len(RESIDUALS)):
+        measured = counts[:, :, i] > 0
+        if measured.any():
+            scaled = np.abs(residuals[:, :, i][measured]) * np.sqrt(counts[:, :, i][measured])
+            limit = _HUBER * max(1.4826 * float(np.median(scaled)), _SMALLEST_NOISE)
+            estimate[i] = max(float(np.sqrt((np.minimum(scaled, limit) ** 2).mean())), _SMALLEST_NOISE)
+    return estimate
+
+
+def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """1/variance of each residual, less for outliers (Huber), 0 without a sample."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sizes = np.abs(residuals) * np.sqrt(counts) / noise
+        robust = np.where(sizes > _HUBER, _HUBER / sizes, 1.0)
+        return np.where(counts > 0, robust * counts / noise**2, 0.0)
+
+
+def scores_of(model: IdentificationModel, segments: Segments, step: float, estimate: Fit) -> np.ndarray:
+    """Gradient of each step, (S, length, P)."""
+    return np.asarray(
+        scores(
+            model, jnp.asarray(estimate.z), jnp.asarray(estimate.starts), segments, jnp.asarray(estimate.weights),
+            jnp.asarray(estimate.reduction), step,
+        )
+    )  # fmt: skip
