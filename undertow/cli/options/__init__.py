@@ -11,6 +11,7 @@ from undertow.cli.options.compare import CompareCommand
 from undertow.cli.options.describe import DescribeCommand, ListCommand
 from undertow.cli.options.export import ExportCommand
 from undertow.cli.options.falsify import FalsifyCommand
+from undertow.cli.options.identify import IdentifyCommand
 from undertow.cli.options.init import InitCommand
 from undertow.cli.options.logs import LogsCommand
 from undertow.cli.options.mavlink import MavlinkCommand
@@ -24,7 +25,7 @@ from undertow.cli.options.version import VersionCommand
 GROUPS: dict[str, tuple[type[Command], ...]] = {
     "Start": (InitCommand, SimulateCommand),
     "Understand": (AnalyzeCommand, CampaignCommand, CompareCommand, FalsifyCommand, ArenaCommand),
-    "Fit": (TuneCommand,),
+    "Fit": (IdentifyCommand, TuneCommand),
     "Deploy": (ExportCommand, RunCommand, Ros2Command, MavlinkCommand, ArdupilotCommand),
     "Paper": (ReproduceCommand,),
     "Inspect": (ListCommand, DescribeCommand, CheckCommand, LogsCommand, BenchCommand, VersionCommand),

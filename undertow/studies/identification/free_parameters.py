@@ -1,8 +1,8 @@
 """The numbers of a vehicle that logs may determine: names, units, and what is thought of them beforehand.
 
-A parameter is estimated as a number z of which a value is made: value = prior exp(deviation z) where it must be positive
-and is compared by ratios, and value = prior + deviation z elsewhere. Beforehand z has mean 0 and variance 1, so that the
-information of the data is compared with what was known before in every parameter alike.
+A parameter is estimated as a number z of which a value is made: value = prior exp(deviation z) where it must be
+positive and is compared by ratios, and value = prior + deviation z elsewhere. Beforehand z has mean 0 and variance 1,
+so that the information of the data is compared with what was known before in every parameter alike.
 """
 
 import fnmatch
@@ -97,7 +97,8 @@ def axis_parameters(prior_gain: float = 50.0, lag: float = 0.15) -> dict[str, Fr
         for i, (axis, unit) in enumerate(zip(BODY_AXES, _GAIN_UNITS, strict=True))
     ]
     lags = [FreeParameter(f"axis_lag.{axis}", "s", lag, 0.7, is_ratio=True) for axis in BODY_AXES]
-    return {number.name: number for number in (*gains, *lags)}
+    power = FreeParameter("axis_power", "", 1.0, 0.3, is_ratio=True)
+    return {number.name: number for number in (*gains, *lags, power)}
 
 
 def _ratio(name: str, unit: str, value) -> FreeParameter:
@@ -144,6 +145,7 @@ USUALLY_FREE = (
     "lag",
     "axis_gain.*",
     "axis_lag.*",
+    "axis_power",
 )
 
 _PRIOR = re.compile(r"\s*([-+0-9.eE]+)\s*(?:\+-|±)\s*([0-9.eE]+)\s*(%?)\s*")

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from undertow.core.contracts import Water
 from undertow.core.measurement import BODY_AXES
+from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.linear_algebra import inverse, matvec
 from undertow.core.numerics.rotations import quaternion_rate, rotation_from_quaternion
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
@@ -20,6 +21,7 @@ from undertow.physics.vehicles.body import Body, rigid_body_mass, seen_from_wate
 
 Values = Mapping[str, Any]  # of parameters, by name
 
+_SMALLEST_INPUT = 1e-6  # below which a power has no slope
 _MATRICES = ("added_mass", "linear_damping", "quadratic_damping")
 
 
@@ -50,6 +52,17 @@ class AbstractActuation(eqx.Module):
     @abc.abstractmethod
     def with_values(self, values: Values) -> "AbstractActuation":
         """The same with some of its numbers replaced."""
+
+    def solved(self, state: Any, u: Float[Array, " N"], step: Float[Array, ""]) -> "SolvedStep | None":
+        """The states over a step (s) with a held input; None where they have to be integrated."""
+        return None
+
+
+class SolvedStep(NamedTuple):
+    """States of the actuation over a step, known in closed form."""
+
+    mean: Any
+    end: Any
 
 
 class ThrusterActuation(AbstractActuation):
@@ -89,22 +102,36 @@ class ThrusterActuation(AbstractActuation):
 class AxisActuation(AbstractActuation):
     """Inputs that push along the axes with a first-order lag, where it is unknown how they reach the thrusters."""
 
-    gains: Float[Array, "6"]  # N and N m per unit of input
+    gains: Float[Array, "6"]  # N and N m at an input of 1
     lags: Float[Array, "6"]  # s
+    power: Float[Array, ""]  # of the input; thrust is nearly quadratic in what speed controllers are told
 
     def initial_state(self):
         return jnp.zeros(len(BODY_AXES))
 
     def dynamics(self, state, u):
-        return (self.gains * u - state) / self.lags
+        return (self._steady(u) - state) / self.lags
 
     def wrench(self, state, u, nu):
         return state
 
+    def solved(self, state, u, step):
+        """However short the lag is beside the step."""
+        target = self._steady(u)
+        share = -jnp.expm1(-step / self.lags)
+        mean = target + (state - target) * share * self.lags / step
+        return SolvedStep(mean, state + (target - state) * share)
+
     def with_values(self, values: Values) -> "AxisActuation":
         return AxisActuation(
-            gains=_replaced(self.gains, values, "axis_gain"), lags=_replaced(self.lags, values, "axis_lag")
+            gains=_replaced(self.gains, values, "axis_gain"),
+            lags=_replaced(self.lags, values, "axis_lag"),
+            power=jnp.asarray(values.get("axis_power", self.power)),
         )
+
+    def _steady(self, u):
+        size = jnp.maximum(jnp.abs(u), _SMALLEST_INPUT)
+        return self.gains * jnp.sign(u) * size**self.power
 
 
 class IdentifiedVehicle(eqx.Module):
@@ -113,9 +140,22 @@ class IdentifiedVehicle(eqx.Module):
     body: Body
     actuation: AbstractActuation
 
-    def initial_state(self, position, attitude, nu, actuators) -> MotionState:
-        """State of a pose, a velocity and a state of the actuators."""
-        return MotionState(position, attitude, nu, actuators)
+    def advance(self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"], step) -> MotionState:
+        """State after a step (s) with a held input."""
+        solved = self.actuation.solved(x.actuators, u, step)
+        if solved is None:
+            return rk4(lambda t, state: self.dynamics(state, u, current), 0.0, x, step)
+        still = jax.tree.map(jnp.zeros_like, x.actuators)
+        driven = lambda t, state: self.dynamics(state, u, current)._replace(actuators=still)
+        after = rk4(driven, 0.0, x._replace(actuators=solved.mean), step)
+        return after._replace(actuators=solved.end)
+
+    def actuators_after(self, state: Any, u: Float[Array, " N"], step) -> Any:
+        """State of the actuation after a step (s), whatever the body does."""
+        solved = self.actuation.solved(state, u, step)
+        if solved is None:
+            return rk4(lambda t, s: self.actuation.dynamics(s, u), 0.0, state, step)
+        return solved.end
 
     def dynamics(self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"]) -> MotionState:
         """d(state)/dt in water that moves evenly, with the velocity `current` in the world, m/s."""
@@ -177,7 +217,7 @@ def prior_vehicle(plant: HybridVehicle, has_axis_inputs: bool = False) -> PriorV
     vehicle = plant.vehicle
     one = jnp.ones(())
     thrusters = ThrusterActuation(plant.thruster, plant.thruster_matrix, plant.inflow_loss, one, one)
-    axes = AxisActuation(jnp.ones(len(BODY_AXES)), jnp.ones(len(BODY_AXES)))
+    axes = AxisActuation(jnp.ones(len(BODY_AXES)), jnp.ones(len(BODY_AXES)), one)
     return PriorVehicle(
         mass=vehicle.mass,
         weight=vehicle.weight,

@@ -27,7 +27,9 @@ _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
 _ITERATIONS = 60
 _TRIES = 10  # dampings of a step
-_CONVERGED = 0.05  # largest change of an unknown, in standard deviations of its estimate
+_GOOD, _POOR = 0.75, 0.25  # shares of the expected decrease above and below which the damping changes
+_CONVERGED = 0.05  # decrease of the cost; 0.5 is one standard deviation of a parameter
+_RELATIVE = 1e-4  # the same as a share of the cost, where residuals are not white
 _NOISE_CONVERGED = 0.02  # largest relative change of a noise
 
 
@@ -95,14 +97,13 @@ def fit(
         if trial is None:
             converged = iteration > 1
             break
-        deviations = np.sqrt(np.diagonal(np.linalg.inv(_reduced(parts, z, starts, 0.0)[0])))
-        change = (np.abs(trial.z - z) / deviations).max()
-        z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, max(trial.damping / 10, 1e-9)
+        small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
+        z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
         new_noise = np.clip(_noise(residuals, counts), noise / _FASTEST, noise * _FASTEST)
         finite = np.isfinite(new_noise)
         steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
         noise = new_noise
-        if steady and change < _CONVERGED:
+        if steady and small:
             converged = True
             break
     weights = _weights(residuals, counts, noise)
@@ -116,7 +117,8 @@ class _Trial(NamedTuple):
     z: np.ndarray
     starts: np.ndarray
     residuals: np.ndarray
-    damping: float
+    cost: float
+    damping: float  # for the next step
 
 
 def _improved(model, segments, parts, weights, step, z, starts, least, damping: float, cost: float) -> _Trial | None:
@@ -126,9 +128,20 @@ def _improved(model, segments, parts, weights, step, z, starts, least, damping: 
         residuals = _residuals(model, segments, step, new_z, new_starts)
         new_cost = _cost(residuals, weights, new_z, new_starts)
         if np.isfinite(new_cost) and new_cost <= cost:
-            return _Trial(new_z, new_starts, residuals, damping)
+            share = (cost - new_cost) / max(_expected(parts, z, starts, new_z, new_starts), 1e-300)
+            following = damping / 10 if share > _GOOD else damping * (3 if share < _POOR else 1)
+            return _Trial(new_z, new_starts, residuals, new_cost, max(following, 1e-9))
         damping *= 10
     return None
+
+
+def _expected(parts: NormalEquations, z, starts, new_z, new_starts) -> float:
+    """Decrease of the cost if residuals were linear."""
+    dz, ds = new_z - z, new_starts - starts
+    linear = dz @ (parts.a.sum(axis=0) + z) + (ds * (parts.b + starts)).sum()
+    square = dz @ (parts.aa.sum(axis=0) + np.eye(len(z))) @ dz + (ds * ds).sum()
+    square += np.einsum("sq,sqr,sr->", ds, parts.bb, ds) + 2 * np.einsum("p,spq,sq->", dz, parts.ab, ds)
+    return float(-linear - 0.5 * square)
 
 
 def _residuals(model, segments, step, z, starts) -> np.ndarray:

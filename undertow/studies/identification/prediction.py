@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.numerics.rotations import (
     attitude_error,
@@ -59,15 +58,14 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
     inputs = delayed(segment.inputs, sensing.command_delay / step)
     length = segment.values.shape[0]
     before = segment.inputs.shape[0] - length
-    actuation = vehicle.actuation
 
     def run_in(state, u):
-        return rk4(lambda t, s: actuation.dynamics(s, u), 0.0, state, step), None
+        return vehicle.actuators_after(state, u, step), None
 
-    actuators, _ = jax.lax.scan(run_in, actuation.initial_state(), inputs[:before])
+    actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
 
     def advance(x: MotionState, u):
-        after = rk4(lambda t, s: vehicle.dynamics(s, u, sensing.current), 0.0, x, step)
+        after = vehicle.advance(x, u, sensing.current, step)
         return after, after._replace(actuators=())
 
     guess = segment.start

@@ -50,6 +50,12 @@ def segments_of(dives: Sequence[Dive], length: float) -> Segments:
     return Segments(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 
+def whole(dive: Dive) -> Segments:
+    """A dive as a single segment from its first step on, whose actuators have run in with its first input."""
+    row = _segment(dive, 0, 0, round(RUN_IN / dive.step), len(dive.inputs))
+    return Segments(*(np.asarray(column)[None] for column in row))
+
+
 def _segment(dive: Dive, number: int, first: int, before: int, steps: int):
     inputs = dive.inputs[max(0, first - before) : first + steps]
     missing = max(0, before - first)

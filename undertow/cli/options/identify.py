@@ -1,0 +1,62 @@
+"""Options of `undertow identify`."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import typer
+
+from undertow.cli.options.command import Command
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, ScenarioFile, results
+
+
+@dataclasses.dataclass(frozen=True)
+class IdentifyCommand(Command):
+    """Identify the numbers of a vehicle from logs of its dives, and say how sure they are.
+
+    The scenario names the vehicle and its thrusters, whose numbers are what is known beforehand. The command compares
+    the motion in the logs with that of the model, driven by the logged inputs, and estimates added mass, damping,
+    restoring and the thrusters. Every dive is also predicted from the others. It writes identification.html,
+    identification.json and figures/.
+    """
+
+    runs: ClassVar = "undertow.cli.identify:identify_vehicle"
+    named: ClassVar = "identify"
+    scenario: ScenarioFile
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs of dives of one vehicle.")]
+    mapping: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="Which columns of the logs are which signal, in which unit and frame."),
+    ] = None
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A parameter to estimate, a group (added_mass) or a pattern (*.yaw); may be repeated. Without it: "
+            "added mass, damping, restoring, gain, reverse gain and lag of the thrusters.",
+        ),
+    ] = None
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE+-DEVIATION",
+            help="What is known of a parameter beforehand, as mass=11.5+-0.2 or mass=11.5+-2%; may be repeated.",
+        ),
+    ] = None
+    per_axis: Annotated[
+        bool,
+        typer.Option(
+            "--per-axis",
+            help="The inputs push along surge, sway, heave, roll, pitch and yaw (sticks or wrenches) instead of "
+            "driving the thrusters.",
+        ),
+    ] = False
+    step: Annotated[float, typer.Option(metavar="SECONDS", help="Step of the integration.")] = 0.05
+    segment: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Length of the segments whose begin is estimated, too.")
+    ] = 10.0
+    out: Annotated[Path | None, results("runs/NAME-identified")] = None
+    overwrite: Overwrite = False
+    allow_code: AllowCode = False
+    pdf: Pdf = None
+    details: Details = False

@@ -1,0 +1,107 @@
+"""The answer of `undertow identify`: whether the model predicts better than the file, and what it does not know."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.number_text import plain
+from undertow.report.answers.plain_answer import PlainAnswer
+
+_SHOWN = 4  # parameters named in a line
+
+
+def answer_of_identification(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
+    """The answer of an identification.
+
+    Args:
+        data: contents of identification.json.
+        folder: of its files.
+    """
+    fits = mean_fits(data)
+    seconds = sum(dive["duration"] for dive in data["dives"])
+    dives = f"{len(data['dives'])} dives" if len(data["dives"]) > 1 else "one dive"
+    better = None
+    if fits:
+        own, before = (np.mean([pair[i] for pair in fits.values()]) for i in (0, 1))
+        better = bool(own > before)
+    verdict = {
+        True: "The identified model predicts dives that it has not seen better than the vehicle file.",
+        False: "The identified model predicts dives that it has not seen worse than the vehicle file: do not use it.",
+        None: "The model was not judged on a dive that it has not seen.",
+    }[better]
+    lines = (
+        f"{len(data['parameters'])} numbers were estimated from {dives}, {seconds:.0f} s together.",
+        *_fit_line(fits),
+        *_convergence(data),
+        *_best_known(data),
+        *_unknown(data),
+        *_ratios(data),
+        f"Next: undertow simulate {folder / 'identified.yaml'}",
+    )
+    return PlainAnswer(better, verdict, lines)
+
+
+def mean_fits(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """Mean free-run fit of each axis over the dives left out, %: of the identified model, and of the vehicle file."""
+    collected: dict[str, tuple[list[float], list[float]]] = {}
+    for validation in data["validation"]:
+        for axis, fit in validation["identified"]["free_run_fit"].items():
+            both = collected.setdefault(axis, ([], []))
+            both[0].append(fit)
+            both[1].append(validation["prior"]["free_run_fit"].get(axis, float("-inf")))
+    return {axis: (float(np.mean(own)), float(np.mean(before))) for axis, (own, before) in collected.items()}
+
+
+def _fit_line(fits: Mapping[str, tuple[float, float]]) -> Iterator[str]:
+    if fits:
+        pairs = ", ".join(f"{axis} {own:.0f} % ({_or_worse(before)})" for axis, (own, before) in fits.items())
+        yield f"Fit of the velocities over whole dives, with that of the file in brackets: {pairs}; 100 % is perfect."
+
+
+def _or_worse(fit: float) -> str:
+    return f"{fit:.0f} %" if fit > -100 else "below -100 %"
+
+
+def _convergence(data: Mapping[str, Any]) -> Iterator[str]:
+    if not data["converged"]:
+        iterations = data["iterations"]
+        yield f"The estimate had not come to rest after {iterations} iterations: do not trust its intervals."
+
+
+def _best_known(data: Mapping[str, Any]) -> Iterator[str]:
+    known = {name: p for name, p in data["parameters"].items() if p["verdict"] == "determined"}
+    if known:
+        order = sorted(known, key=lambda name: known[name]["deviation_left"])[:_SHOWN]
+        shown = "; ".join(f"{in_words(name)} {interval_words(known[name])}" for name in order)
+        yield f"{len(known)} of them are determined by the dives, best: {shown} (95 % intervals)."
+
+
+def _unknown(data: Mapping[str, Any]) -> Iterator[str]:
+    unknown = [in_words(name) for name, p in data["parameters"].items() if p["verdict"] == "unknown"]
+    if unknown:
+        more = f" and {len(unknown) - _SHOWN} more" if len(unknown) > _SHOWN else ""
+        yield f"The dives say nothing of {', '.join(unknown[:_SHOWN])}{more}: the values of the file were kept."
+
+
+def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
+    for combination in data["undetermined"][:1]:
+        if len(combination["parameters"]) > 1:
+            sentence = combination["sentence"]
+            for name in combination["parameters"]:
+                sentence = sentence.replace(name, in_words(name))
+            yield f"{sentence[0].upper()}{sentence[1:]}: weigh the vehicle, or measure a thrust, to separate them."
+
+
+def in_words(name: str) -> str:
+    """Name of a parameter for people: `quadratic damping, surge`."""
+    group, _, axis = name.partition(".")
+    words = {"r_b": "centre of buoyancy", "lag": "lag of the thrusters"}.get(group, group.replace("_", " "))
+    return f"{words}, {axis}" if axis else words
+
+
+def interval_words(parameter: Mapping[str, Any]) -> str:
+    """An interval with its unit: `13.1 [11.4, 14.9] N s/m`."""
+    value, low, high = (plain(parameter[key]) for key in ("value", "low", "high"))
+    return f"{value} [{low}, {high}] {parameter['unit']}".rstrip()

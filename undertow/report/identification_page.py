@@ -1,0 +1,147 @@
+"""The page of an identification: the answer, how it predicts, what is known of each number, what to do next."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.atomic_io import write_whole
+from undertow.report.answers.identification_answer import answer_of_identification, in_words
+from undertow.report.answers.plain_answer import answer_block
+from undertow.report.figures.identification import Series, free_run_figure, intervals_figure
+from undertow.report.figures.writing import Plots, save_all
+from undertow.report.formats import number, prose, unit
+from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
+from undertow.studies.identification.identify import Identification
+from undertow.studies.identification.validation import AXES, whole_values
+
+_CAPTIONS = {
+    "free_run": "Velocities of a dive that was not used for the estimate. The model starts from the measured motion at "
+    "the beginning and is then driven by the logged inputs alone. The number at the right is the fit: 100 % is "
+    "perfect, 0 % is no better than the mean.",
+    "intervals": "Estimates as multiples of the value in the vehicle file, with their 95 % intervals. Blue: determined "
+    "by the dives. Orange: partly. Grey: the dives say nothing, and the value is that of the file. Numbers that are 0 "
+    "in the file are in the table below only.",
+}
+_SURE = (
+    "An interval contains the true value in 95 of 100 cases if the model has the right form. It allows for "
+    "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the model lacks: "
+    "the free run above tells whether that matters."
+)
+_VERDICTS = {"determined": "determined", "partly": "partly determined", "unknown": "not determined"}
+
+
+def write_identification(
+    title: str, identification: Identification, data: Mapping[str, Any], out: Path, folder: Path, pdf: str | None = None
+) -> list[str]:
+    """Write `identification.html` and the figures; return a sentence for each figure that failed.
+
+    Args:
+        title: of the page.
+        identification: result.
+        data: contents of identification.json.
+        out: where to write.
+        folder: where the files will be.
+        pdf: width of PDF files; None for none.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    saved = save_all(lambda: _plots(identification, data), out / "figures", pdf)
+    pictures = {
+        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
+        for name, vector in saved.vectors.items()
+    }
+    page = document(
+        f"Identification of {title}",
+        tag("h1", prose(f"Identification of {title}")),
+        answer_block(answer_of_identification(data, folder)),
+        pictures.get("free_run", Html("")),
+        *(tag("p", prose(sentence)) for sentence in saved.failures),
+        section("dives", "The dives", _dives(data), *_findings(data)),
+        section("numbers", "The numbers", pictures.get("intervals", Html("")), tag("p", prose(_SURE)), _numbers(data)),
+        *_not_determined(data),
+        section("prediction", "Prediction of dives not used", _fits(data), _ahead(data)),
+    )
+    write_whole(out / "identification.html", page)
+    return saved.failures
+
+
+def _plots(identification: Identification, data: Mapping[str, Any]) -> Plots:
+    figures: dict[str, Any] = {"intervals": lambda: intervals_figure(data["parameters"])}
+    if identification.validation:
+        figures["free_run"] = lambda: _free_run(identification)
+    return figures
+
+
+def _free_run(identification: Identification):
+    """The figure of the longest dive that was left out."""
+    validation = max(identification.validation, key=lambda one: len(one.identified.free_run))
+    step = identification.dives[0].step
+    series: dict[str, Series] = {}
+    for axis in AXES:
+        measured, error = whole_values(validation.dive, axis), validation.identified.error(axis)
+        there = np.isfinite(error)
+        if there.any():
+            time = step * np.arange(len(error))[there]
+            series[axis] = (time, measured[there], (measured + error)[there])
+    return free_run_figure(series, validation.identified.fit)
+
+
+def _dives(data: Mapping[str, Any]) -> Html:
+    rows = [(dive["name"], number(dive["duration"]), ", ".join(dive["sensors"])) for dive in data["dives"]]
+    return table(("log", join("duration, ", unit("s")), "measured"), rows, numeric=(1,))
+
+
+def _findings(data: Mapping[str, Any]) -> list[Html]:
+    return [bullets([prose(sentence) for sentence in data["findings"]])] if data["findings"] else []
+
+
+def _numbers(data: Mapping[str, Any]) -> Html:
+    rows = []
+    for name, parameter in data["parameters"].items():
+        interval = join(number(parameter["low"]), " to ", number(parameter["high"]))
+        verdict = _VERDICTS[parameter["verdict"]]
+        values = (number(parameter["prior"]), number(parameter["value"]))
+        rows.append((in_words(name), *values, interval, unit(parameter["unit"]), verdict))
+    return table(("number", "file", "estimate", "95 % interval", "unit", ""), rows, numeric=(1, 2, 3))
+
+
+def _not_determined(data: Mapping[str, Any]) -> list[Html]:
+    if not data["undetermined"]:
+        return []
+    sentences = []
+    for combination in data["undetermined"]:
+        sentence = combination["sentence"]
+        for name in combination["parameters"]:
+            sentence = sentence.replace(name, in_words(name))
+        sentences.append(prose(f"{sentence[0].upper()}{sentence[1:]}."))
+    return [section("unknown", "What the dives do not tell", bullets(sentences))]
+
+
+def _fits(data: Mapping[str, Any]) -> Html:
+    rows = []
+    for validation in data["validation"]:
+        for whose, label in (("identified", "identified"), ("prior", "vehicle file")):
+            fits = validation[whose]["free_run_fit"]
+            rows.append((validation["name"], label, *(number(fits.get(axis), 2) for axis in AXES)))
+    head = ("fit of the free run, %", "model", *AXES)
+    return table(head, rows, numeric=range(2, 2 + len(AXES)))
+
+
+def _ahead(data: Mapping[str, Any]) -> Html:
+    """Rms of the errors some seconds ahead, over all dives."""
+    names = list(
+        dict.fromkeys(name for v in data["validation"] for row in v["identified"]["rms_ahead"].values() for name in row)
+    )
+    rows = []
+    for horizon in dict.fromkeys(h for v in data["validation"] for h in v["identified"]["rms_ahead"]):
+        for whose, label in (("identified", "identified"), ("prior", "vehicle file")):
+            cells = []
+            for name in names:
+                errors = [v[whose]["rms_ahead"][horizon].get(name) for v in data["validation"]]
+                errors = [error for error in errors if error is not None]
+                cells.append(number(float(np.sqrt(np.mean(np.square(errors)))) if errors else None))
+            rows.append((f"{horizon} s", label, *cells))
+    return table(("error ahead, rms", "model", *names), rows, numeric=range(2, 2 + len(names)), wide=True)

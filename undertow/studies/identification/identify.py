@@ -1,0 +1,202 @@
+"""Identification of a vehicle: from its file and logs to numbers with intervals, judged on dives not used."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.core import checks
+from undertow.core.errors import BadInput
+from undertow.logs.log import Log
+from undertow.logs.motion import inputs_of
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.build import Built, in_its_precision
+from undertow.studies.identification.dive import Dive, dive_of
+from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
+from undertow.studies.identification.identified_vehicle import prior_vehicle
+from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
+from undertow.studies.identification.output_error import Fit, fit, scores_of
+from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.uncertainty import Combination, Interval, Uncertainty, uncertainty_of, undetermined
+from undertow.studies.identification.validation import PredictionErrors, prediction_errors
+
+Say = Callable[[str], None]
+
+_PARTS = 4  # into which a single dive is divided for the validation
+_AXES = 6
+
+
+class Validation(NamedTuple):
+    """A dive, or a part of one, that was left out and predicted.
+
+    Attributes:
+        dive: left out.
+        identified: errors of the model from the other dives.
+        prior: errors of the vehicle file.
+    """
+
+    dive: Dive
+    identified: PredictionErrors
+    prior: PredictionErrors
+
+    @property
+    def name(self) -> str:
+        """Of the dive."""
+        return self.dive.name
+
+
+class Identification(NamedTuple):
+    """Result of an identification.
+
+    Attributes:
+        model: see there.
+        dives: on their grids.
+        parameters: that were free.
+        estimate: from all dives.
+        uncertainty: of the unknowns.
+        intervals: of the parameters.
+        undetermined: combinations that the data do not determine.
+        validation: of each dive from the others.
+        findings: sentences of the checks before.
+    """
+
+    model: IdentificationModel
+    dives: tuple[Dive, ...]
+    parameters: tuple[FreeParameter, ...]
+    estimate: Fit
+    uncertainty: Uncertainty
+    intervals: tuple[Interval, ...]
+    undetermined: tuple[Combination, ...]
+    validation: tuple[Validation, ...]
+    findings: tuple[str, ...] = ()
+
+    @property
+    def z(self) -> np.ndarray:
+        """Estimate of the parameters of the vehicle."""
+        return self.estimate.z[: len(self.parameters)]
+
+
+@in_its_precision
+def identify(
+    built: Built,
+    logs: Sequence[Log],
+    *,
+    free: Sequence[str] = (),
+    priors: Mapping[str, str] | None = None,
+    per_axis: bool = False,
+    step: float = 0.05,
+    segment: float = 10.0,
+    validate: bool = True,
+    say: Say = lambda stage: None,
+) -> Identification:
+    """Identify a vehicle.
+
+    Args:
+        built: scenario, whose vehicle and thrusters have the prior numbers; nothing else of it matters.
+        logs: with inputs and motion.
+        free: names, groups or patterns of parameters; () for the usual ones.
+        priors: `value +- deviation` by name.
+        per_axis: whether the inputs push along the six axes (sticks behind a mixer, or wrenches) instead of driving the
+            thrusters.
+        step: of the integration, s.
+        segment: length of the segments, s.
+        validate: whether to predict each dive from the others.
+        say: called with the current stage.
+
+    Raises:
+        BadInput: the plant is no vehicle, a log lacks something, or inputs are of another number than thrusters or
+            axes.
+    """
+    checks.positive("step", step, "s")
+    checks.positive("segment", segment, "s")
+    if not logs:
+        raise BadInput("logs", "be given", "none")
+    plant = _vehicle(built)
+    dives = [_dive(plant, log, per_axis, step) for log in logs]
+    known = parameters_of(plant)
+    if per_axis:
+        of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
+        known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
+    parameters = chosen(known, free, priors)
+    model = model_of(prior_vehicle(plant, per_axis), parameters)
+    say("estimating")
+    estimate = _estimate(model, parameters, dives, segment, None, say)
+    parts, validation = None, ()
+    if validate:
+        parts, validation = _validated(model, parameters, dives, segment, estimate, say)
+    say("judging how sure it is")
+    segments = segments_of(dives, segment)
+    scores = scores_of(model, segments, step, estimate)
+    count = len(parameters)
+    uncertainty = uncertainty_of(estimate.information, scores, step, _with_nuisances(parts, estimate.z, count))
+    return Identification(
+        model=model,
+        dives=tuple(dives),
+        parameters=tuple(parameters),
+        estimate=estimate,
+        uncertainty=uncertainty,
+        intervals=tuple(uncertainty.intervals(parameters, estimate.z)),
+        undetermined=tuple(undetermined(estimate.information, parameters)),
+        validation=validation,
+    )
+
+
+def _vehicle(built: Built) -> HybridVehicle:
+    plant = built.closed_loop.plant
+    if not isinstance(plant, HybridVehicle):
+        raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
+    return plant
+
+
+def _dive(plant: HybridVehicle, log: Log, per_axis: bool, step: float) -> Dive:
+    inputs = inputs_of(log, ("input", "commanded_input"), None if per_axis else np.asarray(plant.thruster_matrix))
+    expected = _AXES if per_axis else plant.inputs()
+    if inputs.flat().shape[1] != expected:
+        whose = "axes" if per_axis else "thrusters"
+        raise BadInput("log", f"have {expected} inputs, one for each of the {whose}", f"{inputs.flat().shape[1]}")
+    return dive_of(log, inputs, step)
+
+
+def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray | None, say: Say) -> Fit:
+    unknowns = Unknowns(tuple(parameters), len(dives))
+    least = unknowns.least()
+    z = np.zeros(len(least))
+    if begin is not None:
+        z[: len(parameters)] = begin
+    watch = lambda iteration, cost: say(f"iteration {iteration}, cost {cost:.6g}")
+    return fit(model, segments_of(dives, segment), dives[0].step, z, least, watch)
+
+
+def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimate: Fit, say: Say):
+    """Estimates without each dive (or part of the only one), and how these predict it."""
+    pieces = list(dives) if len(dives) > 1 else parts_of(dives[0], _PARTS)
+    count = len(parameters)
+    begin = estimate.z[:count]
+    estimates, validation = [], []
+    for number, piece in enumerate(pieces):
+        say(f"validation: {piece.name}")
+        others = [other for i, other in enumerate(pieces) if i != number]
+        without = _estimate(model, parameters, others, segment, begin, say).z[:count]
+        estimates.append(without)
+        identified = prediction_errors(model, without, piece)
+        validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
+    return np.stack(estimates), tuple(validation)
+
+
+def parts_of(dive: Dive, number: int) -> list[Dive]:
+    """A dive divided into equal parts."""
+    length = len(dive.inputs) // number
+    parts = []
+    for i in range(number):
+        rows = slice(i * length, (i + 1) * length)
+        arrays = (dive.inputs[rows], dive.values[rows], dive.offsets[rows], dive.counts[rows])
+        name = f"{dive.name}, part {i + 1} of {number}"
+        parts.append(Dive(name, dive.start + i * length * dive.step, dive.step, *arrays))
+    return parts
+
+
+def _with_nuisances(parts: np.ndarray | None, z: np.ndarray, count: int) -> np.ndarray | None:
+    """Estimates of the parts, with the nuisances of the whole."""
+    if parts is None:
+        return None
+    return np.hstack([parts, np.broadcast_to(z[count:], (len(parts), len(z) - count))])

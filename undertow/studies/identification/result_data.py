@@ -1,0 +1,69 @@
+"""An identification as plain data for identification.json."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from undertow.studies.identification.dive import RESIDUALS
+from undertow.studies.identification.identify import Identification, Validation
+from undertow.studies.identification.uncertainty import LEVEL, Interval
+from undertow.studies.identification.validation import HORIZONS, PredictionErrors
+
+
+def as_data(identification: Identification) -> dict[str, Any]:
+    """All of it but the time series."""
+    count = len(identification.parameters)
+    covariance = identification.uncertainty.covariance[:count, :count]
+    deviations = np.sqrt(np.diagonal(covariance))
+    estimate = identification.estimate
+    return {
+        "dives": [
+            {"name": dive.name, "duration": dive.duration, "sensors": dive.sensors()} for dive in identification.dives
+        ],
+        "level": LEVEL,
+        "parameters": {interval.parameter.name: _interval_data(interval) for interval in identification.intervals},
+        "correlation": (covariance / np.outer(deviations, deviations)).tolist(),
+        "correlation_time": identification.uncertainty.correlation_time,
+        "undetermined": [
+            {"parameters": list(combination.names), "sentence": combination.sentence(), "share": combination.share}
+            for combination in identification.undetermined
+        ],
+        "validation": [_validation_data(validation) for validation in identification.validation],
+        "noise": {
+            name: float(noise) for name, noise in zip(RESIDUALS, estimate.noise, strict=True) if np.isfinite(noise)
+        },
+        "iterations": estimate.iterations,
+        "converged": estimate.converged,
+        "findings": list(identification.findings),
+    }
+
+
+def _interval_data(interval: Interval) -> dict[str, Any]:
+    return {
+        "unit": interval.parameter.unit,
+        "value": interval.value,
+        "low": interval.low,
+        "high": interval.high,
+        "deviation": interval.deviation,
+        "prior": interval.parameter.prior,
+        "deviation_left": interval.share,
+        "verdict": interval.verdict,
+    }
+
+
+def _validation_data(validation: Validation) -> dict[str, Any]:
+    return {
+        "name": validation.name,
+        "identified": _errors_data(validation.identified),
+        "prior": _errors_data(validation.prior),
+    }
+
+
+def _errors_data(errors: PredictionErrors) -> dict[str, Any]:
+    ahead = {
+        f"{horizon:g}": {name: float(value) for name, value in zip(RESIDUALS, row, strict=True) if np.isfinite(value)}
+        for horizon, row in zip(HORIZONS, errors.ahead, strict=True)
+    }
+    fit = {axis: value for axis, value in errors.fit.items() if not math.isnan(value)}
+    return {"free_run_fit": fit, "rms_ahead": ahead}
