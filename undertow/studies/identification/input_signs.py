@@ -1,32 +1,30 @@
 """Which way each input pushes, whether two are swapped, and which do nothing.
 
-Output error cannot find a thruster that pushes the other way: its gain is positive there. In the weak form the gains are
-linear, so that their signs are seen at once, and how well the dive would be explained if two inputs were swapped.
+Output error cannot find a thruster that pushes the other way: its gain is positive there. In the weak form the gains
+are linear, so that their signs are seen at once, and how well the dive would be explained if two inputs were swapped.
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.core.measurement import BODY_AXES
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.finding import Finding
+from undertow.studies.identification.finding import ClockOffset, Finding
 from undertow.studies.identification.free_parameters import FreeParameter
 from undertow.studies.identification.identified_vehicle import AxisActuation, PriorVehicle
-from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
-from undertow.studies.identification.weak_form import body_balance, weak_problem, weights_of, wrenches_of
+from undertow.studies.identification.input_regression import GainSolution, InputRegression, Order, regression_of, solved
 
-_LOOSENED = 3.0  # factor on the prior deviations of everything that is not a gain
 _SURE = 4.0  # standard errors
 _NOTHING = 0.1  # of the gain that the file gives
 _MUCH_BETTER = 0.6  # factor on what remains unexplained
-_ROUNDS = 3  # of weights
-_OF_INPUTS = ("thruster_gain", "reverse_gain", "lag", "command_delay", "axis_")
+_BETTER = 0.85  # on some axis
+# Clocks that differ by some tenths of a second turn the sign of what a quick pilot does: the best offset is taken.
+_OFFSETS = 0.1 * np.arange(-6, 7)  # s
+_WORTH_SAYING = 0.05  # s
 
 
 class InputGains(NamedTuple):
@@ -37,6 +35,7 @@ class InputGains(NamedTuple):
         gains: over those of the file.
         deviations: their standard errors.
         swapped: pairs of inputs that explain the dives much better the other way round.
+        offset: of the inputs, behind the motion that they cause according to the lags of the file.
         findings: in words.
     """
 
@@ -44,23 +43,12 @@ class InputGains(NamedTuple):
     gains: np.ndarray
     deviations: np.ndarray
     swapped: tuple[tuple[int, int], ...]
+    offset: ClockOffset
     findings: tuple[Finding, ...]
 
 
-class _Regression(NamedTuple):
-    """Accelerations as a sum: of what the inputs do along the forces of each other, and of what the body does."""
-
-    of_inputs: np.ndarray  # (rows, N forces, N inputs)
-    of_body: np.ndarray  # (rows, parameters), prior standard deviations
-    target: np.ndarray  # (rows,)
-    usable: np.ndarray  # (rows / 6, 6)
-
-
 def input_gains(
-    prior: PriorVehicle,
-    parameters: Sequence[FreeParameter],
-    dives: Sequence[Dive],
-    names: Sequence[str] = (),
+    prior: PriorVehicle, parameters: Sequence[FreeParameter], dives: Sequence[Dive], names: Sequence[str] = ()
 ) -> InputGains:
     """The gain of each input by the weak form, free of sign, and what is strange about it.
 
@@ -70,152 +58,128 @@ def input_gains(
         dives: with equal steps.
         names: of the inputs; () for T1, T2, ... or the axes.
     """
-    regression, names = _regression(prior, parameters, dives, tuple(names))
+    names = tuple(names) or _usual_names(prior, dives[0].inputs.shape[1])
+    regressions = [regression_of(prior, parameters, [_later(dive, offset) for dive in dives]) for offset in _OFFSETS]
     order = tuple(range(len(names)))
     swapped: list[tuple[int, int]] = []
-    gains, deviations, error = _solved(regression, order)
-    while len(swapped) < len(names) // 2:
-        pairs = [pair for pair in itertools.combinations(range(len(names)), 2) if _are_free(pair, swapped)]
-        if not pairs:
-            break
-        trials = [_solved(regression, _swap(order, pair)) for pair in pairs]
-        best = int(np.argmin([trial[2] for trial in trials]))
-        if not trials[best][2] < _MUCH_BETTER * error:
-            break
-        swapped.append(pairs[best])
-        order = _swap(order, pairs[best])
-        gains, deviations, error = trials[best]
-    findings = _findings(names, gains, deviations, swapped)
-    return InputGains(names, gains, deviations, tuple(swapped), tuple(findings))
+    free = [solved(regression, order) for regression in regressions]
+    while better := _better_pair(regressions, order, swapped, free):
+        swapped.append(better)
+        order = _swap(order, better)
+        free = [solved(regression, order) for regression in regressions]
+    # Signs are only believed to be wrong where no offset explains the motion nearly as well with right ones.
+    right = [_with_positive_gains(regression, order) for regression in regressions]
+    are_wrong = bool((free[_best(free)].error < _BETTER * right[_best(right)].error).any())
+    solutions = free if are_wrong else right
+    best = _best(solutions)
+    solution = free[best]
+    matters = [are_wrong and _matters(regressions[best], order, solution, j) for j in range(len(names))]
+    offset = _offset([each.mean_error for each in solutions], regressions[best].usable)
+    findings = _findings(names, solution, matters, swapped)
+    if abs(offset.delay) > _WORTH_SAYING + 3 * offset.deviation:
+        findings.append(_offset_finding(offset))
+    return InputGains(names, solution.gains, solution.deviations, tuple(swapped), offset, tuple(findings))
 
 
-def _are_free(pair: tuple[int, int], swapped: list[tuple[int, int]]) -> bool:
-    return not any(index in earlier for earlier in swapped for index in pair)
+def _better_pair(
+    regressions: Sequence[InputRegression],
+    order: Order,
+    swapped: Sequence[tuple[int, int]],
+    free: Sequence[GainSolution],
+) -> tuple[int, int] | None:
+    """The two inputs that explain the motion best the other way round, if much better than as they are."""
+    used = {index for pair in swapped for index in pair}
+    pairs = list(itertools.combinations([j for j in range(len(order)) if j not in used], 2))
+    offsets = {_best(free), len(_OFFSETS) // 2}
+    trials = {pair: min(solved(regressions[k], _swap(order, pair)).mean_error for k in offsets) for pair in pairs}
+    best = min(trials, key=lambda pair: trials[pair], default=None)
+    return best if best and trials[best] < _MUCH_BETTER * free[_best(free)].mean_error else None
 
 
-def _swap(order: tuple[int, ...], pair: tuple[int, int]) -> tuple[int, ...]:
+def _swap(order: Order, pair: tuple[int, int]) -> Order:
     swapped = list(order)
     swapped[pair[0]], swapped[pair[1]] = order[pair[1]], order[pair[0]]
     return tuple(swapped)
 
 
-def _regression(
-    prior: PriorVehicle, parameters: Sequence[FreeParameter], dives: Sequence[Dive], names: tuple[str, ...]
-) -> tuple[_Regression, tuple[str, ...]]:
-    problem = weak_problem(dives)
-    of_body = [parameter for parameter in parameters if not parameter.name.startswith(_OF_INPUTS)]
-    model = model_of(prior, of_body)
-    z = np.zeros(len(Unknowns(tuple(of_body), len(dives)).all()))
-    is_per_axis = isinstance(prior.actuation, AxisActuation)
-    count = dives[0].inputs.shape[1]
-    gain_names = [f"axis_gain.{axis}" for axis in BODY_AXES] if is_per_axis else _thruster_gains(count)
-    settings = {p.name: jnp.asarray(p.prior) for p in parameters if p.name.startswith(_OF_INPUTS)}
-    settings = {name: value for name, value in settings.items() if name not in ("thruster_gain", "command_delay")}
-    unit_gains = jnp.asarray([float(settings.get(name, 1.0)) for name in gain_names])
-    test, slope = jnp.asarray(problem.test), jnp.asarray(problem.slope)
-    residuals, derivative, wrenches = (
-        np.asarray(part)
-        for part in _parts(model, jnp.asarray(z), tuple(gain_names), unit_gains, settings, problem.segments, test, slope, problem.step)
-    )
-    inverse_mass = np.asarray(model.candidate(jnp.asarray(z)).vehicle.body.inverse_mass_matrix)
-    # Wrench of input j along the force of each other: w_j = f_j d_j with the direction d_j of the file.
-    directions = _directions(wrenches)
-    strengths = np.einsum("jswa,ja->swj", wrenches, directions)
-    length = problem.segments.values.shape[1]
-    inputs = np.einsum("wk,skj->swj", problem.test, problem.segments.inputs[:, -length:])
-    signs = np.where((inputs * strengths).sum(axis=(0, 1)) < 0, -1.0, 1.0)
-    directions, strengths = signs[:, None] * directions, signs * strengths
-    accelerations = directions @ inverse_mass.T  # (N, 6)
-    of_inputs = np.einsum("ia,swj->swaij", accelerations, strengths).reshape(-1, count, count)
-    return (
-        _Regression(
-            of_inputs=of_inputs,
-            of_body=_LOOSENED * derivative.reshape(-1, derivative.shape[-1]),
-            target=-residuals.reshape(-1),
-            usable=problem.usable.reshape(-1, 6),
-        ),
-        names or tuple(BODY_AXES if is_per_axis else (f"T{j + 1}" for j in range(count))),
-    )
+def _best(solutions: Sequence[GainSolution]) -> int:
+    return int(np.argmin([solution.mean_error for solution in solutions]))
 
 
-def _thruster_gains(count: int) -> list[str]:
-    return [f"thruster_gain.T{j + 1}" for j in range(count)]
+def _offset(errors: Sequence[float], usable: np.ndarray) -> ClockOffset:
+    """By how much later inputs explain the motion best: the vertex of a parabola through the logarithm of the errors.
+
+    The residuals are taken as independent in every other window.
+    """
+    best = int(np.clip(np.argmin(errors), 1, len(errors) - 2))
+    before, here, after = np.log(np.maximum(errors[best - 1 : best + 2], 1e-12))
+    curvature = float(before - 2 * here + after)
+    if not curvature > 0:
+        return ClockOffset(0.0, math.inf)
+    spacing = float(_OFFSETS[1] - _OFFSETS[0])
+    vertex = float(_OFFSETS[best]) + spacing * float(np.clip((before - after) / (2 * curvature), -1, 1))
+    return ClockOffset(-vertex, spacing / math.sqrt(curvature * max(1, usable.sum() / 2)))
 
 
-def _directions(wrenches: np.ndarray) -> np.ndarray:
-    """Unit vectors along which each input pushes, but for their sign, (N, 6); zero of one that never does."""
-    flat = wrenches.reshape(len(wrenches), -1, 6)
-    strongest = np.abs(flat).sum(axis=2).argmax(axis=1)
-    pushes = flat[np.arange(len(flat)), strongest]
-    return pushes / np.maximum(np.linalg.norm(pushes, axis=1, keepdims=True), 1e-12)
+def _offset_finding(offset: ClockOffset) -> Finding:
+    size = f"{abs(offset.delay):.2f} +- {offset.deviation:.2f} s"
+    if offset.delay > 0:
+        sentence = f"The inputs come {size} later in the log than the motion that they cause"
+        return Finding("input", "", "note", sentence, "Let the times of the inputs be that much earlier in the mapping")
+    sentence = f"The motion follows the inputs {size} later than the thrusters of the file explain"
+    return Finding("input", "", "note", sentence, "Free `command_delay`, or let the inputs come that much later")
 
 
-@eqx.filter_jit
-def _parts(model: IdentificationModel, z, names: tuple[str, ...], gains, settings, segments, test, slope, step):
-    """Accelerations of the prior body without inputs, their derivative, and the mean wrench of each input."""
-
-    def residuals(unknowns, segment):
-        candidate = model.candidate(unknowns)
-        body = candidate.vehicle.body
-        nu, force = body_balance(body, candidate.sensing(segment.dive), segment)
-        return slope @ nu + (test @ force) @ body.inverse_mass_matrix.T
-
-    def of_segment(segment):
-        value, derivative = jax.linearize(lambda unknowns: residuals(unknowns, segment), z)
-        return value, jnp.moveaxis(jax.vmap(derivative)(jnp.eye(z.shape[0])), 0, -1)
-
-    def alone(row):
-        actuation = model.prior.actuation.with_values(settings | dict(zip(names, row, strict=True)))
-        one = lambda segment: test @ wrenches_of(actuation, segment.inputs, segment.values, step)
-        return jax.vmap(one)(segments)
-
-    value, derivative = jax.vmap(of_segment)(segments)
-    return value, derivative, jax.vmap(alone)(jnp.diag(gains))
+def _usual_names(prior: PriorVehicle, count: int) -> tuple[str, ...]:
+    return BODY_AXES if isinstance(prior.actuation, AxisActuation) else tuple(f"T{j + 1}" for j in range(count))
 
 
-def _solved(regression: _Regression, order: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
-    """Gains, their standard errors, and the mean size of what remains unexplained, in units of the noise at first."""
-    count = len(order)
-    # Input j of the log acts along the force of input order[j].
-    of_inputs = np.stack([regression.of_inputs[:, order[j], j] for j in range(count)], axis=1)
-    columns = np.hstack([of_inputs, regression.of_body])
-    prior = np.diag(np.concatenate([np.full(count, 1e-6), np.ones(regression.of_body.shape[1])]))
-    solution = np.zeros(columns.shape[1])
-    information = prior
-    residuals = -regression.target
-    for _ in range(_ROUNDS):
-        weights = weights_of(residuals.reshape(-1, 6), regression.usable).reshape(-1)
-        weighted = weights[:, None] * columns
-        information = weighted.T @ columns + prior
-        solution = np.linalg.solve(information, weighted.T @ regression.target)
-        residuals = columns @ solution - regression.target
-    usable = regression.usable.reshape(-1)
-    scale = np.where(usable, np.abs(regression.target), 0.0).reshape(-1, 6).sum(axis=0)
-    sizes = np.where(usable, np.abs(residuals), 0.0).reshape(-1, 6).sum(axis=0)
-    error = float((sizes[scale > 0] / scale[scale > 0]).mean()) if (scale > 0).any() else 1.0
-    deviations = np.sqrt(np.diagonal(np.linalg.inv(information)))[:count]
-    return solution[:count], deviations, error
+def _later(dive: Dive, offset: float) -> Dive:
+    """The same dive with inputs that come later, or earlier where the offset is negative."""
+    steps = np.arange(len(dive.inputs)) - round(offset / dive.step)
+    return dive._replace(inputs=dive.inputs[np.clip(steps, 0, len(steps) - 1)])
 
 
-def _findings(names, gains, deviations, swapped) -> list[Finding]:
+def _with_positive_gains(regression: InputRegression, order: Order) -> GainSolution:
+    """With the inputs left out whose gains would be negative."""
+    left_out: tuple[int, ...] = ()
+    while True:
+        solution = solved(regression, order, left_out)
+        negative = tuple(j for j in range(len(order)) if solution.gains[j] < 0 and j not in left_out)
+        if not negative:
+            return solution
+        left_out += negative
+
+
+def _matters(regression: InputRegression, order: Order, solution: GainSolution, index: int) -> bool:
+    """Whether the dive is explained worse, on some axis, when an input is left out."""
+    without = solved(regression, order, left_out=(index,)).error
+    with np.errstate(invalid="ignore"):
+        return bool((solution.error < _BETTER * without).any())
+
+
+def _findings(
+    names: Sequence[str], solution: GainSolution, matters: Sequence[bool], swapped: list[tuple[int, int]]
+) -> list[Finding]:
     findings = []
     for first, second in swapped:
-        findings.append(
-            Finding(
-                "input",
-                f"{names[first]} and {names[second]}",
-                "refused",
-                f"{names[first]} and {names[second]} are swapped: the motion follows each as the file says of the other",
-                f"Swap their columns in the mapping of the input, or the thrusters in the vehicle file",
-            )
-        )
-    for name, gain, deviation in zip(names, gains, deviations, strict=True):
-        if gain < -_SURE * deviation:
-            sentence = f"{name} pushes the other way than the file says (gain {gain:.2f} +- {deviation:.2f} of the file's)"
+        pair = f"{names[first]} and {names[second]}"
+        sentence = f"{pair} are swapped: the motion follows each of them as the file says of the other"
+        remedy = "Swap their columns in the mapping of the input, or the two thrusters in the vehicle file"
+        findings.append(Finding("input", pair, "refused", sentence, remedy))
+    for j, name in enumerate(names):
+        gain, deviation = float(solution.gains[j]), float(solution.deviations[j])
+        is_negative = gain < -max(_SURE * deviation, _NOTHING)
+        if is_negative and matters[j]:
+            sentence = f"{name} pushes the other way than the file says: {gain:.2f} +- {deviation:.2f} of its thrust"
             remedy = "Write its column with a minus in the mapping of the input, or turn it round in the vehicle file"
             findings.append(Finding("input", name, "refused", sentence, remedy))
+        elif is_negative:
+            sentence = f"{name} may push the other way than the file says ({gain:.2f} +- {deviation:.2f} of its thrust)"
+            sentence += ", but explains little of the motion"
+            findings.append(Finding("input", name, "note", sentence, "Move it alone in a short dive to be sure"))
         elif abs(gain) + 2 * deviation < _NOTHING:
-            sentence = f"{name} does nothing that can be seen (gain {gain:.3f} +- {deviation:.3f} of the file's)"
+            sentence = f"{name} has no effect that can be seen: {gain:.3f} +- {deviation:.3f} of what the file says"
             remedy = "Check its plug, its propeller, and which column of the log is its command"
             findings.append(Finding("input", name, "note", sentence, remedy))
     return findings

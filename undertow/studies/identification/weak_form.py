@@ -44,8 +44,8 @@ class FirstEstimate(NamedTuple):
         values: of the parameters by name.
         deviations: standard errors of the values, by name; without the share of the noise that biases products of
             measurements.
-        explained: share of the variance of the acceleration along each axis, surge to yaw, that the estimate explains; NaN where
-            the motion along an axis was not measured.
+        explained: share of the variance of the acceleration along each axis, surge to yaw, that the estimate
+            explains; NaN where the motion along an axis was not measured.
     """
 
     z: np.ndarray
@@ -133,7 +133,7 @@ def first_estimate(prior: PriorVehicle, parameters: Sequence[FreeParameter], div
         deviations={
             p.name: float(abs(slope) * d) for p, slope, d in zip(parameters, slopes, deviations[:count], strict=True)
         },
-        explained=_explained(problem, residuals),
+        explained=_explained(problem, residuals, weights),
     )
 
 
@@ -251,12 +251,14 @@ def _covariance(information, residuals, derivative, weights) -> np.ndarray:
     return sandwich + np.diag(np.maximum(np.diagonal(inverse) - np.diagonal(sandwich), 0.0))
 
 
-def _explained(problem: WeakProblem, residuals: np.ndarray) -> np.ndarray:
-    """Share of the variance of each acceleration that the forces of the estimate explain."""
+def _explained(problem: WeakProblem, residuals: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Share of the variance of each acceleration that the forces of the estimate explain, outliers at less weight."""
     accelerations = -np.einsum("wk,ska->swa", problem.slope, problem.segments.values[:, :, 7:13])
     explained = np.full(6, np.nan)
     for axis in range(6):
         usable = problem.usable[..., axis]
-        if usable.any() and accelerations[usable, axis].var() > 0:
-            explained[axis] = 1 - residuals[usable, axis].var() / accelerations[usable, axis].var()
+        weight, acceleration = weights[usable, axis], accelerations[usable, axis]
+        total = (weight * acceleration**2).sum()
+        if total > 0:
+            explained[axis] = 1 - (weight * residuals[usable, axis] ** 2).sum() / total
     return explained
