@@ -65,7 +65,7 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
     Raises:
         BadInput: nothing of the motion was measured, or not together with the inputs.
     """
-    measured = _measured(log)
+    measured = measured_by(log)
     if not measured:
         raise BadInput("log", "have an attitude, a velocity or an angular velocity", log.source)
     start = max(inputs.time[0], min(time[0] for time, _ in measured.values()))
@@ -95,7 +95,7 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
     )
 
 
-def _measured(log: LogSignals) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def measured_by(log: LogSignals) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and samples of each sensor that a log has."""
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     pose = next((log[name] for name in ("measured_position", "position") if name in log), None)

@@ -3,9 +3,20 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from undertow.studies.identification.clock_offset import ClockOffset
+
 # What a finding means: for information; a sensor or input that must not be used; an axis, or with the concern `log` the
 # whole log, that cannot be identified.
 SEVERITIES = ("note", "left_out", "refused")
+
+# Sensors in words.
+WORDS = {
+    "position": "position",
+    "attitude": "attitude",
+    "velocity": "velocity",
+    "rates": "angular velocity",
+    "depth": "depth",
+}
 
 
 class Finding(NamedTuple):
@@ -29,25 +40,13 @@ class Finding(NamedTuple):
         return f"{self.sentence}. {self.remedy}." if self.remedy else f"{self.sentence}."
 
 
-class ClockOffset(NamedTuple):
-    """How much later than another stream, or than it should, a stream comes; s.
-
-    Attributes:
-        delay: positive where it comes later.
-        deviation: standard error.
-    """
-
-    delay: float
-    deviation: float
-
-
 class DiveCheck(NamedTuple):
     """Result of the checks of a log.
 
     Attributes:
         findings: the gravest first.
-        offsets: delay of the angular velocity behind the attitude (`rates`), of the velocity behind the position
-            (`velocity`), and of each of both behind the inputs (`rates behind inputs`, ...), where it can be told.
+        offsets: delay of `rates` behind the attitude, of `velocity` behind the position, and of `inputs` behind the
+            motion that they cause; those that the log can tell.
     """
 
     findings: tuple[Finding, ...]

@@ -5,15 +5,15 @@ are linear, so that their signs are seen at once, and how well the dive would be
 """
 
 import itertools
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from undertow.core.measurement import BODY_AXES
+from undertow.studies.identification.clock_offset import ClockOffset, offset_of
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.finding import ClockOffset, Finding
+from undertow.studies.identification.finding import Finding
 from undertow.studies.identification.free_parameters import FreeParameter
 from undertow.studies.identification.identified_vehicle import AxisActuation, PriorVehicle
 from undertow.studies.identification.input_regression import GainSolution, InputRegression, Order, regression_of, solved
@@ -36,6 +36,8 @@ class InputGains(NamedTuple):
         deviations: their standard errors.
         swapped: pairs of inputs that explain the dives much better the other way round.
         offset: of the inputs, behind the motion that they cause according to the lags of the file.
+        effect: on each axis, size of the acceleration that is unexplained without inputs over that with them; NaN where
+            no motion is measured.
         findings: in words.
     """
 
@@ -44,6 +46,7 @@ class InputGains(NamedTuple):
     deviations: np.ndarray
     swapped: tuple[tuple[int, int], ...]
     offset: ClockOffset
+    effect: np.ndarray
     findings: tuple[Finding, ...]
 
 
@@ -74,11 +77,15 @@ def input_gains(
     best = _best(solutions)
     solution = free[best]
     matters = [are_wrong and _matters(regressions[best], order, solution, j) for j in range(len(names))]
-    offset = _offset([each.mean_error for each in solutions], regressions[best].usable)
-    findings = _findings(names, solution, matters, swapped)
-    if abs(offset.delay) > _WORTH_SAYING + 3 * offset.deviation:
+    # Inputs that agree best when they are made earlier come later in the log. Every other window is independent.
+    shift = offset_of([each.mean_error for each in solutions], _OFFSETS, regressions[best].usable.sum() / 2)
+    offset = shift._replace(delay=-shift.delay)
+    has_known_gains = not isinstance(prior.actuation, AxisActuation)
+    findings = _findings(names, solution, matters, swapped, has_known_gains)
+    if offset.is_worth_saying(_WORTH_SAYING):
         findings.append(_offset_finding(offset))
-    return InputGains(names, solution.gains, solution.deviations, tuple(swapped), offset, tuple(findings))
+    effect = np.array([_effect(regressions[best], order, axis) for axis in range(len(BODY_AXES))])
+    return InputGains(names, solution.gains, solution.deviations, tuple(swapped), offset, effect, tuple(findings))
 
 
 def _better_pair(
@@ -106,27 +113,11 @@ def _best(solutions: Sequence[GainSolution]) -> int:
     return int(np.argmin([solution.mean_error for solution in solutions]))
 
 
-def _offset(errors: Sequence[float], usable: np.ndarray) -> ClockOffset:
-    """By how much later inputs explain the motion best: the vertex of a parabola through the logarithm of the errors.
-
-    The residuals are taken as independent in every other window.
-    """
-    best = int(np.clip(np.argmin(errors), 1, len(errors) - 2))
-    before, here, after = np.log(np.maximum(errors[best - 1 : best + 2], 1e-12))
-    curvature = float(before - 2 * here + after)
-    if not curvature > 0:
-        return ClockOffset(0.0, math.inf)
-    spacing = float(_OFFSETS[1] - _OFFSETS[0])
-    vertex = float(_OFFSETS[best]) + spacing * float(np.clip((before - after) / (2 * curvature), -1, 1))
-    return ClockOffset(-vertex, spacing / math.sqrt(curvature * max(1, usable.sum() / 2)))
-
-
 def _offset_finding(offset: ClockOffset) -> Finding:
-    size = f"{abs(offset.delay):.2f} +- {offset.deviation:.2f} s"
     if offset.delay > 0:
-        sentence = f"The inputs come {size} later in the log than the motion that they cause"
+        sentence = f"The inputs come {offset} later in the log than the motion that they cause"
         return Finding("input", "", "note", sentence, "Let the times of the inputs be that much earlier in the mapping")
-    sentence = f"The motion follows the inputs {size} later than the thrusters of the file explain"
+    sentence = f"The motion follows the inputs {offset} later than the thrusters of the file explain"
     return Finding("input", "", "note", sentence, "Free `command_delay`, or let the inputs come that much later")
 
 
@@ -151,6 +142,17 @@ def _with_positive_gains(regression: InputRegression, order: Order) -> GainSolut
         left_out += negative
 
 
+def _effect(regression: InputRegression, order: Order, axis: int) -> float:
+    """Size of the acceleration along an axis that is unexplained without inputs over that with them."""
+    usable = regression.usable & (np.arange(len(BODY_AXES)) == axis)
+    of_axis = regression._replace(usable=usable)
+    inputs_freedom, freedom = len(order), int(usable.sum())
+    if freedom <= 2 * inputs_freedom:
+        return np.nan
+    remaining, without = solved(of_axis, order).error[axis], solved(of_axis, order, left_out=order).error[axis]
+    return float(without / max(remaining, 1e-12) * np.sqrt(1 - inputs_freedom / freedom))
+
+
 def _matters(regression: InputRegression, order: Order, solution: GainSolution, index: int) -> bool:
     """Whether the dive is explained worse, on some axis, when an input is left out."""
     without = solved(regression, order, left_out=(index,)).error
@@ -159,7 +161,11 @@ def _matters(regression: InputRegression, order: Order, solution: GainSolution, 
 
 
 def _findings(
-    names: Sequence[str], solution: GainSolution, matters: Sequence[bool], swapped: list[tuple[int, int]]
+    names: Sequence[str],
+    solution: GainSolution,
+    matters: Sequence[bool],
+    swapped: list[tuple[int, int]],
+    has_known_gains: bool,
 ) -> list[Finding]:
     findings = []
     for first, second in swapped:
@@ -178,7 +184,7 @@ def _findings(
             sentence = f"{name} may push the other way than the file says ({gain:.2f} +- {deviation:.2f} of its thrust)"
             sentence += ", but explains little of the motion"
             findings.append(Finding("input", name, "note", sentence, "Move it alone in a short dive to be sure"))
-        elif abs(gain) + 2 * deviation < _NOTHING:
+        elif has_known_gains and abs(gain) + 2 * deviation < _NOTHING:
             sentence = f"{name} has no effect that can be seen: {gain:.3f} +- {deviation:.3f} of what the file says"
             remedy = "Check its plug, its propeller, and which column of the log is its command"
             findings.append(Finding("input", name, "note", sentence, remedy))
