@@ -26,8 +26,8 @@ _CAPTIONS = {
 }
 _SURE = (
     "An interval contains the true value in 95 of 100 cases if the model has the right form. It allows for "
-    "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the model lacks: "
-    "the free run above tells whether that matters."
+    "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the "
+    "model lacks: the free run above tells whether that matters."
 )
 _VERDICTS = {"determined": "determined", "partly": "partly determined", "unknown": "not determined"}
 

@@ -101,12 +101,11 @@ def model_of(prior: PriorVehicle, parameters: Sequence[FreeParameter]) -> Identi
 class NormalEquations(NamedTuple):
     """Of a segment, from weighted residuals r and their derivatives A (unknowns) and B (motion at the begin)."""
 
-    cost: Float[Array, ""]  # sum of squares over weights, halved
-    aa: Float[Array, "P P"]
-    ab: Float[Array, "P 12"]
-    bb: Float[Array, "12 12"]
-    a: Float[Array, " P"]  # A' r
-    b: Float[Array, "12"]  # B' r
+    aa: Any  # A' A, (P, P)
+    ab: Any  # A' B, (P, 12)
+    bb: Any  # B' B, (12, 12)
+    a: Any  # A' r, (P,)
+    b: Any  # B' r, (12,)
 
 
 @eqx.filter_jit
@@ -128,10 +127,8 @@ def normal_equations(model: IdentificationModel, z, starts, segments, weights, s
         weighted = weight.reshape(-1)
         a, b = derivative[:, : z.shape[0]], derivative[:, z.shape[0] :]
         wa = weighted[:, None] * a
-        return NormalEquations(
-            cost=0.5 * (weighted * flat**2).sum(), aa=wa.T @ a, ab=wa.T @ b, bb=b.T @ (weighted[:, None] * b),
-            a=wa.T @ flat, b=b.T @ (weighted * flat),
-        )  # fmt: skip
+        wb = weighted[:, None] * b
+        return NormalEquations(wa.T @ a, wa.T @ b, wb.T @ b, wa.T @ flat, wb.T @ flat)
 
     return jax.lax.map(lambda row: of_segment(*row), (starts, segments, weights), batch_size=_AT_ONCE)
 

@@ -21,7 +21,9 @@ from undertow.studies.identification.model import (
 )
 from undertow.studies.identification.segments import Segments
 
-_HUBER = 3.0  # standard deviations from which on a residual counts as an outlier
+# Standard deviations from which on a residual counts as an outlier: at first few do, since far from the estimate those
+# of good samples are large; then those of a normal distribution hardly do.
+_HUBER = (30.0, 3.0)
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -29,7 +31,7 @@ _ITERATIONS = 60
 _TRIES = 10  # dampings of a step
 _GOOD, _POOR = 0.75, 0.25  # shares of the expected decrease above and below which the damping changes
 _CONVERGED = 0.05  # decrease of the cost; 0.5 is one standard deviation of a parameter
-_RELATIVE = 1e-4  # the same as a share of the cost, where residuals are not white
+_RELATIVE = 3e-5  # the same as a share of the cost, where residuals are not white
 _NOISE_CONVERGED = 0.02  # largest relative change of a noise
 
 
@@ -88,25 +90,27 @@ def fit(
     residuals = _residuals(model, segments, step, z, starts)
     noise = _first_noise(counts) if noise is None else noise
     damping, converged, iteration = 1e-3, False, 0
+    huber, *others = _HUBER
     for iteration in range(1, _ITERATIONS + 1):
-        weights = _weights(residuals, counts, noise)
+        weights = _weights(residuals, counts, noise, huber)
         cost = _cost(residuals, weights, z, starts)
         watch(iteration, cost)
         parts = _evaluated(model, segments, weights, step, z, starts)
         trial = _improved(model, segments, parts, weights, step, z, starts, least, damping, cost)
-        if trial is None:
-            converged = iteration > 1
-            break
-        small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
-        z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
-        new_noise = np.clip(_noise(residuals, counts), noise / _FASTEST, noise * _FASTEST)
+        small = trial is None
+        if trial is not None:
+            small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
+            z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
+        new_noise = np.clip(_noise(residuals, counts, huber), noise / _FASTEST, noise * _FASTEST)
         finite = np.isfinite(new_noise)
         steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
         noise = new_noise
         if steady and small:
-            converged = True
-            break
-    weights = _weights(residuals, counts, noise)
+            if not others:
+                converged = True
+                break
+            huber, *others = others
+    weights = _weights(residuals, counts, noise, huber)
     parts = _evaluated(model, segments, weights, step, z, starts)
     information, _, reduction = _reduced(parts, z, starts, 0.0)
     cost = _cost(residuals, weights, z, starts)
@@ -159,57 +163,64 @@ def _evaluated(model, segments, weights, step, z, starts) -> NormalEquations:
     return NormalEquations(*(np.asarray(part) for part in parts))
 
 
-def _reduced(parts: NormalEquations, z, starts, damping: float):
+def _reduced(parts: NormalEquations, z: np.ndarray, starts: np.ndarray, damping: float):
     """Information and gradient of the unknowns, with the begins of the segments eliminated, and the elimination."""
-    bb = parts.bb + np.eye(12)
-    bb = bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
+    bb = _damped(parts, damping)
     reduction = np.linalg.solve(bb, parts.ab.transpose(0, 2, 1))
     information = parts.aa.sum(axis=0) + np.eye(len(z)) - np.einsum("spq,sqr->pr", parts.ab, reduction)
-    b = parts.b + starts
-    gradient = parts.a.sum(axis=0) + z - np.einsum("spq,sq->p", parts.ab, np.linalg.solve(bb, b[..., None])[..., 0])
+    eliminated = np.linalg.solve(bb, (parts.b + starts)[..., None])[..., 0]
+    gradient = parts.a.sum(axis=0) + z - np.einsum("spq,sq->p", parts.ab, eliminated)
     return information, gradient, reduction
 
 
-def _step(parts: NormalEquations, z, starts, damping: float, least: np.ndarray):
-    """The next unknowns; those at their smallest value that would become smaller stay there."""
+def _damped(parts: NormalEquations, damping: float) -> np.ndarray:
+    """B' B of each segment with what was known beforehand, damped, (S, 12, 12)."""
+    bb = parts.bb + np.eye(12)
+    return bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
+
+
+def _step(parts: NormalEquations, z: np.ndarray, starts: np.ndarray, damping: float, least: np.ndarray):
+    """The next unknowns and begins."""
     information, gradient, _ = _reduced(parts, z, starts, damping)
     information = information + damping * np.diag(np.diagonal(information))
-    free = np.ones(len(z), dtype=bool)
-    for _ in range(len(z)):
-        change = np.zeros(len(z))
-        change[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])
-        blocked = free & (z <= least) & (change < 0)
-        if not blocked.any():
-            break
-        free &= ~blocked
-    new_z = np.maximum(z + change, least)
-    bb = parts.bb + np.eye(12)
-    bb = bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
+    new_z = np.maximum(z + _change(information, gradient, z <= least), least)
     right = parts.b + starts + np.einsum("spq,p->sq", parts.ab, new_z - z)
-    return new_z, starts - np.linalg.solve(bb, right[..., None])[..., 0]
+    return new_z, starts - np.linalg.solve(_damped(parts, damping), right[..., None])[..., 0]
+
+
+def _change(information: np.ndarray, gradient: np.ndarray, at_least: np.ndarray) -> np.ndarray:
+    """Newton's step; unknowns at their smallest value that would become smaller stay there."""
+    free = np.ones(len(gradient), dtype=bool)
+    while True:
+        change = np.zeros(len(gradient))
+        change[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])
+        blocked = free & at_least & (change < 0)
+        if not blocked.any():
+            return change
+        free &= ~blocked
 
 
 def _first_noise(counts: np.ndarray) -> np.ndarray:
     return np.where(counts.sum(axis=(0, 1)) > 0, _FIRST_NOISE, np.inf)
 
 
-def _noise(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def _noise(residuals: np.ndarray, counts: np.ndarray, huber: float) -> np.ndarray:
     """Standard deviation of a single sample for each kind of residual, outliers cut at some of them."""
     estimate = np.full(len(RESIDUALS), np.inf)
     for i in range(len(RESIDUALS)):
         measured = counts[:, :, i] > 0
         if measured.any():
             scaled = np.abs(residuals[:, :, i][measured]) * np.sqrt(counts[:, :, i][measured])
-            limit = _HUBER * max(1.4826 * float(np.median(scaled)), _SMALLEST_NOISE)
+            limit = huber * max(1.4826 * float(np.median(scaled)), _SMALLEST_NOISE)
             estimate[i] = max(float(np.sqrt((np.minimum(scaled, limit) ** 2).mean())), _SMALLEST_NOISE)
     return estimate
 
 
-def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> np.ndarray:
+def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray, huber: float) -> np.ndarray:
     """1/variance of each residual, less for outliers (Huber), 0 without a sample."""
     with np.errstate(divide="ignore", invalid="ignore"):
         sizes = np.abs(residuals) * np.sqrt(counts) / noise
-        robust = np.where(sizes > _HUBER, _HUBER / sizes, 1.0)
+        robust = np.where(sizes > huber, huber / sizes, 1.0)
         return np.where(counts > 0, robust * counts / noise**2, 0.0)
 
 

@@ -1,0 +1,84 @@
+"""How often the 95 % intervals of `undertow identify` contain the truth, parameter by parameter, on simulated dives.
+
+Each seed has a BlueROV2 Heavy whose numbers differ at random from the vehicle file (damping by 30 %, the centre of buoyancy
+by 9 mm, ...), a current, noise of all sensors, and uneven times of samples. `python benchmarks/identification_coverage.py --seeds 200`.
+"""
+
+import argparse
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.runtime import in_precision
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.t200 import t200
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.studies.identification.dive import dive_of
+from undertow.studies.identification.free_parameters import chosen, parameters_of
+from undertow.studies.identification.identified_vehicle import prior_vehicle
+from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
+from undertow.studies.identification.output_error import fit, scores_of
+from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.uncertainty import uncertainty_of
+
+AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
+SPREAD = 0.3  # of the true numbers, in the deviations that are usual beforehand; ten times that is another vehicle
+VOLTS_AT = 50.0  # N at which a T200 has its 16 V, about
+
+
+def main() -> None:
+    """Print the table."""
+    options = argparse.ArgumentParser()
+    options.add_argument("--seeds", type=int, default=20)
+    options.add_argument("--first", type=int, default=0)
+    options.add_argument("--duration", type=float, default=60.0, help="s")
+    options.add_argument("--step", type=float, default=0.05, help="s")
+    arguments = options.parse_args()
+    with in_precision("float64"):
+        run(arguments.seeds, arguments.first, arguments.duration, arguments.step)
+
+
+def run(seeds: int, first: int, duration: float, step: float) -> None:
+    """Identify one vehicle per seed, and count."""
+    plant = hybrid_vehicle(bluerov2_heavy(), t200())
+    prior = prior_vehicle(plant)
+    parameters = chosen(parameters_of(plant))
+    model = model_of(prior, parameters)
+    unknowns = Unknowns(tuple(parameters), 1)
+    inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
+    make = jax.jit(lambda z: model.candidate(z).vehicle)
+    inside = np.zeros((seeds, len(parameters)), dtype=bool)
+    shares = np.zeros((seeds, len(parameters)))
+    started = time.process_time()
+    for number in range(seeds):
+        generator = np.random.default_rng(first + number)
+        truth = SPREAD * generator.standard_normal(len(parameters))
+        truth = np.maximum(truth, unknowns.least()[: len(parameters)])
+        vehicle = make(jnp.asarray(np.concatenate([truth, np.zeros(len(NUISANCES))])))
+        thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
+        volts = np.clip(16 * np.sign(thrust) * np.sqrt(np.abs(thrust) / VOLTS_AT), -16, 16)
+        current = (*generator.uniform(-0.2, 0.2, 2), 0.0)
+        log = simulated_log(vehicle, volts, generator, current=current)
+        dive = dive_of(log, log["input"], step)
+        segments = segments_of([dive], 10.0)
+        estimate = fit(model, segments, step, np.zeros(len(unknowns.least())), unknowns.least())
+        uncertainty = uncertainty_of(estimate.information, scores_of(model, segments, step, estimate), step)
+        intervals = uncertainty.intervals(parameters, estimate.z)
+        values = [parameter.value(z) for parameter, z in zip(parameters, truth, strict=True)]
+        inside[number] = [i.low <= value <= i.high for i, value in zip(intervals, values, strict=True)]
+        shares[number] = [interval.share for interval in intervals]
+        missed = [p.name for p, good in zip(parameters, inside[number], strict=True) if not good]
+        print(
+            f"seed {first + number}: {estimate.iterations} iterations, converged {estimate.converged}, missed {missed}"
+        )
+    print(f"{'parameter':28}covered, %   deviation left")
+    for i, parameter in enumerate(parameters):
+        print(f"{parameter.name:28}{100 * inside[:, i].mean():8.1f}   {np.median(shares[:, i]):12.3f}")
+    print(f"all: {100 * inside.mean():.1f} %, {(time.process_time() - started) / seeds:.1f} s of processor time a seed")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""Logs of simulated dives, of a vehicle whose numbers are known: what an identification is tested with."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from undertow.core.numerics.rotations import euler_from_rotation, rotation_from_quaternion
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
+from undertow.studies.identification.identified_vehicle import IdentifiedVehicle
+from undertow.studies.identification.prediction import Sensing, motion
+from undertow.studies.identification.segments import Segments
+
+_FINE = 0.01  # s, of the integration
+_BEFORE = 200  # steps of run-in
+_JITTER = 0.2  # of the interval between two samples, at most
+
+
+class SensorSpecification(NamedTuple):
+    """How a sensor measures: rate in Hz, and standard deviation of its noise in the unit of the signal."""
+
+    rate: float
+    noise: float
+
+
+# A vehicle with an acoustic position, an attitude reference, a DVL and gyros.
+SENSORS = {
+    "position": SensorSpecification(5.0, 0.02),
+    "attitude": SensorSpecification(20.0, 0.01),
+    "body_velocity": SensorSpecification(10.0, 0.02),
+    "angular_velocity": SensorSpecification(50.0, 0.005),
+}
+_COLUMNS = {
+    "position": (("north", "east", "down"), "m"),
+    "attitude": (("roll", "pitch", "yaw"), "rad"),
+    "body_velocity": (("surge", "sway", "heave"), "m/s"),
+    "angular_velocity": (("p", "q", "r"), "rad/s"),
+}
+
+
+def telegraph_wrenches(
+    generator: np.random.Generator, duration: float, amplitudes: np.ndarray, shortest: float = 0.5, longest: float = 3.0
+) -> np.ndarray:
+    """Forces and moments that jump between minus, zero and plus an amplitude at random times, (steps, 6).
+
+    Args:
+        generator: of random numbers.
+        duration: s.
+        amplitudes: of the six axes, N and N m.
+        shortest, longest: time between two jumps of an axis, s.
+    """
+    steps = round(duration / _FINE)
+    wrenches = np.zeros((steps, 6))
+    for axis, amplitude in enumerate(amplitudes):
+        begin = 0
+        while begin < steps:
+            end = begin + max(1, round(generator.uniform(shortest, longest) / _FINE))
+            wrenches[begin:end, axis] = amplitude * generator.choice([-1.0, 0.0, 1.0])
+            begin = end
+    return wrenches
+
+
+def simulated_log(
+    vehicle: IdentifiedVehicle,
+    inputs: np.ndarray,
+    generator: np.random.Generator,
+    *,
+    sensors: Mapping[str, SensorSpecification] = SENSORS,
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    command_delay: float = 0.0,
+    depth: float = 5.0,
+    name: str = "simulated dive",
+) -> Log:
+    """The log of a dive that begins at rest.
+
+    Args:
+        vehicle: see there.
+        inputs: of its thrusters every 0.01 s, of which every fifth is logged and acts, (steps, N).
+        generator: of the noise and of the times of the samples.
+        sensors: by signal.
+        current: of the water, world, m/s.
+        command_delay: s.
+        depth: at the begin, m.
+        name: of the log.
+    """
+    held = np.repeat(inputs[::5], 5, axis=0)[: len(inputs)]
+    truth = _motion(vehicle, jnp.asarray(command_delay), jnp.asarray(current), jnp.asarray(held), depth)
+    series = {name: np.asarray(values) for name, values in truth.items()}
+    duration = _FINE * len(inputs)
+    time = _FINE * np.arange(len(inputs) + 1)
+    signals = {}
+    for signal, sensor in sensors.items():
+        stamps = np.arange(0.0, duration, 1 / sensor.rate)
+        stamps = stamps + generator.uniform(0.0, _JITTER / sensor.rate, len(stamps))
+        values = np.stack([np.interp(stamps, time, column) for column in series[signal].T], axis=1)
+        if signal == "attitude":  # of quaternions between two steps
+            values = np.asarray(_euler(jnp.asarray(values / np.linalg.norm(values, axis=1, keepdims=True))))
+        values = values + sensor.noise * generator.standard_normal(values.shape)
+        columns, unit = _COLUMNS[signal]
+        signals[signal] = Series(stamps, values, columns, unit)
+    numbers = tuple(f"T{i + 1}" for i in range(held.shape[1]))
+    signals["input"] = Series(time[:-1:5], held[::5], numbers, "V")
+    return Log(signals, name, "undertow")
+
+
+@eqx.filter_jit
+def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: float):
+    """True signals at every fine step."""
+    steps = inputs.shape[0]
+    start = jnp.zeros(13).at[2].set(depth).at[3].set(1.0)
+    nothing = jnp.zeros((steps, 1))
+    with_run_in = jnp.concatenate([jnp.zeros((_BEFORE, inputs.shape[1])), inputs])
+    segment = Segments(with_run_in, nothing, nothing, nothing, start, jnp.zeros(()), jnp.zeros(()))  # pyright: ignore[reportArgumentType] - JAX arrays
+    states = motion(vehicle, Sensing(command_delay, current, jnp.zeros(3)), jnp.zeros(12), segment, jnp.asarray(_FINE))
+    return {
+        "position": states.position,
+        "attitude": states.attitude,
+        "body_velocity": states.nu[:, :3],
+        "angular_velocity": states.nu[:, 3:],
+    }
+
+
+@jax.jit
+def _euler(quaternions):
+    """Roll, pitch, yaw of each."""
+    return jax.vmap(lambda attitude: euler_from_rotation(rotation_from_quaternion(attitude)))(quaternions)
