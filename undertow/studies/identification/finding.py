@@ -19,7 +19,7 @@ WORDS = {
 }
 
 
-class Finding(NamedTuple):
+class LogFinding(NamedTuple):
     """One thing that is worth knowing about a log.
 
     Attributes:
@@ -49,7 +49,7 @@ class DiveCheck(NamedTuple):
             motion that they cause; those that the log can tell.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
     offsets: Mapping[str, ClockOffset]
 
     def left_out(self) -> list[str]:
@@ -60,10 +60,10 @@ class DiveCheck(NamedTuple):
         """Axes that cannot be identified."""
         return _names(self.findings, "axis", "refused")
 
-    def refusals(self) -> list[Finding]:
+    def refusals(self) -> list[LogFinding]:
         """Why the log cannot be used at all; () where it can."""
         return [f for f in self.findings if f.severity == "refused" and f.concern in ("log", "input")]
 
 
-def _names(findings: tuple[Finding, ...], concern: str, severity: str) -> list[str]:
+def _names(findings: tuple[LogFinding, ...], concern: str, severity: str) -> list[str]:
     return list(dict.fromkeys(f.name for f in findings if f.concern == concern and f.severity == severity))

@@ -36,7 +36,8 @@ def filled(dive: Dive) -> Dive:
 def usable_axes(complete: np.ndarray) -> np.ndarray:
     """Whether the equation of each axis can be used, (..., 6), given which sensors are there, (..., 5).
 
-    Linear velocities are not needed for a turn: what they add to its moment is small.
+    The equations of turns are used without linear velocities, too, although these add to the moments of roll and pitch:
+    a rough estimate is better than none.
     """
     _, attitude, velocity, rates, _ = np.moveaxis(complete, -1, 0)
     of_axis = {axis: velocity for axis in BODY_AXES[:3]} | {axis: rates for axis in BODY_AXES[3:]}

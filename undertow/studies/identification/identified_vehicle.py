@@ -92,7 +92,7 @@ class ThrusterActuation(AbstractActuation):
         gains = jnp.stack([jnp.asarray(values.get(f"thruster_gain.T{j + 1}", 1.0)) for j in range(count)])
         return ThrusterActuation(
             thruster=self.thruster,
-            thruster_matrix=self.thruster_matrix * (values.get("thruster_gain", 1.0) * gains),
+            thruster_matrix=self.thruster_matrix * (values.get("thruster_gain", 1.0) * gains)[None, :],
             inflow_loss=self.inflow_loss,
             reverse_gain=jnp.asarray(values.get("reverse_gain", self.reverse_gain)),
             lag=jnp.asarray(values.get("lag", self.lag)),

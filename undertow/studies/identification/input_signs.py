@@ -13,7 +13,7 @@ import numpy as np
 from undertow.core.measurement import BODY_AXES
 from undertow.studies.identification.clock_offset import ClockOffset, offset_of
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.finding import Finding
+from undertow.studies.identification.finding import LogFinding
 from undertow.studies.identification.free_parameters import FreeParameter
 from undertow.studies.identification.identified_vehicle import AxisActuation, PriorVehicle
 from undertow.studies.identification.input_regression import GainSolution, InputRegression, Order, regression_of, solved
@@ -47,7 +47,7 @@ class InputGains(NamedTuple):
     swapped: tuple[tuple[int, int], ...]
     offset: ClockOffset
     effect: np.ndarray
-    findings: tuple[Finding, ...]
+    findings: tuple[LogFinding, ...]
 
 
 def input_gains(
@@ -113,12 +113,14 @@ def _best(solutions: Sequence[GainSolution]) -> int:
     return int(np.argmin([solution.mean_error for solution in solutions]))
 
 
-def _offset_finding(offset: ClockOffset) -> Finding:
+def _offset_finding(offset: ClockOffset) -> LogFinding:
     if offset.delay > 0:
         sentence = f"The inputs come {offset} later in the log than the motion that they cause"
-        return Finding("input", "", "note", sentence, "Let the times of the inputs be that much earlier in the mapping")
+        return LogFinding(
+            "input", "", "note", sentence, "Let the times of the inputs be that much earlier in the mapping"
+        )
     sentence = f"The motion follows the inputs {offset} later than the thrusters of the file explain"
-    return Finding("input", "", "note", sentence, "Free `command_delay`, or let the inputs come that much later")
+    return LogFinding("input", "", "note", sentence, "Free `command_delay`, or let the inputs come that much later")
 
 
 def _usual_names(prior: PriorVehicle, count: int) -> tuple[str, ...]:
@@ -166,26 +168,26 @@ def _findings(
     matters: Sequence[bool],
     swapped: list[tuple[int, int]],
     has_known_gains: bool,
-) -> list[Finding]:
+) -> list[LogFinding]:
     findings = []
     for first, second in swapped:
         pair = f"{names[first]} and {names[second]}"
         sentence = f"{pair} are swapped: the motion follows each of them as the file says of the other"
         remedy = "Swap their columns in the mapping of the input, or the two thrusters in the vehicle file"
-        findings.append(Finding("input", pair, "refused", sentence, remedy))
+        findings.append(LogFinding("input", pair, "refused", sentence, remedy))
     for j, name in enumerate(names):
         gain, deviation = float(solution.gains[j]), float(solution.deviations[j])
         is_negative = gain < -max(_SURE * deviation, _NOTHING)
         if is_negative and matters[j]:
             sentence = f"{name} pushes the other way than the file says: {gain:.2f} +- {deviation:.2f} of its thrust"
             remedy = "Write its column with a minus in the mapping of the input, or turn it round in the vehicle file"
-            findings.append(Finding("input", name, "refused", sentence, remedy))
+            findings.append(LogFinding("input", name, "refused", sentence, remedy))
         elif is_negative:
             sentence = f"{name} may push the other way than the file says ({gain:.2f} +- {deviation:.2f} of its thrust)"
             sentence += ", but explains little of the motion"
-            findings.append(Finding("input", name, "note", sentence, "Move it alone in a short dive to be sure"))
+            findings.append(LogFinding("input", name, "note", sentence, "Move it alone in a short dive to be sure"))
         elif has_known_gains and abs(gain) + 2 * deviation < _NOTHING:
             sentence = f"{name} has no effect that can be seen: {gain:.3f} +- {deviation:.3f} of what the file says"
             remedy = "Check its plug, its propeller, and which column of the log is its command"
-            findings.append(Finding("input", name, "note", sentence, remedy))
+            findings.append(LogFinding("input", name, "note", sentence, remedy))
     return findings

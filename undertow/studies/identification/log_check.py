@@ -1,5 +1,6 @@
 """Checks of a log before anything is fitted: what cannot be used or identified, and what to do about it."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ from undertow.logs.log_signals import LogSignals, Series
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.studies.identification.clock_offset import ClockOffset
 from undertow.studies.identification.dive import Dive, dive_of, measured_by
-from undertow.studies.identification.finding import SEVERITIES, DiveCheck, Finding
+from undertow.studies.identification.finding import SEVERITIES, DiveCheck, LogFinding
 from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.input_check import axis_findings, input_findings
@@ -36,12 +37,14 @@ def check_dive(
     if per_axis and inputs.values.shape[1:] == (len(BODY_AXES),):
         inputs = inputs._replace(columns=BODY_AXES)
     series = sensor_series(log)
-    findings = stream_findings(series)
+    findings = stream_findings(series, log.duration())
     useless = {finding.name for finding in findings if finding.severity == "left_out"}
     if not set(series) - useless:
         sentence = "The log has no motion: no attitude, velocity, angular velocity, position or depth that can be used"
-        findings.append(Finding("log", "", "refused", sentence, "Map the columns or topics that hold them"))
+        findings.append(LogFinding("log", "", "refused", sentence, "Map the columns or topics that hold them"))
     findings += input_findings(inputs, vehicle, per_axis)
+    is_finite = np.isfinite(inputs.values.reshape(-1, len(inputs.column_names()))).all(axis=1)
+    inputs = inputs._replace(time=inputs.time[is_finite], values=inputs.values[is_finite])
     offsets: dict[str, ClockOffset] = {}
     measured = {name: stream for name, stream in measured_by(log).items() if name not in useless}
     if "attitude" in series and "attitude" not in useless:
@@ -57,10 +60,11 @@ def check_dive(
     grave = {finding.name for finding in findings if finding.severity != "note"}
     findings = [finding for finding in findings if finding.severity != "note" or finding.name not in grave - {""}]
     findings.sort(key=lambda finding: -SEVERITIES.index(finding.severity))
-    return DiveCheck(tuple(findings), offsets)
+    told = {name: offset for name, offset in offsets.items() if math.isfinite(offset.deviation)}
+    return DiveCheck(tuple(findings), told)
 
 
-def _attitude_findings(attitude: Series, measured: dict, offsets: dict[str, ClockOffset]) -> Iterator[Finding]:
+def _attitude_findings(attitude: Series, measured: dict, offsets: dict[str, ClockOffset]) -> Iterator[LogFinding]:
     """Units of the attitude, its heading, and whether other sensors agree with it."""
     in_degrees = is_in_degrees(attitude)
     if in_degrees is None and not _has_heading(attitude):
@@ -69,7 +73,9 @@ def _attitude_findings(attitude: Series, measured: dict, offsets: dict[str, Cloc
     findings, offset = rates_findings(attitude, measured["rates"]) if "rates" in measured else ([], None)
     if offset is not None:
         offsets["rates"] = offset
-    units = [finding for finding in findings if finding.concern == "log"] or [in_degrees] * (in_degrees is not None)
+    units = [finding for finding in findings if finding.concern == "log"]
+    if in_degrees is not None and not units:
+        units = [in_degrees]
     yield from units or findings
     if not units and "position" in measured and "velocity" in measured:
         findings, offset = velocity_findings(measured["attitude"], measured["position"], measured["velocity"])
@@ -83,17 +89,19 @@ def _has_heading(attitude: Series) -> bool:
     return len(yaw) > 0 and float(np.ptp(yaw)) > 1e-6
 
 
-def _heading_findings(attitude: Series, measured: dict) -> Iterator[Finding]:
+def _heading_findings(attitude: Series, measured: dict) -> Iterator[LogFinding]:
     """What an attitude without a heading means."""
     yaw = attitude.values[np.isfinite(attitude.values).all(axis=1), 2]
     time, rates = measured.get("rates", (np.zeros(2), np.zeros((2, 3))))
     turned = float(np.ptp(np.cumsum(np.diff(time) * rates[1:, 2]))) if len(time) > 1 else 0.0
     known = f", while r says that the vehicle turns by {turned:.1f} rad" if turned > _TURNED else ""
     sentence = f"The attitude has no heading: yaw is {yaw.mean():.2f} rad throughout{known}"
-    yield Finding("sensor", "attitude.yaw", "left_out", sentence, "Map the heading, or identify without the position")
+    yield LogFinding(
+        "sensor", "attitude.yaw", "left_out", sentence, "Map the heading, or identify without the position"
+    )
     if "position" in measured:
         sentence = "Without a heading the position cannot be predicted from velocities in body axes"
-        yield Finding("sensor", "position", "left_out", sentence)
+        yield LogFinding("sensor", "position", "left_out", sentence)
 
 
 def _dive(log: LogSignals, inputs: Series, left_out: set[str]) -> Dive | None:
@@ -118,9 +126,9 @@ def _gains(vehicle: HybridVehicle, dive: Dive, inputs: Series, per_axis: bool) -
     return input_gains(prior_vehicle(vehicle, per_axis), parameters, [dive], tuple(inputs.column_names()))
 
 
-def _axis_findings(dive: Dive | None, gains: InputGains | None) -> Iterator[Finding]:
+def _axis_findings(dive: Dive | None, gains: InputGains | None) -> Iterator[LogFinding]:
     if dive is None:
         sentence = "Inputs and motion are not there at the same time"
-        yield Finding("log", "", "refused", sentence, "Check the times of both in the log: they need one clock")
+        yield LogFinding("log", "", "refused", sentence, "Check the times of both in the log: they need one clock")
         return
     yield from axis_findings(dive, None if gains is None else gains.effect)

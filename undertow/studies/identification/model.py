@@ -76,7 +76,7 @@ class IdentificationModel(eqx.Module):
             for i, (name, ratio) in enumerate(zip(self.names, self.is_ratio, strict=True))
         }
         delay = values.get("command_delay", jnp.zeros(()))
-        nuisances = self.nuisance_deviations * z[count:].reshape(-1, len(NUISANCES))
+        nuisances = self.nuisance_deviations[None, :] * z[count:].reshape(-1, len(NUISANCES))
         return Candidate(self.prior.with_values(values), delay, nuisances)
 
     def residuals(self, z: Float[Array, " unknowns"], start: Float[Array, "12"], segment: Any, step: Float[Array, ""]):
