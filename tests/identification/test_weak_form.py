@@ -14,7 +14,8 @@ from undertow.studies.identification.gap_filling import filled
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.input_signs import input_gains
 from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
-from undertow.studies.identification.weak_form import first_estimate, weak_problem
+from undertow.studies.identification.weak_form import first_estimate
+from undertow.studies.identification.weak_problem import weak_problem
 
 TRUTH = {"added_mass.surge": 9.0, "quadratic_damping.sway": 160.0, "net_buoyancy": 3.0, "r_b.z": -0.02}
 AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m

@@ -13,7 +13,7 @@ from undertow.studies.identification.gap_filling import filled, usable_axes
 
 _AT_LIMIT = 0.99
 _OFTEN, _NEARLY_ALWAYS = 0.2, 0.9
-_SHORTEST, _SHORT = 10.0, 30.0  # s
+_SHORTEST, _SHORT = 10.0, 25.0  # s
 _LONGEST_INTERVAL = 0.25  # s
 _MISSING = 0.2
 _ABSURD = 1e9

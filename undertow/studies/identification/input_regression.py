@@ -13,7 +13,8 @@ from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.free_parameters import FreeParameter
 from undertow.studies.identification.identified_vehicle import AxisActuation, PriorVehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
-from undertow.studies.identification.weak_form import body_balance, weak_problem, weights_of, wrenches_of
+from undertow.studies.identification.weak_form import body_balance, weights_of, wrenches_of
+from undertow.studies.identification.weak_problem import weak_problem
 
 Order = tuple[int, ...]  # input j acts along the force of input order[j]
 

@@ -116,11 +116,11 @@ def _best(solutions: Sequence[GainSolution]) -> int:
 def _offset_finding(offset: ClockOffset) -> LogFinding:
     if offset.delay > 0:
         sentence = f"The inputs come {offset} later in the log than the motion that they cause"
-        return LogFinding(
-            "input", "", "note", sentence, "Let the times of the inputs be that much earlier in the mapping"
-        )
+        return LogFinding("input", "", "note", sentence, "Make the times of the inputs that much earlier in the log")
     sentence = f"The motion follows the inputs {offset} later than the thrusters of the file explain"
-    return LogFinding("input", "", "note", sentence, "Free `command_delay`, or let the inputs come that much later")
+    return LogFinding(
+        "input", "", "note", sentence, "Free `command_delay`, or make the times of the inputs that much later"
+    )
 
 
 def _usual_names(prior: PriorVehicle, count: int) -> tuple[str, ...]:

@@ -4,24 +4,14 @@ Angular velocities are compared with the turns between attitudes, velocities wit
 is fitted that takes the ones to the others: it should be the unit matrix.
 """
 
-import itertools
-from typing import NamedTuple
-
 import numpy as np
 import scipy.optimize
-from scipy.spatial.transform import Rotation
 
-from undertow.logs import frames
 from undertow.logs.log_signals import Series
-from undertow.studies.identification.clock_offset import ClockOffset, offset_of
+from undertow.studies.identification.agreement import Agreement, Stream, agreement_of_steps, agreement_of_turns
+from undertow.studies.identification.clock_offset import ClockOffset
 from undertow.studies.identification.finding import WORDS, LogFinding
-from undertow.studies.identification.stream_check import outliers
 
-Stream = tuple[np.ndarray, np.ndarray]  # times (rows,) and values (rows, columns)
-
-_OFFSETS = 0.05 * np.arange(-20, 21)  # s
-_TURN_WINDOW, _STEP_WINDOW = 0.3, 1.0  # s
-_FEWEST = 15  # windows
 _MOVES = {"rates": 0.04, "velocity": 0.05}  # rad, m; typical change in a window, below which nothing can be told
 _BELONGS, _SURELY_BELONGS = 0.15, 0.5  # share explained
 _CONTRIBUTES = 0.4  # share of a number that one of the other stream gives
@@ -29,32 +19,12 @@ _SLOPES = (0.8, 1.25)
 _DEGREES = (40.0, 80.0)
 _LARGEST_OFFSET = 0.2  # s, with which a stream is still used
 _WORTH_SAYING = 0.05  # s
-_HUBER = 3.0
-_ROUNDS = 5
-
-
-class Agreement(NamedTuple):
-    """How the changes of a pose follow from a velocity.
-
-    Attributes:
-        matrix: that takes the integrated velocity to the changes, (3, 3).
-        explained: share of the changes that it explains, outliers at less weight.
-        contributions: size of each entry beside the change that it gives, (3, 3).
-        offset: of the velocity behind the pose.
-        change: typical size of the changes on each axis, (3,).
-    """
-
-    matrix: np.ndarray
-    explained: float
-    contributions: np.ndarray
-    offset: ClockOffset
-    change: np.ndarray
 
 
 def rates_findings(attitude: Series, rates: Stream) -> tuple[list[LogFinding], ClockOffset | None]:
     """Whether the angular velocity (rad/s) goes with the angles (rad)."""
-    as_radians = _of_turns(attitude, rates, 1.0)
-    as_degrees = _of_turns(attitude, rates, np.pi / 180)
+    as_radians = agreement_of_turns(attitude, rates, 1.0)
+    as_degrees = agreement_of_turns(attitude, rates, np.pi / 180)
     if as_radians is None or as_degrees is None:
         return [], None
     if as_degrees.explained > _SURELY_BELONGS and as_degrees.explained > as_radians.explained + 0.2:
@@ -79,7 +49,7 @@ def velocity_findings(
     attitude: Stream, position: Stream, velocity: Stream
 ) -> tuple[list[LogFinding], ClockOffset | None]:
     """Whether the body velocity goes with the position."""
-    agreement = _of_steps(attitude, position, velocity)
+    agreement = agreement_of_steps(attitude, position, velocity)
     if agreement is None:
         return [], None
     turned = _frame_finding(attitude, position, velocity, agreement)
@@ -114,7 +84,7 @@ def _frame_finding(attitude: Stream, position: Stream, velocity: Stream, agreeme
         ),
     )
     for sentence, sensor, remedy, turned, moved in trials:
-        trial = _of_steps(turned, moved, velocity)
+        trial = agreement_of_steps(turned, moved, velocity)
         if trial is None or trial.explained < _SURELY_BELONGS or _error_of_identity(trial) > 0.3:
             continue
         # A level vehicle does not tell an upward z from a wrong sign of w: then the depth has to.
@@ -182,86 +152,3 @@ def _of_slope(sensor: str, pose: str, name: str, slope: float, contribution: flo
         sentence = f"{name} of the {WORDS[sensor]} is {1 / slope:.2f} times that of the {pose}: smoothed, or scaled"
         return [LogFinding("sensor", column, "note", sentence, "Log what the sensor measures, without a filter")]
     return []
-
-
-def _of_turns(attitude: Series, rates: Stream, unit: float) -> Agreement | None:
-    is_finite = np.isfinite(attitude.values).all(axis=1)
-    time, quaternions = attitude.time[is_finite], frames.quaternions(unit * attitude.values[is_finite])
-    ends = _windows(time, _TURN_WINDOW)
-    if len(ends) < _FEWEST or len(rates[0]) < _FEWEST:
-        return None
-    rotation = Rotation.from_quat(quaternions, scalar_first=True)
-    first, last = ends.T
-    turns = (rotation[first].inv() * rotation[last]).as_rotvec()
-    return _agreement(time[first], time[last], turns, rates)
-
-
-def _of_steps(attitude: Stream, position: Stream, velocity: Stream) -> Agreement | None:
-    keep = ~outliers(position[1]) if len(position[0]) > _FEWEST else np.ones(len(position[0]), dtype=bool)
-    time, places = position[0][keep], position[1][keep]
-    ends = _windows(time, _STEP_WINDOW)
-    if min(len(ends), len(velocity[0]), len(attitude[0])) < _FEWEST:
-        return None
-    first, last = ends.T
-    middle = (time[first] + time[last]) / 2
-    quaternions = np.stack([np.interp(middle, attitude[0], column) for column in attitude[1].T], axis=1)
-    quaternions[np.linalg.norm(quaternions, axis=1) < 1e-9] = (1.0, 0.0, 0.0, 0.0)
-    steps = Rotation.from_quat(quaternions, scalar_first=True).inv().apply(places[last] - places[first])
-    return _agreement(time[first], time[last], steps, velocity)
-
-
-def _windows(time: np.ndarray, length: float) -> np.ndarray:
-    """Numbers of samples about a length apart, shape (windows, 2); none across a gap."""
-    starts = np.searchsorted(time, np.arange(time[0], time[-1], length)) if len(time) > 1 else np.zeros(0, dtype=int)
-    starts = np.unique(np.clip(starts, 0, max(len(time) - 1, 0)))
-    pairs = np.array(list(itertools.pairwise(starts)), dtype=int).reshape(-1, 2)
-    return pairs[time[pairs[:, 1]] - time[pairs[:, 0]] < 2 * length] if len(pairs) else pairs
-
-
-def _agreement(begin: np.ndarray, end: np.ndarray, changes: np.ndarray, velocity: Stream) -> Agreement | None:
-    """The fitted matrix at the offset of the clocks where it explains most."""
-    time, values = velocity
-    keep = ~outliers(values)
-    time, values = time[keep], values[keep]
-    trapezoids = np.diff(time)[:, None] * (values[1:] + values[:-1]) / 2
-    integral = np.vstack([np.zeros(3), np.cumsum(trapezoids, axis=0)])
-    at = lambda times: np.stack([np.interp(times, time, column) for column in integral.T], axis=1)
-    margin = float(_OFFSETS[-1])
-    inside = (begin - margin > time[0]) & (end + margin < time[-1])
-    if inside.sum() < _FEWEST:
-        return None
-    begin, end, changes = begin[inside], end[inside], changes[inside]
-    fits = [_robust_fit(at(end + offset) - at(begin + offset), changes) for offset in _OFFSETS]
-    offset = offset_of([error for _, error in fits], _OFFSETS, 3 * len(changes))
-    best = int(np.argmin(np.abs(_OFFSETS - offset.delay))) if np.isfinite(offset.deviation) else len(_OFFSETS) // 2
-    matrix, error = fits[best]
-    integrated = at(end + _OFFSETS[best]) - at(begin + _OFFSETS[best])
-    typical = np.maximum(_typical(changes), 1e-12)
-    contributions = matrix * _typical(integrated) / typical[:, None]
-    explained = 1 - (error / max(float(np.sqrt((_cut(changes) ** 2).mean())), 1e-12)) ** 2
-    return Agreement(matrix, explained, contributions, offset, typical)
-
-
-def _robust_fit(integrated: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Matrix of least squares with less weight for outliers (Huber), and the size of what remains."""
-    weight = np.ones(len(changes))
-    matrix, remaining = np.eye(3), changes
-    ridge = 1e-9 * max(float((integrated**2).sum()), 1e-12) * np.eye(3)
-    for _ in range(_ROUNDS):
-        weighted = weight[:, None] * integrated
-        matrix = np.linalg.solve(weighted.T @ integrated + ridge, weighted.T @ changes).T
-        remaining = changes - integrated @ matrix.T
-        sizes = np.linalg.norm(remaining, axis=1)
-        limit = _HUBER * max(float(np.median(sizes)), 1e-12)
-        weight = np.minimum(1.0, limit / np.maximum(sizes, 1e-12))
-    return matrix, float(np.sqrt((weight[:, None] * remaining**2).mean()))
-
-
-def _typical(changes: np.ndarray) -> np.ndarray:
-    return np.sqrt((_cut(changes) ** 2).mean(axis=0))
-
-
-def _cut(changes: np.ndarray) -> np.ndarray:
-    """Changes with outliers made smaller."""
-    limit = 6 * np.maximum(np.median(np.abs(changes), axis=0), 1e-12)
-    return np.clip(changes, -limit, limit)
