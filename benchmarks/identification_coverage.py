@@ -1,7 +1,8 @@
 """How often the 95 % intervals of `undertow identify` contain the truth, parameter by parameter, on simulated dives.
 
-Each seed has a BlueROV2 Heavy whose numbers differ at random from the vehicle file (damping by 30 %, the centre of buoyancy
-by 9 mm, ...), a current, noise of all sensors, and uneven times of samples. `python benchmarks/identification_coverage.py --seeds 200`.
+Each seed has a BlueROV2 Heavy whose numbers differ at random from the vehicle file (damping by 30 %, the centre of
+buoyancy by 9 mm, ...), a current, noise of all sensors, and uneven times of samples.
+`python benchmarks/identification_coverage.py --seeds 200`.
 """
 
 import argparse

@@ -22,10 +22,11 @@ from undertow.report.identification_page import write_identification
 from undertow.scenario.build import build
 from undertow.scenario.log_file import read_log
 from undertow.scenario.reading import read
+from undertow.studies.identification.identified_files import write_files
 from undertow.studies.identification.identify import identify
 from undertow.studies.identification.result_data import as_data
 
-_WRITTEN = ("identification.html", "identification.json", "figures")
+_WRITTEN = ("identification.html", "identification.json", "identified.yaml", "vehicle.yaml", "figures")
 
 
 def identify_vehicle(command: IdentifyCommand) -> int:
@@ -55,6 +56,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         )
         data = as_data(result)
         (draft.path / "identification.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
+        write_files(built, result, command.logs, draft.path)
         draft.publish()  # before the figures, which may fail
         warn_of(write_identification(command.scenario.stem, result, data, draft.path, folder, command.pdf))
     if command.details:

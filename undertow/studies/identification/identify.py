@@ -1,6 +1,7 @@
 """Identification of a vehicle: from its file and logs to numbers with intervals, judged on dives not used."""
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -8,22 +9,28 @@ import numpy as np
 from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.logs.log import Log
-from undertow.logs.motion import inputs_of
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
-from undertow.studies.identification.dive import Dive, dive_of
+from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
 from undertow.studies.identification.output_error import Fit, fit, scores_of
+from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
 from undertow.studies.identification.segments import segments_of
-from undertow.studies.identification.uncertainty import Combination, Interval, Uncertainty, uncertainty_of, undetermined
+from undertow.studies.identification.uncertainty import (
+    Combination,
+    ParameterInterval,
+    Uncertainty,
+    uncertainty_of,
+    undetermined,
+)
 from undertow.studies.identification.validation import PredictionErrors, prediction_errors
+from undertow.studies.identification.weak_form import first_estimate
 
 Say = Callable[[str], None]
 
 _PARTS = 4  # into which a single dive is divided for the validation
-_AXES = 6
 
 
 class Validation(NamedTuple):
@@ -65,7 +72,7 @@ class Identification(NamedTuple):
     parameters: tuple[FreeParameter, ...]
     estimate: Fit
     uncertainty: Uncertainty
-    intervals: tuple[Interval, ...]
+    intervals: tuple[ParameterInterval, ...]
     undetermined: tuple[Combination, ...]
     validation: tuple[Validation, ...]
     findings: tuple[str, ...] = ()
@@ -112,15 +119,22 @@ def identify(
     if not logs:
         raise BadInput("logs", "be given", "none")
     plant = _vehicle(built)
-    dives = [_dive(plant, log, per_axis, step) for log in logs]
+    say("checking the logs")
+    prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
+    dives = [dive.dive for dive in prepared]
     known = parameters_of(plant)
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
-    parameters = chosen(known, free, priors)
+    refused = set.intersection(*(set(dive.refused_axes) for dive in prepared))
+    parameters = [p for p in chosen(known, free, priors) if p.name.rpartition(".")[2] not in refused]
+    if not parameters:
+        raise BadInput("logs", "tell something of a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)
+    say("first estimate")
+    begin = first_estimate(model.prior, parameters, dives).z
     say("estimating")
-    estimate = _estimate(model, parameters, dives, segment, None, say)
+    estimate = _estimate(model, parameters, dives, segment, begin, say)
     parts, validation = None, ()
     if validate:
         parts, validation = _validated(model, parameters, dives, segment, estimate, say)
@@ -138,6 +152,7 @@ def identify(
         intervals=tuple(uncertainty.intervals(parameters, estimate.z)),
         undetermined=tuple(undetermined(estimate.information, parameters)),
         validation=validation,
+        findings=tuple(_findings(prepared)),
     )
 
 
@@ -148,21 +163,24 @@ def _vehicle(built: Built) -> HybridVehicle:
     return plant
 
 
-def _dive(plant: HybridVehicle, log: Log, per_axis: bool, step: float) -> Dive:
-    inputs = inputs_of(log, ("input", "commanded_input"), None if per_axis else np.asarray(plant.thruster_matrix))
-    expected = _AXES if per_axis else plant.inputs()
-    if inputs.flat().shape[1] != expected:
-        whose = "axes" if per_axis else "thrusters"
-        raise BadInput("log", f"have {expected} inputs, one for each of the {whose}", f"{inputs.flat().shape[1]}")
-    return dive_of(log, inputs, step)
+def _findings(prepared: Sequence[PreparedDive]) -> list[str]:
+    """Sentences of the checks, with the name of the log; equal ones once."""
+    sentences: dict[str, list[str]] = {}
+    for dive in prepared:
+        for finding in dive.findings:
+            sentences.setdefault(finding, []).append(Path(dive.dive.name).name)
+    labelled = []
+    for sentence, names in sentences.items():
+        where = "all logs" if len(names) == len(prepared) > 1 else ", ".join(names)
+        labelled.append(f"{where}: {sentence}")
+    return labelled
 
 
-def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray | None, say: Say) -> Fit:
+def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray, say: Say) -> Fit:
     unknowns = Unknowns(tuple(parameters), len(dives))
     least = unknowns.least()
     z = np.zeros(len(least))
-    if begin is not None:
-        z[: len(parameters)] = begin
+    z[: len(parameters)] = begin
     watch = lambda iteration, cost: say(f"iteration {iteration}, cost {cost:.6g}")
     return fit(model, segments_of(dives, segment), dives[0].step, z, least, watch)
 

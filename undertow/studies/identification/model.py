@@ -43,7 +43,7 @@ class Unknowns(NamedTuple):
         return np.array([parameter.least_z for parameter in self.all()])
 
 
-class Candidate(NamedTuple):
+class CandidateVehicle(NamedTuple):
     """A vehicle and what lies between it and the log of each dive."""
 
     vehicle: IdentifiedVehicle
@@ -67,7 +67,7 @@ class IdentificationModel(eqx.Module):
     is_ratio: tuple[bool, ...] = eqx.field(static=True)
     nuisance_deviations: Float[Array, "5"]
 
-    def candidate(self, z: Float[Array, " unknowns"]) -> Candidate:
+    def candidate(self, z: Float[Array, " unknowns"]) -> CandidateVehicle:
         """What a vector of unknown numbers stands for."""
         count = len(self.names)
         scaled = self.deviations * z[:count]
@@ -77,7 +77,7 @@ class IdentificationModel(eqx.Module):
         }
         delay = values.get("command_delay", jnp.zeros(()))
         nuisances = self.nuisance_deviations[None, :] * z[count:].reshape(-1, len(NUISANCES))
-        return Candidate(self.prior.with_values(values), delay, nuisances)
+        return CandidateVehicle(self.prior.with_values(values), delay, nuisances)
 
     def residuals(self, z: Float[Array, " unknowns"], start: Float[Array, "12"], segment: Any, step: Float[Array, ""]):
         """Residuals of a segment; `start` in standard deviations of the guess."""

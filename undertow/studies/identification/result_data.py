@@ -7,7 +7,7 @@ import numpy as np
 
 from undertow.studies.identification.dive import RESIDUALS
 from undertow.studies.identification.identify import Identification, Validation
-from undertow.studies.identification.uncertainty import LEVEL, Interval
+from undertow.studies.identification.uncertainty import LEVEL, ParameterInterval
 from undertow.studies.identification.validation import HORIZONS, PredictionErrors
 
 
@@ -39,7 +39,7 @@ def as_data(identification: Identification) -> dict[str, Any]:
     }
 
 
-def _interval_data(interval: Interval) -> dict[str, Any]:
+def _interval_data(interval: ParameterInterval) -> dict[str, Any]:
     return {
         "unit": interval.parameter.unit,
         "value": interval.value,

@@ -21,7 +21,7 @@ _CHANCE = 0.05  # probability with which parts of the data scatter as much by ch
 _LARGEST_SHARE = 0.25  # of a segment over which correlation is counted
 
 
-class Interval(NamedTuple):
+class ParameterInterval(NamedTuple):
     """What is known of a parameter.
 
     Attributes:
@@ -64,18 +64,20 @@ class Uncertainty(NamedTuple):
     inflation: np.ndarray
     correlation_time: float
 
-    def intervals(self, parameters: Sequence[FreeParameter], z: np.ndarray) -> list[Interval]:
+    def intervals(self, parameters: Sequence[FreeParameter], z: np.ndarray) -> list[ParameterInterval]:
         """Of each parameter."""
         deviations = np.sqrt(np.diagonal(self.covariance))
         reach = stats.t.ppf(0.5 + LEVEL / 2, self.freedom) * deviations
         return [_interval(p, z[i], deviations[i], reach[i]) for i, p in enumerate(parameters)]
 
 
-def _interval(parameter: FreeParameter, z: float, deviation: float, reach: float) -> Interval:
+def _interval(parameter: FreeParameter, z: float, deviation: float, reach: float) -> ParameterInterval:
     value = float(parameter.value(z))
     low, high = float(parameter.value(z - reach)), float(parameter.value(z + reach))
     in_unit = deviation * parameter.deviation * (value if parameter.is_ratio else 1.0)
-    return Interval(parameter, value, max(low, parameter.least), high, float(in_unit), float(deviation), float(z))
+    return ParameterInterval(
+        parameter, value, max(low, parameter.least), high, float(in_unit), float(deviation), float(z)
+    )
 
 
 def uncertainty_of(
