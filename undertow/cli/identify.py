@@ -22,6 +22,7 @@ from undertow.report.identification_page import write_identification
 from undertow.scenario.build import build
 from undertow.scenario.log_file import read_log
 from undertow.scenario.reading import read
+from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
 from undertow.studies.identification.identified_files import write_files
 from undertow.studies.identification.identify import identify
 from undertow.studies.identification.result_data import as_data
@@ -65,16 +66,17 @@ def identify_vehicle(command: IdentifyCommand) -> int:
     return DONE
 
 
-def priors_of(words: Sequence[str]) -> dict[str, str]:
+def priors_of(words: Sequence[str]) -> dict[str, UncertainNumber]:
     """Priors as a user writes them: `mass=11.5+-0.2`.
 
     Raises:
-        BadInput: a word without `=`.
+        BadInput: a word of another form.
     """
     priors = {}
     for word in words:
-        name, equals, prior = word.partition("=")
-        if not equals:
+        name, _, text = word.partition("=")
+        prior = uncertain_number("--prior", text)
+        if prior is None:
             raise BadInput("--prior", "be NAME=VALUE+-DEVIATION, such as mass=11.5+-0.2", word)
         priors[name.strip()] = prior
     return priors

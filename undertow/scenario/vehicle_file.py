@@ -47,6 +47,18 @@ def is_vehicle_file(name: str) -> bool:
     return Path(name).suffix in (".yaml", ".yml")
 
 
+def vehicle_file_of(scenario: Text) -> VehicleFile | None:
+    """The vehicle file of a scenario; None where its vehicle is one of the catalogue.
+
+    Raises:
+        BadInput: the file cannot be read.
+    """
+    description = scenario.data.get("plant", {}).get("vehicle", "")
+    options = {"kind": description} if isinstance(description, str) else dict(description)
+    kind = str(options.pop("kind", ""))
+    return read_vehicle(scenario.folder / kind, options, "plant.vehicle.kind") if is_vehicle_file(kind) else None
+
+
 def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str = "kind") -> VehicleFile:
     """A vehicle file, read and checked for form.
 

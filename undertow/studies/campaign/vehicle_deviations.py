@@ -12,7 +12,7 @@ from undertow.core.errors import BadInput
 from undertow.scenario.correlation import lower_triangle
 from undertow.scenario.reading import Text
 from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
-from undertow.scenario.vehicle_file import is_vehicle_file, read_vehicle
+from undertow.scenario.vehicle_file import vehicle_file_of
 from undertow.scenario.vehicle_parameters import ADJUSTED_OPTIONS, NOT_NEGATIVE, POSITIVE, is_outside, sign_of
 from undertow.scenario.vehicle_uncertainty import VehicleUncertainty
 from undertow.studies.campaign.campaign_schema import Campaign, Correlation, Distribution
@@ -55,16 +55,16 @@ def with_vehicle_deviations(campaign: Campaign, scenario: Text) -> Campaign:
 
 def _uncertainty(scenario: Text) -> VehicleUncertainty:
     """Deviations in the vehicle file of a scenario."""
-    description = scenario.data.get("plant", {}).get("vehicle", "")
-    options = {"kind": description} if isinstance(description, str) else dict(description)
-    kind = str(options.pop("kind", ""))
-    if not is_vehicle_file(kind):
-        raise BadInput(_NAME, "be of a scenario with a vehicle file, which has deviations", kind or "another vehicle")
-    uncertainty = read_vehicle(scenario.folder / kind, options, f"{_VEHICLE}.kind").uncertainty
-    if uncertainty is None:
+    vehicle_file = vehicle_file_of(scenario)
+    if vehicle_file is None:
+        vehicle = scenario.data.get("plant", {}).get("vehicle", "another vehicle")
+        raise BadInput(_NAME, "be of a scenario with a vehicle file, which has deviations", vehicle)
+    if vehicle_file.uncertainty is None:
         hint = "Write numbers such as `13.5 +- 0.2` there, or a section `uncertainty`"
-        raise BadInput(_NAME, "be of a vehicle file with deviations", f"{kind}, which has none", hint=hint)
-    return uncertainty
+        raise BadInput(
+            _NAME, "be of a vehicle file with deviations", f"{vehicle_file.text.name}, which has none", hint=hint
+        )
+    return vehicle_file.uncertainty
 
 
 def _spread(name: str, uncertainty: VehicleUncertainty) -> Distribution:

@@ -7,7 +7,6 @@ so that the information of the data is compared with what was known before in ev
 
 import fnmatch
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -16,10 +15,9 @@ import numpy as np
 from undertow.core.errors import BadInput, nearest
 from undertow.core.measurement import BODY_AXES
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
+from undertow.scenario.vehicle_parameters import unit_of
 
-_MASS_UNITS = ("kg", "kg", "kg", "kg m^2", "kg m^2", "kg m^2")
-_LINEAR_UNITS = ("N s/m", "N s/m", "N s/m", "N m s", "N m s", "N m s")
-_QUADRATIC_UNITS = ("N s^2/m^2", "N s^2/m^2", "N s^2/m^2", "N m s^2", "N m s^2", "N m s^2")
 _GAIN_UNITS = ("N", "N", "N", "N m", "N m", "N m")  # per unit of the input of an axis
 
 # What is thought of numbers of a vehicle file that has no deviations: a share of the value.
@@ -28,6 +26,7 @@ _TYPICAL_SPEED = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # m/s, rad/s; at whic
 _DAMPING_SHARE = 1.0  # of the damping at that speed
 _ARM = 0.03  # m, of the centre of buoyancy
 _NET_WEIGHT = 0.02  # of the weight
+_DELAY = 0.1  # s, of commands
 
 
 class FreeParameter(NamedTuple):
@@ -68,20 +67,17 @@ def parameters_of(plant: HybridVehicle) -> dict[str, FreeParameter]:
         plant: vehicle with thrusters, whose values are the prior ones.
     """
     vehicle = plant.vehicle
-    numbers = [_ratio("mass", "kg", vehicle.mass)]
-    numbers += _diagonal("inertia", ("roll", "pitch", "yaw"), ("kg m^2",) * 3, vehicle.inertia)
-    numbers += _diagonal("added_mass", BODY_AXES, _MASS_UNITS, vehicle.added_mass)
+    net_buoyancy = float(vehicle.buoyancy - vehicle.weight)
+    numbers = [_ratio("mass", vehicle.mass)]
+    numbers += _diagonal("inertia", BODY_AXES[3:], vehicle.inertia)
+    numbers += _diagonal("added_mass", BODY_AXES, vehicle.added_mass)
     numbers += _damping(vehicle)
-    numbers += [
-        FreeParameter(
-            "net_buoyancy", "N", float(vehicle.buoyancy - vehicle.weight), _NET_WEIGHT * float(vehicle.weight)
-        )
-    ]
-    numbers += [FreeParameter(f"r_b.{axis}", "m", float(vehicle.r_b[i]), _ARM) for i, axis in enumerate("xyz")]
-    numbers += [_ratio("thruster_gain", "", 1.0)]
-    numbers += [_ratio(f"thruster_gain.T{j + 1}", "", 1.0) for j in range(plant.inputs())]
-    numbers += [_ratio("reverse_gain", "", 1.0), _ratio("lag", "", 1.0)]
-    numbers += [FreeParameter("command_delay", "s", 0.0, 0.1, least=0.0)]
+    numbers += [_number("net_buoyancy", net_buoyancy, _NET_WEIGHT * float(vehicle.weight))]
+    numbers += [_number(f"r_b.{axis}", float(vehicle.r_b[i]), _ARM) for i, axis in enumerate("xyz")]
+    numbers += [_ratio("thruster_gain", 1.0)]
+    numbers += [_ratio(f"thruster_gain.T{j + 1}", 1.0) for j in range(plant.inputs())]
+    numbers += [_ratio("reverse_gain", 1.0), _ratio("lag", 1.0)]
+    numbers += [_number("command_delay", 0.0, _DELAY, least=0.0)]
     return {number.name: number for number in numbers}
 
 
@@ -101,18 +97,18 @@ def axis_parameters(prior_gain: float = 50.0, lag: float = 0.15) -> dict[str, Fr
     return {number.name: number for number in (*gains, *lags, power)}
 
 
-def _ratio(name: str, unit: str, value) -> FreeParameter:
-    return FreeParameter(name, unit, float(value), _SHARES[name.split(".")[0]], is_ratio=True)
+def _ratio(name: str, value) -> FreeParameter:
+    return FreeParameter(name, unit_of(name), float(value), _SHARES[name.split(".")[0]], is_ratio=True)
 
 
-def _diagonal(name: str, axes: Sequence[str], units: Sequence[str], matrix) -> list[FreeParameter]:
+def _number(name: str, value: float, deviation: float, least: float = -math.inf) -> FreeParameter:
+    return FreeParameter(name, unit_of(name), value, deviation, least=least)
+
+
+def _diagonal(name: str, axes: Sequence[str], matrix) -> list[FreeParameter]:
     """Those of a matrix with positive diagonal entries."""
     entries = np.diagonal(np.asarray(matrix, dtype=float))
-    return [
-        FreeParameter(f"{name}.{axis}", unit, float(entry), _SHARES[name], is_ratio=True)
-        for axis, unit, entry in zip(axes, units, entries, strict=True)
-        if entry > 0
-    ]
+    return [_ratio(f"{name}.{axis}", entry) for axis, entry in zip(axes, entries, strict=True) if entry > 0]
 
 
 def _damping(vehicle) -> list[FreeParameter]:
@@ -124,16 +120,14 @@ def _damping(vehicle) -> list[FreeParameter]:
     free = []
     for i, axis in enumerate(BODY_AXES):
         deviation = _DAMPING_SHARE * float(together[i])
-        free.append(FreeParameter(f"linear_damping.{axis}", _LINEAR_UNITS[i], float(linear[i]), deviation, least=0.0))
+        free.append(_number(f"linear_damping.{axis}", float(linear[i]), deviation, least=0.0))
         deviation /= float(_TYPICAL_SPEED[i])
-        free.append(
-            FreeParameter(f"quadratic_damping.{axis}", _QUADRATIC_UNITS[i], float(quadratic[i]), deviation, least=0.0)
-        )
+        free.append(_number(f"quadratic_damping.{axis}", float(quadratic[i]), deviation, least=0.0))
     return free
 
 
-# Free where nothing else is asked for: mass and inertia of the dry vehicle are weighed, and cannot be told from the
-# added ones; single thrusters cannot be told from all of them without long logs.
+# Free where nothing else is asked for: mass and inertia of the dry vehicle are known, and motion shows only their sum
+# with the added ones; gains of single thrusters need long logs.
 USUALLY_FREE = (
     "added_mass.*",
     "linear_damping.*",
@@ -148,23 +142,21 @@ USUALLY_FREE = (
     "axis_power",
 )
 
-_PRIOR = re.compile(r"\s*([-+0-9.eE]+)\s*(?:\+-|±)\s*([0-9.eE]+)\s*(%?)\s*")
-
 
 def chosen(
-    known: Mapping[str, FreeParameter], free: Sequence[str] = (), priors: Mapping[str, str] | None = None
+    known: Mapping[str, FreeParameter], free: Sequence[str] = (), priors: Mapping[str, UncertainNumber] | None = None
 ) -> list[FreeParameter]:
     """The parameters that are free, some with another prior.
 
     Args:
         known: all that can be.
         free: names, groups (`added_mass`) or patterns (`*.yaw`); () for the usual ones.
-        priors: `value +- deviation` or `value +- share %` by name; these are free, too.
+        priors: by name; these are free, too.
 
     Raises:
-        BadInput: a name that means none, or a prior that cannot be read.
+        BadInput: a name that means none, or a prior that its parameter cannot have.
     """
-    priors = dict(priors or {})
+    priors = priors or {}
     asked = tuple(free) or USUALLY_FREE
     names: list[str] = []
     for pattern in (*asked, *priors):
@@ -179,18 +171,9 @@ def _in_group(name: str, group: str) -> bool:
     return name.startswith(f"{group}.") and not group == "thruster_gain"
 
 
-def _with_prior(parameter: FreeParameter, prior: str) -> FreeParameter:
-    found = _PRIOR.fullmatch(str(prior))
-    location = f"priors.{parameter.name}"
-    if not found:
-        raise BadInput(location, "be `value +- deviation` or `value +- share %`", prior)
-    value, deviation = float(found[1]), float(found[2])
-    if found[3]:
-        deviation *= abs(value) / 100
-    if not deviation > 0:
-        raise BadInput(location, "have a deviation above 0", prior, hint="A number without one is fixed")
-    if parameter.is_ratio:
-        if not value > 0:
-            raise BadInput(location, "be positive", prior)
-        return parameter._replace(prior=value, deviation=math.sqrt(math.log1p((deviation / value) ** 2)))
-    return parameter._replace(prior=value, deviation=deviation)
+def _with_prior(parameter: FreeParameter, prior: UncertainNumber) -> FreeParameter:
+    if not parameter.is_ratio:
+        return parameter._replace(prior=prior.value, deviation=prior.deviation)
+    if not prior.value > 0:
+        raise BadInput(f"priors.{parameter.name}", "be positive", prior.value)
+    return parameter._replace(prior=prior.value, deviation=log_deviation(prior))

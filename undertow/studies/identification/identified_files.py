@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from undertow.core.atomic_io import write_whole
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
@@ -42,15 +40,12 @@ def write_files(built: Built, identification: Identification, logs: Sequence[Pat
     ]
     values = {interval.parameter.name: interval.value for _, interval in chosen}
     deviations = {interval.parameter.name: interval.deviation for _, interval in chosen}
-    index = [i for i, _ in chosen]
-    covariance = identification.uncertainty.covariance[np.ix_(index, index)]
-    scale = np.sqrt(np.diagonal(covariance))
     write_vehicle(
         folder / "vehicle.yaml",
         contents_of(plant.vehicle),
         values,
         deviations,
-        covariance / np.outer(scale, scale),
+        identification.uncertainty.correlation([i for i, _ in chosen]),
         _provenance(identification, logs),
     )
     scenario: dict[str, Any] = dict(built.text.data)

@@ -15,8 +15,8 @@ from undertow.core.numerics.integrators import rk4
 from undertow.core.numerics.linear_algebra import inverse, matvec
 from undertow.core.numerics.rotations import quaternion_rate, rotation_from_quaternion
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.physics.thrusters.adjusted import AdjustedThruster, adjusted
 from undertow.physics.thrusters.inflow import advance_speed, with_inflow
-from undertow.physics.thrusters.thruster import AbstractThruster
 from undertow.physics.vehicles.body import Body, rigid_body_mass, seen_from_water
 
 Values = Mapping[str, Any]  # of parameters, by name
@@ -68,35 +68,32 @@ class SolvedStep(NamedTuple):
 class ThrusterActuation(AbstractActuation):
     """Thrusters that are driven by their inputs."""
 
-    thruster: AbstractThruster
-    thruster_matrix: Float[Array, "6 N"]  # gains included
+    thruster: AdjustedThruster
+    thruster_matrix: Float[Array, "6 N"]
     inflow_loss: Float[Array, ""] | None
-    reverse_gain: Float[Array, ""]  # factor on thrust in reverse
-    lag: Float[Array, ""]  # factor on the time constants
 
     def initial_state(self):
         return self.thruster.initial_state(self.thruster_matrix.shape[1])
 
     def dynamics(self, state, u):
-        rates = self.thruster.dynamics(state, u)
-        return jax.tree.map(lambda rate: rate / self.lag, rates)
+        return self.thruster.dynamics(state, u)
 
     def wrench(self, state, u, nu):
         thrust = jnp.broadcast_to(self.thruster.thrust(state, u), u.shape)
         if self.inflow_loss is not None:
             thrust = with_inflow(thrust, self.inflow_loss, advance_speed(self.thruster_matrix, nu))
-        return matvec(self.thruster_matrix, jnp.where(thrust < 0, self.reverse_gain, 1.0) * thrust)
+        return matvec(self.thruster_matrix, thrust)
 
     def with_values(self, values: Values) -> "ThrusterActuation":
         count = self.thruster_matrix.shape[1]
         gains = jnp.stack([jnp.asarray(values.get(f"thruster_gain.T{j + 1}", 1.0)) for j in range(count)])
-        return ThrusterActuation(
-            thruster=self.thruster,
-            thruster_matrix=self.thruster_matrix * (values.get("thruster_gain", 1.0) * gains)[None, :],
-            inflow_loss=self.inflow_loss,
-            reverse_gain=jnp.asarray(values.get("reverse_gain", self.reverse_gain)),
-            lag=jnp.asarray(values.get("lag", self.lag)),
+        thruster = adjusted(
+            self.thruster.thruster,
+            gain=values.get("thruster_gain", 1.0) * gains,
+            reverse_gain=values.get("reverse_gain", 1.0),
+            lag=values.get("lag", 1.0),
         )
+        return ThrusterActuation(thruster, self.thruster_matrix, self.inflow_loss)
 
 
 class AxisActuation(AbstractActuation):
@@ -216,7 +213,7 @@ def prior_vehicle(plant: HybridVehicle, has_axis_inputs: bool = False) -> PriorV
     """The vehicle of a plant; with inputs along the axes instead of its thrusters, if these are what logs have."""
     vehicle = plant.vehicle
     one = jnp.ones(())
-    thrusters = ThrusterActuation(plant.thruster, plant.thruster_matrix, plant.inflow_loss, one, one)
+    thrusters = ThrusterActuation(adjusted(plant.thruster), plant.thruster_matrix, plant.inflow_loss)
     axes = AxisActuation(jnp.ones(len(BODY_AXES)), jnp.ones(len(BODY_AXES)), one)
     return PriorVehicle(
         mass=vehicle.mass,

@@ -11,6 +11,8 @@ from undertow.core.errors import BadInput
 from undertow.logs.log import Log
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.uncertain_number import UncertainNumber
+from undertow.scenario.vehicle_file import vehicle_file_of
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
@@ -89,7 +91,7 @@ def identify(
     logs: Sequence[Log],
     *,
     free: Sequence[str] = (),
-    priors: Mapping[str, str] | None = None,
+    priors: Mapping[str, UncertainNumber] | None = None,
     per_axis: bool = False,
     step: float = 0.05,
     segment: float = 10.0,
@@ -102,7 +104,7 @@ def identify(
         built: scenario, whose vehicle and thrusters have the prior numbers; nothing else of it matters.
         logs: with inputs and motion.
         free: names, groups or patterns of parameters; () for the usual ones.
-        priors: `value +- deviation` by name.
+        priors: value and deviation beforehand, by name; those of the vehicle file unless given.
         per_axis: whether the inputs push along the six axes (sticks behind a mixer, or wrenches) instead of driving the
             thrusters.
         step: of the integration, s.
@@ -126,8 +128,9 @@ def identify(
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
+    beforehand = {name: number for name, number in _deviations(built).items() if name in known} | dict(priors or {})
     refused = set.intersection(*(set(dive.refused_axes) for dive in prepared))
-    parameters = [p for p in chosen(known, free, priors) if p.name.rpartition(".")[2] not in refused]
+    parameters = [p for p in chosen(known, free, beforehand) if p.name.rpartition(".")[2] not in refused]
     if not parameters:
         raise BadInput("logs", "tell something of a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)
@@ -163,6 +166,12 @@ def _vehicle(built: Built) -> HybridVehicle:
     return plant
 
 
+def _deviations(built: Built) -> dict[str, UncertainNumber]:
+    """Numbers of the vehicle file that have deviations."""
+    vehicle_file = vehicle_file_of(built.text)
+    return {} if vehicle_file is None or vehicle_file.uncertainty is None else vehicle_file.uncertainty.numbers
+
+
 def _findings(prepared: Sequence[PreparedDive]) -> list[str]:
     """Sentences of the checks, with the name of the log; equal ones once."""
     sentences: dict[str, list[str]] = {}
@@ -176,13 +185,13 @@ def _findings(prepared: Sequence[PreparedDive]) -> list[str]:
     return labelled
 
 
-def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray, say: Say) -> Fit:
+def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray, say: Say, noise=None) -> Fit:
     unknowns = Unknowns(tuple(parameters), len(dives))
     least = unknowns.least()
     z = np.zeros(len(least))
     z[: len(parameters)] = begin
     watch = lambda iteration, cost: say(f"iteration {iteration}, cost {cost:.6g}")
-    return fit(model, segments_of(dives, segment), dives[0].step, z, least, watch)
+    return fit(model, segments_of(dives, segment), dives[0].step, z, least, watch, noise)
 
 
 def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimate: Fit, say: Say):
@@ -194,7 +203,7 @@ def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimat
     for number, piece in enumerate(pieces):
         say(f"validation: {piece.name}")
         others = [other for i, other in enumerate(pieces) if i != number]
-        without = _estimate(model, parameters, others, segment, begin, say).z[:count]
+        without = _estimate(model, parameters, others, segment, begin, say, estimate.noise).z[:count]
         estimates.append(without)
         identified = prediction_errors(model, without, piece)
         validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))

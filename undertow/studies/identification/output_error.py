@@ -21,9 +21,22 @@ from undertow.studies.identification.model import (
 )
 from undertow.studies.identification.segments import Segments
 
-# Standard deviations from which on a residual counts as an outlier: at first few do, since far from the estimate those
-# of good samples are large; then those of a normal distribution hardly do.
-_HUBER = (30.0, 3.0)
+
+class _Phase(NamedTuple):
+    """Of the estimate.
+
+    Attributes:
+        huber: standard deviations from which on a residual counts as an outlier.
+        tolerance: decrease of the cost, as a share of it, at which the phase is over; residuals are not white, so that
+            it is more than one standard deviation of a parameter takes.
+    """
+
+    huber: float
+    tolerance: float
+
+
+# At first hardly any residual is an outlier, since far from the estimate those of good samples are large.
+_PHASES = (_Phase(huber=30.0, tolerance=1e-3), _Phase(huber=3.0, tolerance=5e-5))
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -31,7 +44,6 @@ _ITERATIONS = 60
 _TRIES = 10  # dampings of a step
 _GOOD, _POOR = 0.75, 0.25  # shares of the expected decrease above and below which the damping changes
 _CONVERGED = 0.05  # decrease of the cost; 0.5 is one standard deviation of a parameter
-_RELATIVE = 3e-5  # the same as a share of the cost, where residuals are not white
 _NOISE_CONVERGED = 0.02  # largest relative change of a noise
 
 
@@ -82,26 +94,26 @@ def fit(
         z: where to begin.
         least: smallest numbers.
         watch: called with the iteration and the cost.
-        noise: standard deviations to begin with.
+        noise: standard deviations of the residuals, where they and `z` are near those of the estimate.
     """
     starts = np.zeros((len(segments.dive), 12))
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     z = np.maximum(z, least)
     residuals = _residuals(model, segments, step, z, starts)
+    phase, *others = _PHASES if noise is None else _PHASES[-1:]
     noise = _first_noise(counts) if noise is None else noise
     damping, converged, iteration = 1e-3, False, 0
-    huber, *others = _HUBER
     for iteration in range(1, _ITERATIONS + 1):
-        weights = _weights(residuals, counts, noise, huber)
+        weights = _weights(residuals, counts, noise, phase.huber)
         cost = _cost(residuals, weights, z, starts)
         watch(iteration, cost)
         parts = _evaluated(model, segments, weights, step, z, starts)
         trial = _improved(model, segments, parts, weights, step, z, starts, least, damping, cost)
         small = trial is None
         if trial is not None:
-            small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
+            small = cost - trial.cost < max(_CONVERGED, phase.tolerance * cost)
             z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
-        new_noise = np.clip(_noise(residuals, counts, huber), noise / _FASTEST, noise * _FASTEST)
+        new_noise = np.clip(_noise(residuals, counts, phase.huber), noise / _FASTEST, noise * _FASTEST)
         finite = np.isfinite(new_noise)
         steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
         noise = new_noise
@@ -109,8 +121,8 @@ def fit(
             if not others:
                 converged = True
                 break
-            huber, *others = others
-    weights = _weights(residuals, counts, noise, huber)
+            phase, *others = others
+    weights = _weights(residuals, counts, noise, phase.huber)
     parts = _evaluated(model, segments, weights, step, z, starts)
     information, _, reduction = _reduced(parts, z, starts, 0.0)
     cost = _cost(residuals, weights, z, starts)

@@ -14,8 +14,6 @@ from undertow.studies.identification.validation import HORIZONS, PredictionError
 def as_data(identification: Identification) -> dict[str, Any]:
     """All of it but the time series."""
     count = len(identification.parameters)
-    covariance = identification.uncertainty.covariance[:count, :count]
-    deviations = np.sqrt(np.diagonal(covariance))
     estimate = identification.estimate
     return {
         "dives": [
@@ -23,7 +21,7 @@ def as_data(identification: Identification) -> dict[str, Any]:
         ],
         "level": LEVEL,
         "parameters": {interval.parameter.name: _interval_data(interval) for interval in identification.intervals},
-        "correlation": (covariance / np.outer(deviations, deviations)).tolist(),
+        "correlation": identification.uncertainty.correlation(range(count)).tolist(),
         "correlation_time": identification.uncertainty.correlation_time,
         "undetermined": [
             {"parameters": list(combination.names), "sentence": combination.sentence(), "share": combination.share}

@@ -64,6 +64,14 @@ class Uncertainty(NamedTuple):
     inflation: np.ndarray
     correlation_time: float
 
+    def correlation(self, unknowns: Sequence[int]) -> np.ndarray:
+        """Correlation matrix of some of the unknowns."""
+        covariance = self.covariance[np.ix_(unknowns, unknowns)]
+        scale = np.sqrt(np.diagonal(covariance))
+        correlation = covariance / np.outer(scale, scale)
+        np.fill_diagonal(correlation, 1.0)  # without rounding
+        return correlation
+
     def intervals(self, parameters: Sequence[FreeParameter], z: np.ndarray) -> list[ParameterInterval]:
         """Of each parameter."""
         deviations = np.sqrt(np.diagonal(self.covariance))
