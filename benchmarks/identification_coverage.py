@@ -20,7 +20,7 @@ from undertow.studies.identification.dive import dive_of
 from undertow.studies.identification.free_parameters import chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
-from undertow.studies.identification.output_error import fit, scores_of
+from undertow.studies.identification.output_error import fit, scores_of, without_step_error
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
 from undertow.studies.identification.uncertainty import uncertainty_of
@@ -66,6 +66,7 @@ def run(seeds: int, first: int, duration: float, step: float) -> None:
         dive = dive_of(log, log["input"], step)
         segments = segments_of([dive], 10.0)
         estimate = fit(model, segments, step, np.zeros(len(unknowns.least())), unknowns.least())
+        estimate = without_step_error(model, segments, step, estimate, unknowns.least())
         uncertainty = uncertainty_of(estimate.information, scores_of(model, segments, step, estimate), step)
         intervals = uncertainty.intervals(parameters, estimate.z)
         values = [parameter.value(z) for parameter, z in zip(parameters, truth, strict=True)]

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from undertow.core.errors import BadInput as BadInput
     from undertow.core.process_setup import prepare as prepare
     from undertow.explorer import explore as explore
+    from undertow.identification import IdentifiedModel as IdentifiedModel
+    from undertow.identification import identify as identify
     from undertow.logs.frames import attitudes_of_quaternions as attitudes_of_quaternions
     from undertow.logs.frames import body_vectors as body_vectors
     from undertow.logs.frames import world_vectors as world_vectors
@@ -51,6 +53,7 @@ _HOMES = {
     "BadInput": "undertow.core.errors",
     "Comparison": "undertow.comparison",
     "HybridVehicle": "undertow.physics.plants.hybrid_vehicle",
+    "IdentifiedModel": "undertow.identification",
     "NavigationFilter": "undertow.outside.autopilot.navigation_filter",
     "Run": "undertow.run",
     "Vehicle": "undertow.outside.autopilot.vehicle",
@@ -58,6 +61,7 @@ _HOMES = {
     "body_vectors": "undertow.logs.frames",
     "compare": "undertow.comparison",
     "explore": "undertow.explorer",
+    "identify": "undertow.identification",
     "prepare": "undertow.core.process_setup",
     "rcaf": "undertow.control.controllers.rcaf",
     "read_log": "undertow.scenario.log_file",

@@ -8,9 +8,10 @@ import numpy as np
 
 from undertow.core.atomic_io import write_whole
 from undertow.report.answers.identification_answer import answer_of_identification, in_words
+from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.identification import Series, free_run_figure, intervals_figure
-from undertow.report.figures.writing import Plots, save_all
+from undertow.report.figures.writing import Plots, save_all, small_png
 from undertow.report.formats import number, prose, unit
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 from undertow.studies.identification.identify import Identification
@@ -48,7 +49,7 @@ def write_identification(
     Raises:
         OSError: the folder cannot be written.
     """
-    saved = save_all(lambda: _plots(identification, data), out / "figures", pdf)
+    saved = save_all(lambda: identification_plots(identification, data), out / "figures", pdf)
     pictures = {
         name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
         for name, vector in saved.vectors.items()
@@ -68,7 +69,16 @@ def write_identification(
     return saved.failures
 
 
-def _plots(identification: Identification, data: Mapping[str, Any]) -> Plots:
+def in_notebook_of(identification: Identification, data: Mapping[str, Any]) -> Html:
+    """An identification as a notebook shows it: the answer and one figure."""
+    plots = identification_plots(identification, data)
+    name = "free_run" if "free_run" in plots else "intervals"
+    picture = figure(small_png(plots[name]()), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
+    return in_notebook("Identification", answer_of_identification(data), picture)
+
+
+def identification_plots(identification: Identification, data: Mapping[str, Any]) -> Plots:
+    """Functions that make the figures, by name."""
     figures: dict[str, Any] = {"intervals": lambda: intervals_figure(data["parameters"])}
     if identification.validation:
         figures["free_run"] = lambda: _free_run(identification)

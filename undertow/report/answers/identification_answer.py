@@ -10,14 +10,15 @@ from undertow.core.number_text import plain
 from undertow.report.answers.plain_answer import PlainAnswer
 
 _SHOWN = 4  # parameters named in a line
+_AS_BEFORE = "their intervals are as wide as what was known before"
 
 
-def answer_of_identification(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
+def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None) -> PlainAnswer:
     """The answer of an identification.
 
     Args:
         data: contents of identification.json.
-        folder: of its files.
+        folder: of its files; None where there are none.
     """
     fits = mean_fits(data)
     seconds = sum(dive["duration"] for dive in data["dives"])
@@ -38,7 +39,7 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path) -> PlainAnsw
         *_best_known(data),
         *_unknown(data),
         *_ratios(data),
-        f"Next: undertow simulate {folder / 'identified.yaml'}",
+        *([] if folder is None else [f"Next: undertow simulate {folder / 'identified.yaml'}"]),
     )
     return PlainAnswer(better, verdict, lines)
 
@@ -82,7 +83,7 @@ def _unknown(data: Mapping[str, Any]) -> Iterator[str]:
     unknown = [in_words(name) for name, p in data["parameters"].items() if p["verdict"] == "unknown"]
     if unknown:
         more = f" and {len(unknown) - _SHOWN} more" if len(unknown) > _SHOWN else ""
-        yield f"The dives say nothing of {', '.join(unknown[:_SHOWN])}{more}: the values of the file were kept."
+        yield f"The dives say hardly anything of {'; '.join(unknown[:_SHOWN])}{more}: {_AS_BEFORE}."
 
 
 def _ratios(data: Mapping[str, Any]) -> Iterator[str]:

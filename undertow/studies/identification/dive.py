@@ -70,6 +70,8 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
         raise BadInput("log", "have an attitude, a velocity or an angular velocity", log.source)
     start = max(inputs.time[0], min(time[0] for time, _ in measured.values()))
     end = max(time[-1] for time, _ in measured.values())
+    # Steps begin where inputs jump: thrust is no linear function of them, so that a mean over a jump is another thrust.
+    start = inputs.time[min(np.searchsorted(inputs.time, start), len(inputs.time) - 1)]
     steps = int((end - start) / step)
     if steps < 2:
         raise BadInput("log", "have inputs and a motion at the same time", log.source)

@@ -94,7 +94,8 @@ def axis_parameters(prior_gain: float = 50.0, lag: float = 0.15) -> dict[str, Fr
     ]
     lags = [FreeParameter(f"axis_lag.{axis}", "s", lag, 0.7, is_ratio=True) for axis in BODY_AXES]
     power = FreeParameter("axis_power", "", 1.0, 0.3, is_ratio=True)
-    return {number.name: number for number in (*gains, *lags, power)}
+    delay = FreeParameter("axis_delay", "s", 0.0, _DELAY)  # negative where the clock of the sticks is late
+    return {number.name: number for number in (*gains, *lags, power, delay)}
 
 
 def _ratio(name: str, value) -> FreeParameter:
@@ -140,6 +141,7 @@ USUALLY_FREE = (
     "axis_gain.*",
     "axis_lag.*",
     "axis_power",
+    "axis_delay",
 )
 
 

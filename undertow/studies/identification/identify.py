@@ -17,7 +17,7 @@ from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
-from undertow.studies.identification.output_error import Fit, fit, scores_of
+from undertow.studies.identification.output_error import Fit, fit, scores_of, without_step_error
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
@@ -60,6 +60,7 @@ class Identification(NamedTuple):
     Attributes:
         model: see there.
         dives: on their grids.
+        segment: length of the segments, s.
         parameters: that were free.
         estimate: from all dives.
         uncertainty: of the unknowns.
@@ -71,6 +72,7 @@ class Identification(NamedTuple):
 
     model: IdentificationModel
     dives: tuple[Dive, ...]
+    segment: float
     parameters: tuple[FreeParameter, ...]
     estimate: Fit
     uncertainty: Uncertainty
@@ -138,17 +140,20 @@ def identify(
     begin = first_estimate(model.prior, parameters, dives).z
     say("estimating")
     estimate = _estimate(model, parameters, dives, segment, begin, say)
+    segments = segments_of(dives, segment)
+    least = Unknowns(tuple(parameters), len(dives)).least()
+    estimate = without_step_error(model, segments, step, estimate, least)
     parts, validation = None, ()
     if validate:
         parts, validation = _validated(model, parameters, dives, segment, estimate, say)
     say("judging how sure it is")
-    segments = segments_of(dives, segment)
     scores = scores_of(model, segments, step, estimate)
     count = len(parameters)
     uncertainty = uncertainty_of(estimate.information, scores, step, _with_nuisances(parts, estimate.z, count))
     return Identification(
         model=model,
         dives=tuple(dives),
+        segment=segment,
         parameters=tuple(parameters),
         estimate=estimate,
         uncertainty=uncertainty,

@@ -66,6 +66,7 @@ class IdentificationModel(eqx.Module):
     names: tuple[str, ...] = eqx.field(static=True)
     is_ratio: tuple[bool, ...] = eqx.field(static=True)
     nuisance_deviations: Float[Array, "5"]
+    substeps: int = eqx.field(static=True, default=1)  # of the integration in each step
 
     def candidate(self, z: Float[Array, " unknowns"]) -> CandidateVehicle:
         """What a vector of unknown numbers stands for."""
@@ -75,7 +76,7 @@ class IdentificationModel(eqx.Module):
             name: self.means[i] * jnp.exp(scaled[i]) if ratio else self.means[i] + scaled[i]
             for i, (name, ratio) in enumerate(zip(self.names, self.is_ratio, strict=True))
         }
-        delay = values.get("command_delay", jnp.zeros(()))
+        delay = values.get("command_delay", values.get("axis_delay", jnp.zeros(())))
         nuisances = self.nuisance_deviations[None, :] * z[count:].reshape(-1, len(NUISANCES))
         return CandidateVehicle(self.prior.with_values(values), delay, nuisances)
 
@@ -83,7 +84,7 @@ class IdentificationModel(eqx.Module):
         """Residuals of a segment; `start` in standard deviations of the guess."""
         candidate = self.candidate(z)
         change = jnp.asarray(START_DEVIATION) * start
-        return residuals(candidate.vehicle, candidate.sensing(segment.dive), change, segment, step)
+        return residuals(candidate.vehicle, candidate.sensing(segment.dive), change, segment, step, self.substeps)
 
 
 def model_of(prior: PriorVehicle, parameters: Sequence[FreeParameter]) -> IdentificationModel:
@@ -134,22 +135,24 @@ def normal_equations(model: IdentificationModel, z, starts, segments, weights, s
 
 
 @eqx.filter_jit
-def scores(model: IdentificationModel, z, starts, segments, weights, reduction, step):
+def scores(model: IdentificationModel, z, starts, segments, weights, residuals, reduction, step):
     """Gradient of each step, with what the free begin of the segment takes up removed: (S, length, P).
 
     Args:
         model, z, starts, segments, weights, step: as above.
+        residuals: (S, length, 13).
         reduction: bb^-1 ab' of each segment, (S, 12, P).
     """
 
-    def of_segment(start, segment, weight, reduced):
-        r, derivative = _linearized(model, z, start, segment, step)
+    def of_segment(start, segment, weight, r, reduced):
+        _, derivative = _linearized(model, z, start, segment, step)
         weighted = weight * jnp.where(weight > 0, r, 0.0)
         a, b = derivative[:, : z.shape[0]], derivative[:, z.shape[0] :]
         projected = (a - b @ reduced).reshape(*r.shape, -1)
         return jnp.einsum("kc,kcp->kp", weighted, projected)
 
-    return jax.lax.map(lambda row: of_segment(*row), (starts, segments, weights, reduction), batch_size=_AT_ONCE)
+    rows = (starts, segments, weights, residuals, reduction)
+    return jax.lax.map(lambda row: of_segment(*row), rows, batch_size=_AT_ONCE)
 
 
 @eqx.filter_jit

@@ -5,13 +5,15 @@ equations segment by segment, so that an iteration costs what the derivatives co
 would store a matrix of all residuals by all unknowns, which is a gigabyte for ten minutes of a dive.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.ndimage import median_filter
 
-from undertow.studies.identification.dive import RESIDUALS, SENSOR_OF_RESIDUAL
+from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.model import (
     IdentificationModel,
     NormalEquations,
@@ -21,22 +23,8 @@ from undertow.studies.identification.model import (
 )
 from undertow.studies.identification.segments import Segments
 
-
-class _Phase(NamedTuple):
-    """Of the estimate.
-
-    Attributes:
-        huber: standard deviations from which on a residual counts as an outlier.
-        tolerance: decrease of the cost, as a share of it, at which the phase is over; residuals are not white, so that
-            it is more than one standard deviation of a parameter takes.
-    """
-
-    huber: float
-    tolerance: float
-
-
-# At first hardly any residual is an outlier, since far from the estimate those of good samples are large.
-_PHASES = (_Phase(huber=30.0, tolerance=1e-3), _Phase(huber=3.0, tolerance=5e-5))
+_NEIGHBOURS = 5  # samples, with whose median one is compared; what the model lacks moves all of them
+_OUTLIER = 4.0  # standard deviations from that median from which on a sample counts as an outlier
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -44,6 +32,7 @@ _ITERATIONS = 60
 _TRIES = 10  # dampings of a step
 _GOOD, _POOR = 0.75, 0.25  # shares of the expected decrease above and below which the damping changes
 _CONVERGED = 0.05  # decrease of the cost; 0.5 is one standard deviation of a parameter
+_RELATIVE = 5e-5  # the same as a share of the cost, where residuals are not white
 _NOISE_CONVERGED = 0.02  # largest relative change of a noise
 
 
@@ -100,29 +89,26 @@ def fit(
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     z = np.maximum(z, least)
     residuals = _residuals(model, segments, step, z, starts)
-    phase, *others = _PHASES if noise is None else _PHASES[-1:]
     noise = _first_noise(counts) if noise is None else noise
     damping, converged, iteration = 1e-3, False, 0
     for iteration in range(1, _ITERATIONS + 1):
-        weights = _weights(residuals, counts, noise, phase.huber)
+        weights = _weights(residuals, counts, noise)
         cost = _cost(residuals, weights, z, starts)
         watch(iteration, cost)
         parts = _evaluated(model, segments, weights, step, z, starts)
         trial = _improved(model, segments, parts, weights, step, z, starts, least, damping, cost)
         small = trial is None
         if trial is not None:
-            small = cost - trial.cost < max(_CONVERGED, phase.tolerance * cost)
+            small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
             z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
-        new_noise = np.clip(_noise(residuals, counts, phase.huber), noise / _FASTEST, noise * _FASTEST)
+        new_noise = np.clip(_noise(residuals, counts), noise / _FASTEST, noise * _FASTEST)
         finite = np.isfinite(new_noise)
         steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
         noise = new_noise
         if steady and small:
-            if not others:
-                converged = True
-                break
-            phase, *others = others
-    weights = _weights(residuals, counts, noise, phase.huber)
+            converged = True
+            break
+    weights = _weights(residuals, counts, noise)
     parts = _evaluated(model, segments, weights, step, z, starts)
     information, _, reduction = _reduced(parts, z, starts, 0.0)
     cost = _cost(residuals, weights, z, starts)
@@ -216,31 +202,57 @@ def _first_noise(counts: np.ndarray) -> np.ndarray:
     return np.where(counts.sum(axis=(0, 1)) > 0, _FIRST_NOISE, np.inf)
 
 
-def _noise(residuals: np.ndarray, counts: np.ndarray, huber: float) -> np.ndarray:
-    """Standard deviation of a single sample for each kind of residual, outliers cut at some of them."""
-    estimate = np.full(len(RESIDUALS), np.inf)
-    for i in range(len(RESIDUALS)):
+def _noise(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Standard deviation of a single sample for each kind of residual, outliers left out."""
+    shares = _shares(residuals, counts)
+    squares = np.where(counts > 0, shares * counts * residuals**2, 0.0).sum(axis=(0, 1))
+    samples = np.where(counts > 0, shares, 0.0).sum(axis=(0, 1))
+    mean = squares / np.maximum(samples, 1e-300)
+    return np.where(samples > 0, np.maximum(np.sqrt(mean), _SMALLEST_NOISE), np.inf)
+
+
+def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """1/variance of each residual, less for outliers, 0 without a sample."""
+    return _shares(residuals, counts) * counts / noise**2
+
+
+def _shares(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """By which residuals count, Huber's: 1, and less for samples far from the median of their neighbours."""
+    shares = np.ones(residuals.shape)
+    for i in range(residuals.shape[2]):
         measured = counts[:, :, i] > 0
-        if measured.any():
-            scaled = np.abs(residuals[:, :, i][measured]) * np.sqrt(counts[:, :, i][measured])
-            limit = huber * max(1.4826 * float(np.median(scaled)), _SMALLEST_NOISE)
-            estimate[i] = max(float(np.sqrt((np.minimum(scaled, limit) ** 2).mean())), _SMALLEST_NOISE)
-    return estimate
+        of_one = residuals[:, :, i][measured] * np.sqrt(counts[:, :, i][measured])
+        if len(of_one) >= _NEIGHBOURS:
+            apart = np.abs(of_one - median_filter(of_one, _NEIGHBOURS, mode="nearest"))
+            limit = _OUTLIER * max(1.4826 * float(np.median(apart)), _SMALLEST_NOISE)
+            shares[:, :, i][measured] = np.where(apart > limit, limit / np.maximum(apart, limit), 1.0)
+    return shares
 
 
-def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray, huber: float) -> np.ndarray:
-    """1/variance of each residual, less for outliers (Huber), 0 without a sample."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = np.abs(residuals) * np.sqrt(counts) / noise
-        robust = np.where(sizes > huber, huber / sizes, 1.0)
-        return np.where(counts > 0, robust * counts / noise**2, 0.0)
-
-
-def scores_of(model: IdentificationModel, segments: Segments, step: float, estimate: Fit) -> np.ndarray:
-    """Gradient of each step, (S, length, P)."""
+def scores_of(
+    model: IdentificationModel, segments: Segments, step: float, estimate: Fit, residuals: np.ndarray | None = None
+) -> np.ndarray:
+    """Gradient of each step, (S, length, P); of other residuals than those of the estimate, if they are given."""
     return np.asarray(
         scores(
             model, jnp.asarray(estimate.z), jnp.asarray(estimate.starts), segments, jnp.asarray(estimate.weights),
-            jnp.asarray(estimate.reduction), step,
+            jnp.asarray(estimate.residuals if residuals is None else residuals), jnp.asarray(estimate.reduction), step,
         )
     )  # fmt: skip
+
+
+def without_step_error(
+    model: IdentificationModel, segments: Segments, step: float, estimate: Fit, least: np.ndarray
+) -> Fit:
+    """The estimate for half the step of integration, to first order: what is known to a thousandth needs it.
+
+    Args:
+        model, segments, step, least: as for the estimate.
+        estimate: with steps as they are.
+    """
+    finer = dataclasses.replace(model, substeps=2)
+    residuals = _residuals(finer, segments, step, estimate.z, estimate.starts)
+    change = np.where(estimate.weights > 0, residuals - estimate.residuals, 0.0)
+    gradient = scores_of(model, segments, step, estimate, change).sum(axis=(0, 1))
+    moved = np.maximum(estimate.z - np.linalg.solve(estimate.information, gradient), least)
+    return estimate._replace(z=moved)

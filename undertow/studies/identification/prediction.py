@@ -20,7 +20,7 @@ class Sensing(NamedTuple):
     """What lies between a vehicle and its log.
 
     Attributes:
-        command_delay: s, from an input to what it does.
+        command_delay: s, from an input to what it does; negative where the times of inputs are late.
         current: of the water, world, m/s.
         rate_bias: of the angular velocity, rad/s.
     """
@@ -31,7 +31,12 @@ class Sensing(NamedTuple):
 
 
 def residuals(
-    vehicle: IdentifiedVehicle, sensing: Sensing, change: Float[Array, "12"], segment: Any, step: Float[Array, ""]
+    vehicle: IdentifiedVehicle,
+    sensing: Sensing,
+    change: Float[Array, "12"],
+    segment: Any,
+    step: Float[Array, ""],
+    substeps: int = 1,
 ) -> Float[Array, "length 13"]:
     """Predicted less measured, at the times of the samples; m, rad, m/s, rad/s, m. Without a sample: any number.
 
@@ -41,8 +46,9 @@ def residuals(
         change: of the guessed motion at the begin of the segment: m, rad (a turn in body axes), m/s, rad/s.
         segment: one of `Segments`.
         step: s.
+        substeps: of the integration in each step.
     """
-    states = motion(vehicle, sensing, change, segment, step)
+    states = motion(vehicle, sensing, change, segment, step, substeps)
     return jax.vmap(_differences, (0, 0, 0, 0, None, None))(
         jax.tree.map(lambda leaf: leaf[:-1], states),
         jax.tree.map(lambda leaf: leaf[1:], states),
@@ -53,20 +59,23 @@ def residuals(
     )
 
 
-def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step) -> MotionState:
+def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step, substeps: int = 1) -> MotionState:
     """States at the begin of each step of a segment and at its end, actuators left out (zero)."""
     inputs = delayed(segment.inputs, sensing.command_delay / step)
     length = segment.values.shape[0]
     before = segment.inputs.shape[0] - length
 
     def run_in(state, u):
-        return vehicle.actuators_after(state, u, step), None
+        for _ in range(substeps):
+            state = vehicle.actuators_after(state, u, step / substeps)
+        return state, None
 
     actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
 
     def advance(x: MotionState, u):
-        after = vehicle.advance(x, u, sensing.current, step)
-        return after, after._replace(actuators=())
+        for _ in range(substeps):
+            x = vehicle.advance(x, u, sensing.current, step / substeps)
+        return x, x._replace(actuators=())
 
     guess = segment.start
     start = MotionState(
@@ -81,11 +90,11 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
 
 
 def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[Array, "steps N"]:
-    """Mean inputs of each step, when all come later by a number of steps, not negative."""
+    """Mean inputs of each step, when all come later by a number of steps; earlier where it is negative."""
     whole = jnp.floor(jax.lax.stop_gradient(steps))
     part = steps - whole
     index = jnp.arange(inputs.shape[0]) - whole.astype(int)
-    earlier = lambda k: jnp.asarray(inputs)[jnp.clip(index - k, 0)]
+    earlier = lambda k: jnp.asarray(inputs)[jnp.clip(index - k, 0, inputs.shape[0] - 1)]
     return (1 - part) * earlier(0) + part * earlier(1)
 
 

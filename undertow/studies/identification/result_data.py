@@ -1,14 +1,16 @@
 """An identification as plain data for identification.json."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from undertow.studies.identification.dive import RESIDUALS
+from undertow.studies.identification.dive import RESIDUALS, SENSOR_OF_RESIDUAL
 from undertow.studies.identification.identify import Identification, Validation
+from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import LEVEL, ParameterInterval
-from undertow.studies.identification.validation import HORIZONS, PredictionErrors
+from undertow.studies.identification.validation import HORIZONS, PredictionErrors, Whiteness, whiteness
 
 
 def as_data(identification: Identification) -> dict[str, Any]:
@@ -31,10 +33,24 @@ def as_data(identification: Identification) -> dict[str, Any]:
         "noise": {
             name: float(noise) for name, noise in zip(RESIDUALS, estimate.noise, strict=True) if np.isfinite(noise)
         },
+        "residuals": {name: test._asdict() | {"is_white": test.is_white} for name, test in _whiteness(identification)},
         "iterations": estimate.iterations,
         "converged": estimate.converged,
         "findings": list(identification.findings),
     }
+
+
+def _whiteness(identification: Identification) -> Iterator[tuple[str, Whiteness]]:
+    """Of the residuals of each sensor, at its samples."""
+    dives = identification.dives
+    segments = segments_of(dives, identification.segment)
+    counts = segments.counts[:, :, SENSOR_OF_RESIDUAL] > 0
+    length = segments.values.shape[1]
+    inputs = segments.inputs[:, -length:]
+    for i, name in enumerate(RESIDUALS):
+        there = counts[:, :, i]
+        if there.any():
+            yield name, whiteness(identification.estimate.residuals[:, :, i][there], inputs[there])
 
 
 def _interval_data(interval: ParameterInterval) -> dict[str, Any]:

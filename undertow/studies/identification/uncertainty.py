@@ -18,6 +18,9 @@ LEVEL = 0.95  # of the intervals
 _DETERMINED, _PARTLY = 0.5, 0.9  # deviation as a share of that beforehand
 _MEMBER = 0.35  # component from which on a parameter belongs to a combination
 _CHANCE = 0.05  # probability with which parts of the data scatter as much by chance
+# Of the deviation beforehand: inputs and samples are averaged over steps, which bends the fastest motion; what white
+# noise alone would let one know better is not known.
+_RESOLUTION = 0.003
 _LARGEST_SHARE = 0.25  # of a segment over which correlation is counted
 
 
@@ -111,7 +114,7 @@ def uncertainty_of(
     if parts is not None and len(parts) > 2:
         inflation = np.maximum(inflation, _between_parts(parts, variance))
     inflation = np.minimum(inflation, np.maximum(1.0, 1.0 / variance))  # not less sure than beforehand
-    root = np.sqrt(inflation)
+    root = np.sqrt(np.maximum(inflation, _RESOLUTION**2 / variance))
     return Uncertainty(root[:, None] * plain * root, float(freedom), root, float(lags * step))
 
 
