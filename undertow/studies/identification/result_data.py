@@ -22,7 +22,7 @@ def as_data(identification: Identification) -> dict[str, Any]:
             {"name": dive.name, "duration": dive.duration, "sensors": dive.sensors()} for dive in identification.dives
         ],
         "level": LEVEL,
-        "parameters": {interval.parameter.name: _interval_data(interval) for interval in identification.intervals},
+        "parameters": {interval.parameter.name: interval_data(interval) for interval in identification.intervals},
         "correlation": (covariance / np.outer(deviations, deviations)).tolist(),
         "correlation_time": identification.uncertainty.correlation_time,
         "undetermined": [
@@ -39,7 +39,8 @@ def as_data(identification: Identification) -> dict[str, Any]:
     }
 
 
-def _interval_data(interval: ParameterInterval) -> dict[str, Any]:
+def interval_data(interval: ParameterInterval) -> dict[str, Any]:
+    """What is known of a parameter."""
     return {
         "unit": interval.parameter.unit,
         "value": interval.value,
