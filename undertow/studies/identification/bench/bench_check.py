@@ -17,8 +17,11 @@ FEWEST_REVERSE = 3
 _THRUST = 0.02  # share of the largest thrust, from which on there is some
 _SAME = 5e-3  # share of the largest voltage, within which voltages are the same
 _FALLING = (0.05, 0.2)  # shares of the largest thrust by which it falls while the command rises: told, refused
+_MOST_SUPPLIES = 20  # above which a supply is one that sags, and not several
+_DIFFERENT = 0.03  # share of the largest thrust, by which it differs at equal volts
 _OFFSET = 0.03  # share of the largest thrust at command 0
-_THRUST_PER_POWER = (0.02, 1.5)  # N/W at the largest power
+_STRONG = 0.6  # of the largest voltage, from which on commands are large
+_THRUST_PER_POWER = (0.02, 1.5)  # N/W at large commands
 _DOUBTFUL = (0.04, 0.6)
 _SPEED_PER_VOLT = (3.0, 300.0)  # rad/s per V
 
@@ -52,6 +55,7 @@ def check_bench(tables: Sequence[BenchTable]) -> tuple[LogFinding, ...]:
     settled = [table for table in tables if table.time is None]
     if settled:
         findings += _monotone(settled, largest)
+        findings += [finding for table in settled for finding in _supplies(table, largest)]
     findings += _offset(volts, thrust, largest)
     for table in tables:
         findings += _dead_columns(table) + _units(table)
@@ -70,7 +74,7 @@ def _levels(volts: np.ndarray) -> int:
     """How many different voltages there are."""
     if not len(volts):
         return 0
-    return 1 + int((np.diff(np.sort(np.abs(volts))) > _SAME * np.abs(volts).max()).sum())
+    return len(np.unique(np.round(volts / (_SAME * np.abs(volts).max()))))
 
 
 def _check_direction(volts: np.ndarray, thrust: np.ndarray, names: str) -> None:
@@ -102,7 +106,26 @@ def _monotone(tables: Sequence[BenchTable], largest: float) -> list[LogFinding]:
         raise BadInput("bench", "have a thrust that rises with the command", sentence, hint="Are columns interchanged?")
     if worst < _FALLING[0] * largest:
         return []
-    return [LogFinding("log", "", "note", sentence, "Look at these rows: did the propeller draw air, or the supply sag")]
+    return [
+        LogFinding("log", "", "note", sentence, "Look at these rows: did the propeller draw air, or the supply sag")
+    ]
+
+
+def _supplies(table: BenchTable, largest: float) -> list[LogFinding]:
+    """By how much thrust differs at equal volts between supplies."""
+    supplies = np.unique(np.round(table.supply, 1))
+    curves = []
+    for supply in supplies:
+        rows = np.flatnonzero(np.round(table.supply, 1) == supply)
+        rows = rows[np.argsort(table.volts[rows], kind="stable")]
+        curves.append((table.volts[rows], table.thrust[rows]))
+    volts, thrust = curves[0]
+    difference = max((float(np.abs(np.interp(volts, *curve) - thrust).max()) for curve in curves[1:]), default=0.0)
+    if len(supplies) > _MOST_SUPPLIES or difference < _DIFFERENT * largest:
+        return []
+    names = ", ".join(f"{supply:g}" for supply in supplies)
+    sentence = f"{table.name}: at equal volts thrust differs by up to {difference:.2g} N between supplies of {names} V"
+    return [LogFinding("log", "", "note", sentence, "Choose the rows of yours with --supply")]
 
 
 def _offset(volts: np.ndarray, thrust: np.ndarray, largest: float) -> list[LogFinding]:
@@ -129,18 +152,18 @@ def _dead_columns(table: BenchTable) -> list[LogFinding]:
 def _units(table: BenchTable) -> list[LogFinding]:
     """Thrust per power and speed per volt that no thruster has, or few."""
     findings = []
+    moving = np.abs(table.volts) > _STRONG * np.abs(table.volts).max()
     power = np.abs(table.current * table.supply)
-    if np.isfinite(power).any() and np.nanmax(power) > 0:
-        row = int(np.nanargmax(power))
-        ratio = float(abs(table.thrust[row]) / power[row])
-        sentence = f"{abs(table.thrust[row]):.3g} N for {power[row]:.3g} W, {ratio:.2g} N/W"
+    powered = moving & (np.nan_to_num(power) > 0)
+    if powered.any():
+        ratio = float(np.median(np.abs(table.thrust[powered]) / power[powered]))
+        sentence = f"{ratio:.2g} N/W at large commands"
         if not _THRUST_PER_POWER[0] <= ratio <= _THRUST_PER_POWER[1]:
             must = f"have a plausible thrust: {_DOUBTFUL[0]:g} to {_DOUBTFUL[1]:g} N/W"
             raise BadInput("bench", must, f"{table.name} with {sentence}", hint=_unit_hint(ratio))
         if not _DOUBTFUL[0] <= ratio <= _DOUBTFUL[1]:
             remedy = "Few thrusters do that: check the units of thrust and current"
             findings.append(LogFinding("sensor", "thrust", "note", f"{table.name}: {sentence}", remedy))
-    moving = np.abs(table.volts) > 0.5 * np.abs(table.volts).max()
     if table.has("speed") and np.isfinite(table.speed[moving]).any():
         ratio = float(np.nanmedian(table.speed[moving] / table.volts[moving]))
         if not _SPEED_PER_VOLT[0] <= ratio <= _SPEED_PER_VOLT[1]:
@@ -150,7 +173,5 @@ def _units(table: BenchTable) -> list[LogFinding]:
 
 
 def _unit_hint(ratio: float) -> str:
-    fitting = [
-        unit for factor, unit in _AS_IF.items() if _DOUBTFUL[0] <= ratio * factor <= _DOUBTFUL[1]
-    ]
+    fitting = [unit for factor, unit in _AS_IF.items() if _DOUBTFUL[0] <= ratio * factor <= _DOUBTFUL[1]]
     return f"It would be plausible in {' or '.join(fitting)}: name the unit of thrust in the header" if fitting else ""

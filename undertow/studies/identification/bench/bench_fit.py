@@ -23,6 +23,7 @@ _MAD = 1.4826  # standard deviation of a normal distribution per median of sizes
 _FOLDS = 8  # of settled rows, by voltage
 _FOLDS_OF_RECORD = 4  # in time
 _EVALUATIONS = 60
+_INSIDE = 0.1  # distance of the begin from a bound, in deviations beforehand
 
 
 class BenchFit(NamedTuple):
@@ -120,9 +121,15 @@ def _solved(problem: BenchProblem, present: np.ndarray, z: np.ndarray, noise: np
         return np.stack([value, weight, slope])
 
     least = np.array([parameter.least_z for parameter in problem.parameters])
-    begin = np.maximum(z, least)
+    begin = np.maximum(z, least + _INSIDE)  # at its bound the method hardly moves
     solution = least_squares(
-        residuals, begin, jacobian, (least, np.inf), loss=loss, x_scale="jac", max_nfev=_EVALUATIONS
+        residuals,
+        begin,
+        jac=jacobian,  # pyright: ignore[reportArgumentType] - a function, as SciPy documents
+        bounds=(least, np.inf),
+        loss=loss,  # pyright: ignore[reportArgumentType] - a function, as SciPy documents
+        x_scale="jac",
+        max_nfev=_EVALUATIONS,
     )
     return solution.x, bool(solution.success)
 

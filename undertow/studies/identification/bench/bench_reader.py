@@ -17,6 +17,7 @@ _SUPPLY_TOLERANCE = 0.03  # of the supply, within which a row counts as one of i
 _SLOWEST = 0.3  # s between rows that show a lag
 _PULSES = (700.0, 2400.0)  # us
 _FULL_DUTY = 1.05
+_REVERSAL = 0.5  # s after a change of sign in which a motor may still turn the other way
 _FEWEST = 20  # rows over time
 _NEGATIVE = 0.02  # share of the largest thrust, from which on a thrust counts as one in reverse
 _COMMANDS = ("pulse", "duty", "command", "voltage")
@@ -179,9 +180,11 @@ def _with_time(table: BenchTable) -> BenchTable:
 
 
 def _with_signs(table: BenchTable) -> BenchTable:
-    """The table with current and speed in the sign of the command, and thrust too where it is given as a size."""
+    """The table with current, speed and thrust in the sign of the command, where they are given as sizes."""
     sign = np.sign(table.volts)
-    table = table._replace(current=np.abs(table.current) * sign, speed=np.abs(table.speed) * sign)
+    signs = np.where(_reversing(table), np.nan, sign)
+    signed = {name: _signed(getattr(table, name), sign, signs, table.time) for name in ("current", "speed")}
+    table = table._replace(**signed)
     if table.time is not None or not (sign < 0).any() or not (sign > 0).any():
         return table
     least = -_NEGATIVE * float(np.abs(table.thrust).max())
@@ -189,3 +192,18 @@ def _with_signs(table: BenchTable) -> BenchTable:
         return table
     note = "thrust has no sign: in reverse it is taken as negative"
     return table._replace(thrust=np.where(sign < 0, -1.0, 1.0) * table.thrust, notes=(*table.notes, note))
+
+
+def _signed(values: Rows, sign: Rows, signs: Rows, time: Rows | None) -> Rows:
+    """Sizes in the sign of the command, those of settled rows always; NaN where the motor may still turn back."""
+    has_own_signs = time is not None and bool((values < 0).any())
+    return values if has_own_signs else np.abs(values) * (sign if time is None else signs)
+
+
+def _reversing(table: BenchTable) -> np.ndarray:
+    """Rows of a record shortly after the command has changed its sign, (rows,)."""
+    rows = np.zeros(len(table.volts), dtype=bool)
+    if table.time is not None:
+        for change in table.time[1:][np.diff(np.sign(table.volts)) != 0]:
+            rows |= (table.time >= change) & (table.time <= change + _REVERSAL)
+    return rows

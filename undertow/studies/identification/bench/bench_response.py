@@ -76,7 +76,7 @@ def response_over_time(
         return after, now
 
     _, series = jax.lax.scan(advance, begin, jnp.asarray(command.volts)[:, None])
-    grid = command.step * jnp.arange(len(command.volts))
+    grid = jnp.asarray(command.step * np.arange(len(command.volts)))
     times = jnp.asarray(command.times) - delay
     return BenchResponse(*(jnp.interp(times, grid, values[:, 0]) for values in series))
 

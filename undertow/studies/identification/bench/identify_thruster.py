@@ -22,6 +22,9 @@ Say = Callable[[str], None]
 
 _QUIET = 5e-3  # share of the largest thrust, up to which there is none
 _FEWEST_SPEEDS = 5  # rows with speed and current, below which no motor is fitted
+# Share of the largest thrust by which a motor may predict thrust worse than a curve and still be taken: it knows the
+# current too, what another supply does, and how the lag depends on the speed.
+_WORTH = 0.01
 _DETERMINED_ZONE = 0.06  # of the largest voltage: deviation of a dead zone before
 
 
@@ -31,7 +34,7 @@ class ThrusterIdentification(NamedTuple):
     Attributes:
         tables: records.
         findings: of their checks.
-        fits: judged forms of the thruster, that which predicts thrust best first.
+        fits: judged forms of the thruster; the one to use first: a motor unless it predicts thrust clearly worse.
         compared: rms of the errors of thrust, N, of other thrusters on the same rows, by name.
     """
 
@@ -42,7 +45,7 @@ class ThrusterIdentification(NamedTuple):
 
     @property
     def best(self) -> JudgedFit:
-        """The form that predicts thrust best."""
+        """The form to use."""
         return self.fits[0]
 
     @property
@@ -52,9 +55,7 @@ class ThrusterIdentification(NamedTuple):
 
 
 def identify_thruster(
-    tables: Sequence[BenchTable],
-    others: Mapping[str, AbstractThruster] | None = None,
-    say: Say = lambda stage: None,
+    tables: Sequence[BenchTable], others: Mapping[str, AbstractThruster] | None = None, say: Say = lambda stage: None
 ) -> ThrusterIdentification:
     """Identify a thruster.
 
@@ -75,7 +76,10 @@ def identify_thruster(
             say(f"fitting the {form_class.name}")
             fits.append(_of_form(form_class, tables, has_reverse(findings)))
         compared = {name: _thrust_error(thruster, tables) for name, thruster in (others or {}).items()}
-    fits.sort(key=lambda fit: fit.left_out["thrust"])
+    largest = float(np.abs(joined(tables, "thrust")).max())
+    fits.sort(
+        key=lambda fit: fit.left_out["thrust"] - (_WORTH * largest if isinstance(fit.problem.form, MotorForm) else 0.0)
+    )
     return ThrusterIdentification(tuple(tables), findings, tuple(fits), compared)
 
 
@@ -119,7 +123,7 @@ def _without(table: BenchTable, names: set[str]) -> BenchTable:
 
 
 def _dead_zone(tables: Sequence[BenchTable]) -> tuple[float, float] | None:
-    """Between which voltages the dead zone ends: the largest without thrust, the smallest with some; None if unknown."""
+    """The largest voltage without thrust and the smallest with some, in order; None without settled rows."""
     settled = [table for table in tables if table.time is None]
     if not settled:
         return None
