@@ -1,4 +1,4 @@
-"""Thrusters identified from bench records: closed forms, SciPy's own fit, the published table, coverage, refusals."""
+"""Thrusters identified from bench records: closed forms, SciPy's own fit, the published table, coverage, missing reverse."""
 
 from pathlib import Path
 
@@ -79,7 +79,7 @@ def test_lag_and_delay_of_a_record_over_time():
 
 
 @pytest.mark.full
-def test_inertia_of_a_motor_is_told_by_steps():
+def test_inertia_of_a_motor_follows_from_steps():
     with in_precision("float64"):
         truth = dc_motor(
             rotor_inertia=3.2e-4, reverse_thrust_coefficient=2.9e-4, dead_zone=0.8, dead_zone_kind="subtract"
@@ -126,7 +126,7 @@ def test_published_t200_at_16_volts():
         np.testing.assert_allclose(thrust, [51.44, -39.91], atol=1.5)
 
 
-def test_supplies_that_differ_are_told():
+def test_rows_of_a_supply_are_chosen():
     table = read_bench(TABLE)
     assert len(table.volts) == 1206
     with pytest.raises(BadInput, match="10, 12, 14, 16, 18, 20"):

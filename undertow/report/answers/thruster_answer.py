@@ -9,6 +9,7 @@ from undertow.report.answers.identification_answer import in_words, interval_wor
 from undertow.report.answers.plain_answer import PlainAnswer
 
 _GOOD = 0.05  # share of the largest thrust, up to which an error of prediction is a good one
+_CLEARLY = 0.9  # share of the error below which another thruster predicts better than by chance
 NAMES = {"curve": "power of the voltage", "motor": "DC motor"}
 _LAGS = {"time_constant": "time constant", "rotor_inertia": "rotor inertia"}
 
@@ -23,7 +24,7 @@ def answer_of_thruster(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
     best = data["forms"][0]
     error = best["rms_left_out"]["thrust"]
     share = error / data["largest_thrust"]
-    better = [name for name, rms in data["compared"].items() if rms < error]
+    better = [name for name, rms in data["compared"].items() if rms < _CLEARLY * error]
     good = share <= _GOOD and best["converged"] and not better
     rows = sum(bench["rows"] for bench in data["bench"])
     verdict = (

@@ -24,7 +24,7 @@ def bench_figure(fit: JudgedFit, others: Mapping[str, np.ndarray], grid: np.ndar
 
     Args:
         fit: form of the thruster to show.
-        others: thrust of other thrusters at the voltages of `grid`, N, by name; the first is drawn.
+        others: thrust of other thrusters at the voltages of `grid`, N, by name; the first is shown.
         grid: voltages, V.
     """
     settled = [table for table in fit.problem.tables if table.time is None]

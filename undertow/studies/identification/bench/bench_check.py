@@ -16,7 +16,7 @@ FEWEST_FORWARD = 5  # different voltages that give thrust
 FEWEST_REVERSE = 3
 _THRUST = 0.02  # share of the largest thrust, from which on there is some
 _SAME = 5e-3  # share of the largest voltage, within which voltages are the same
-_FALLING = (0.05, 0.2)  # shares of the largest thrust by which it falls while the command rises: told, refused
+_FALLING = (0.05, 0.2)  # shares of the largest thrust by which it falls while the command rises: reported, an error
 _MOST_SUPPLIES = 20  # above which a supply is one that sags, and not several
 _DIFFERENT = 0.03  # share of the largest thrust, by which it differs at equal volts
 _OFFSET = 0.03  # share of the largest thrust at command 0
@@ -107,7 +107,7 @@ def _monotone(tables: Sequence[BenchTable], largest: float) -> list[LogFinding]:
     if worst < _FALLING[0] * largest:
         return []
     return [
-        LogFinding("log", "", "note", sentence, "Look at these rows: did the propeller draw air, or the supply sag")
+        LogFinding("log", "", "note", sentence, "Look at these rows: did air reach the propeller, or the supply sag")
     ]
 
 

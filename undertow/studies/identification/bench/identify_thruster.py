@@ -21,6 +21,8 @@ from undertow.studies.identification.uncertainty import ParameterInterval
 Say = Callable[[str], None]
 
 _QUIET = 5e-3  # share of the largest thrust, up to which there is none
+_SETTLED = 0.6  # s after a change of the command, when the thrust of small thrusters has settled
+_FEWEST_LATE = 5  # rows of a held command, of which a mean is taken
 _FEWEST_SPEEDS = 5  # rows with speed and current, below which no motor is fitted
 # Share of the largest thrust by which a motor may predict thrust worse than a curve and still be taken: it knows the
 # current too, what another supply does, and how the lag depends on the speed.
@@ -62,7 +64,7 @@ def identify_thruster(
     Args:
         tables: records of one thruster.
         others: thrusters to compare with, by name.
-        say: is told what is done.
+        say: called with what is done.
 
     Raises:
         BadInput: nothing can be identified, with the reason.
@@ -75,11 +77,13 @@ def identify_thruster(
         for form_class in (CurveForm, MotorForm) if _has_motor(tables) else (CurveForm,):
             say(f"fitting the {form_class.name}")
             fits.append(_of_form(form_class, tables, has_reverse(findings)))
-        compared = {name: _thrust_error(thruster, tables) for name, thruster in (others or {}).items()}
     largest = float(np.abs(joined(tables, "thrust")).max())
     fits.sort(
         key=lambda fit: fit.left_out["thrust"] - (_WORTH * largest if isinstance(fit.problem.form, MotorForm) else 0.0)
     )
+    delay = fits[0].problem.values(fits[0].fit.z).get("delay", 0.0)
+    with in_precision("float64"):
+        compared = {name: _thrust_error(thruster, tables, delay) for name, thruster in (others or {}).items()}
     return ThrusterIdentification(tuple(tables), findings, tuple(fits), compared)
 
 
@@ -123,15 +127,28 @@ def _without(table: BenchTable, names: set[str]) -> BenchTable:
 
 
 def _dead_zone(tables: Sequence[BenchTable]) -> tuple[float, float] | None:
-    """The largest voltage without thrust and the smallest with some, in order; None without settled rows."""
-    settled = [table for table in tables if table.time is None]
-    if not settled:
+    """The largest voltage without thrust and the smallest with some, in order; None where nothing settles."""
+    points = [point for table in tables for point in _settled_points(table)]
+    if not points:
         return None
-    volts, thrust = np.abs(joined(settled, "volts")), np.abs(joined(settled, "thrust"))
+    volts, thrust = np.abs(np.array(points)).T
     quiet = thrust <= _QUIET * thrust.max()
     without = float(volts[quiet].max(initial=0.0))
     least = float(volts[~quiet].min())
     return min(without, least), max(without, least)
+
+
+def _settled_points(table: BenchTable) -> list[tuple[float, float]]:
+    """Voltage and thrust of settled rows; of a record over time the mean of each command that was held for long."""
+    if table.time is None:
+        return list(zip(table.volts, table.thrust, strict=True))
+    points = []
+    changes = np.flatnonzero(np.diff(table.volts) != 0) + 1
+    for rows in np.split(np.arange(len(table.volts)), changes):
+        late = rows[table.time[rows] >= table.time[rows[0]] + _SETTLED]
+        if len(late) >= _FEWEST_LATE:
+            points.append((float(table.volts[late[0]]), float(table.thrust[late].mean())))
+    return points
 
 
 def _zone_interval(bracket: tuple[float, float], largest: float) -> ParameterInterval:
@@ -143,14 +160,14 @@ def _zone_interval(bracket: tuple[float, float], largest: float) -> ParameterInt
     return ParameterInterval(parameter, middle, low, high, float(deviation), float(deviation / before), 0.0)
 
 
-def _thrust_error(thruster: AbstractThruster, tables: Sequence[BenchTable]) -> float:
-    """Rms of the error of thrust, N."""
+def _thrust_error(thruster: AbstractThruster, tables: Sequence[BenchTable], delay: float) -> float:
+    """Rms of the error of thrust, N, where commands arrive late by a delay (s)."""
     errors = []
     for table in tables:
         if table.time is None:
             thrust = settled_response(thruster, jnp.asarray(table.volts)).thrust
         else:
             command = held_command(table.volts, table.time)
-            thrust = response_over_time(thruster, thruster.initial_state(1), command).thrust
+            thrust = response_over_time(thruster, thruster.initial_state(1), command, delay).thrust
         errors.append(np.asarray(thrust) - table.thrust)
     return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
