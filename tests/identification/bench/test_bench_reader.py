@@ -130,3 +130,18 @@ def test_findings_that_do_not_stop():
     assert ("speed", "left_out") in names
     assert ("lag", "refused") in names
     assert "at command 0 the thrust is 3 N" in sentences
+
+
+def test_a_mapping_names_columns_of_any_header(tmp_path):
+    path = written(tmp_path, "clock,channel_3,cell", 20 * np.arange(len(VOLTS)), PULSES, power_curve(VOLTS) / 9.80665)
+    mapping = tmp_path / "mapping.yaml"
+    mapping.write_text(
+        "time: {column: clock, unit: ms}\n"
+        "signals:\n"
+        "  input: {columns: [channel_3], unit: us, supply: 16, dead_band: 0}\n"
+        "  thrust: {columns: [cell], unit: kgf}\n"
+    )
+    table = read_bench(path, mapping=mapping)
+    np.testing.assert_allclose(table.volts, VOLTS, atol=1e-9)
+    np.testing.assert_allclose(table.thrust, power_curve(VOLTS), rtol=1e-5)
+    assert table.time is not None
