@@ -32,6 +32,11 @@ PATHS = {
     "compare": [("compare s.yaml --controllers scenario,pidd", 2, "Did you mean `pid`?")],
     "falsify": [("falsify f.yaml --out broken", 2, "must hold in the nominal scenario, but is violated")],
     "tune": [("tune s.yaml --method luck", 2, "`--method` must be one of gradient, search, evolution")],
+    "identify": [
+        ("identify", 2, "needs a SCENARIO and the LOGs"),
+        ("identify --thruster none.csv", 2, "`bench` must be an existing file"),
+        ("identify --thruster b.csv", 2, "Give it with --supply"),
+    ],
     "arena": [("arena --tasks hover", 2, "`--tasks` must name tasks of the arena, but is hover")],
     "bench": [("bench s.yaml", 2, "unexpected extra argument")],
     "reproduce": [("reproduce --out s.yaml", 2, "`--out` must")],
@@ -51,6 +56,7 @@ def test_no_command_is_left_out():
 def test_one_path(undertow, tmp_path, command):
     (tmp_path / "s.yaml").write_text(SMALL)
     (tmp_path / "f.yaml").write_text(FALSIFIED)
+    (tmp_path / "b.csv").write_text("pwm_us,thrust_N\n1500,0\n1900,40\n")
     for line, code, words in PATHS[command]:
         said = undertow(*line.split())
         assert said.code == code and words in said.out + said.err, (line, said)

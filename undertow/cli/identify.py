@@ -32,17 +32,20 @@ _WRITTEN = ("identification.html", "identification.json", "identified.yaml", "ve
 
 def identify_vehicle(command: IdentifyCommand) -> int:
     """Identify the vehicle of a scenario and write the results to `out`, or to a free folder under runs/."""
+    if command.scenario is None or not command.logs:
+        raise BadInput("", "", "identify needs a SCENARIO and the LOGs of its dives, or --thruster with a bench record")
+    scenario, log_files = command.scenario, command.logs
     check_pdf(command.pdf)
     console = wide_console()
     priors = priors_of(command.prior or ())
     with (
-        output_folder(command.out, Path("runs") / f"{command.scenario.stem}-identified") as folder,
+        output_folder(command.out, Path("runs") / f"{scenario.stem}-identified") as folder,
         results_folder(folder, _WRITTEN, "identification.json", command.overwrite) as draft,
-        _live(console) as say,
+        live_stages(console) as say,
     ):
         say("reading")
-        logs = [read_log(path, command.mapping) for path in command.logs]
-        built = build(read(command.scenario, allow_code=command.allow_code))
+        logs = [read_log(path, command.mapping) for path in log_files]
+        built = build(read(scenario, allow_code=command.allow_code))
         result = interruptible(
             lambda: identify(
                 built,
@@ -57,9 +60,9 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         )
         data = as_data(result)
         (draft.path / "identification.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
-        write_files(built, result, command.logs, draft.path)
+        write_files(built, result, log_files, draft.path)
         draft.publish()  # before the figures, which may fail
-        warn_of(write_identification(command.scenario.stem, result, data, draft.path, folder, command.pdf))
+        warn_of(write_identification(scenario.stem, result, data, draft.path, folder, command.pdf))
     if command.details:
         console.print(_table(data))
     print_lines(console, [*answer_of_identification(data, folder).text, f"Results: {folder}"])
@@ -83,7 +86,7 @@ def priors_of(words: Sequence[str]) -> dict[str, UncertainNumber]:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Callable[[str], None]]:
+def live_stages(console: Console) -> Iterator[Callable[[str], None]]:
     """Show the current stage and the time."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:

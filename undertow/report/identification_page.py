@@ -63,7 +63,7 @@ def write_identification(
         section("dives", "The dives", _dives(data), *_findings(data)),
         section("numbers", "The numbers", pictures.get("intervals", Html("")), tag("p", prose(_SURE)), _numbers(data)),
         *_not_determined(data),
-        section("prediction", "Prediction of dives not used", _fits(data), _ahead(data)),
+        section("prediction", "Prediction of dives not used", _fits(data), _ahead(data), _white(data)),
     )
     write_whole(out / "identification.html", page)
     return saved.failures
@@ -128,6 +128,18 @@ def _not_determined(data: Mapping[str, Any]) -> list[Html]:
             sentence = sentence.replace(name, in_words(name))
         sentences.append(prose(f"{sentence[0].upper()}{sentence[1:]}."))
     return [section("unknown", "What the dives do not tell", bullets(sentences))]
+
+
+def _white(data: Mapping[str, Any]) -> Html:
+    """Whether residuals are noise."""
+    coloured = [name for name, test in data["residuals"].items() if not test["is_white"]]
+    if not coloured:
+        return tag("p", "What remains unexplained looks like noise in every sensor (autocorrelation over 20 samples).")
+    sentence = (
+        f"What remains unexplained in {', '.join(coloured)} is no noise: it lasts longer than a sample, or goes with "
+        "the inputs. The intervals allow for its duration; its cause is a disturbance, or something that the model lacks."
+    )
+    return tag("p", prose(sentence))
 
 
 def _fits(data: Mapping[str, Any]) -> Html:

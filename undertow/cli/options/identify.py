@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, ScenarioFile, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,12 +18,38 @@ class IdentifyCommand(Command):
     the motion in the logs with that of the model, driven by the logged inputs, and estimates added mass, damping,
     restoring and the thrusters. Every dive is also predicted from the others. It writes identification.html,
     identification.json and figures/.
+
+    With --thruster, a thruster is identified from records of a test bench instead, without a scenario: tables whose
+    header names command (pwm_us, duty or voltage_V), thrust (thrust_N, thrust_kgf) and, where they were measured,
+    current, speed, supply and time. thruster.yaml is then the section for a scenario.
     """
 
     runs: ClassVar = "undertow.cli.identify:identify_vehicle"
     named: ClassVar = "identify"
-    scenario: ScenarioFile
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs of dives of one vehicle.")]
+    scenario: Annotated[
+        Path | None, typer.Argument(metavar="SCENARIO", help="A .yaml file, or an earlier run.nc.", show_default=False)
+    ] = None
+    logs: Annotated[
+        list[Path] | None, typer.Argument(metavar="LOG...", help="Logs of dives of one vehicle.", show_default=False)
+    ] = None
+    thruster: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="BENCH.csv",
+            help="Identify a thruster from this bench record, settled or over time; may be repeated.",
+        ),
+    ] = None
+    supply: Annotated[
+        float | None,
+        typer.Option(
+            metavar="VOLTS",
+            help="With --thruster: supply of pulses and duties, or which rows to use where the record has several.",
+        ),
+    ] = None
+    compare: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="With --thruster: also judge this thruster of the catalogue, such as t200."),
+    ] = None
     mapping: Annotated[
         Path | None,
         typer.Option(metavar="FILE.yaml", help="Which columns of the logs are which signal, in which unit and frame."),
@@ -60,3 +86,7 @@ class IdentifyCommand(Command):
     allow_code: AllowCode = False
     pdf: Pdf = None
     details: Details = False
+
+    def target(self) -> str:
+        """That of a thruster where a bench record is given."""
+        return "undertow.cli.identify_thruster:identify_bench" if self.thruster else self.runs

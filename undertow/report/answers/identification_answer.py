@@ -1,6 +1,6 @@
 """The answer of `undertow identify`: whether the model predicts better than the file, and what it does not know."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from undertow.core.number_text import plain
 from undertow.report.answers.plain_answer import PlainAnswer
 
 _SHOWN = 4  # parameters named in a line
+_FAR = 4.0  # deviations beforehand, from which on an estimate is not believable
 _AS_BEFORE = "their intervals are as wide as what was known before"
 
 
@@ -27,12 +28,17 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
     if fits:
         own, before = (np.mean([pair[i] for pair in fits.values()]) for i in (0, 1))
         better = bool(own > before)
+    far = [name for name, p in data["parameters"].items() if abs(p["shift"]) > _FAR]
     verdict = {
         True: "The identified model predicts dives that it has not seen better than the vehicle file.",
         False: "The identified model predicts dives that it has not seen worse than the vehicle file: do not use it.",
         None: "The model was not judged on a dive that it has not seen.",
     }[better]
+    if far:
+        better = False
+        verdict = "The identified model is not believable: do not use it."
     lines = (
+        *_far_line(far),
         f"{len(data['parameters'])} numbers were estimated from {dives}, {seconds:.0f} s together.",
         *_fit_line(fits),
         *_convergence(data),
@@ -53,6 +59,15 @@ def mean_fits(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
             both[0].append(fit)
             both[1].append(validation["prior"]["free_run_fit"].get(axis, float("-inf")))
     return {axis: (float(np.mean(own)), float(np.mean(before))) for axis, (own, before) in collected.items()}
+
+
+def _far_line(far: Sequence[str]) -> Iterator[str]:
+    if far:
+        names = f"{'; '.join(in_words(name) for name in far[:_SHOWN])}{' and more' if len(far) > _SHOWN else ''}"
+        yield (
+            f"{names[0].upper()}{names[1:]}: more than {_FAR:.0f} standard deviations away from what was known before. "
+            "The log may be of another vehicle, have late or coarse inputs, or the model lacks something."
+        )
 
 
 def _fit_line(fits: Mapping[str, tuple[float, float]]) -> Iterator[str]:

@@ -60,7 +60,7 @@ class DiveCheck(NamedTuple):
         """Axes that cannot be identified."""
         return _names(self.findings, "axis", "refused")
 
-    def refusals(self) -> list[LogFinding]:
+    def errors(self) -> list[LogFinding]:
         """Why the log cannot be used at all; () where it can."""
         return [f for f in self.findings if f.severity == "refused" and f.concern in ("log", "input")]
 

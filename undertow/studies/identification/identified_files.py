@@ -58,12 +58,12 @@ def _provenance(identification: Identification, logs: Sequence[Path]) -> dict[st
     return {
         "date": datetime.date.today().isoformat(),
         "version": importlib.metadata.version("undertow"),
-        "logs": [{"name": path.name, "sha256": _sha256(path)} for path in logs],
+        "logs": [{"name": path.name, "sha256": sha256_of(path)} for path in logs],
         "estimated": [parameter.name for parameter in identification.parameters],
     }
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """Hash of a file, or of all files of a folder in the order of their names."""
     digest = hashlib.sha256()
     files = sorted(path.rglob("*")) if path.is_dir() else [path]

@@ -101,7 +101,7 @@ class AxisActuation(AbstractActuation):
 
     gains: Float[Array, "6"]  # N and N m at an input of 1
     lags: Float[Array, "6"]  # s
-    power: Float[Array, ""]  # of the input; thrust is nearly quadratic in what speed controllers are told
+    power: Float[Array, ""]  # of the input; thrust is nearly quadratic in the command of a speed controller
 
     def initial_state(self):
         return jnp.zeros(len(BODY_AXES))

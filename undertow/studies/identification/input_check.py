@@ -55,7 +55,7 @@ def input_findings(inputs: Series, vehicle: HybridVehicle | None, per_axis: bool
         yield LogFinding("input", "", "note", sentence, "Log them at 10 Hz or more, or each time that they change")
     for name, constant in zip(names, is_constant, strict=True):
         if constant:
-            sentence = f"{name} never changes: its gain cannot be told"
+            sentence = f"{name} never changes: its gain cannot be known"
             yield LogFinding(
                 "input", name, "note", sentence, "Use it in a further dive, or take its gain from the file"
             )

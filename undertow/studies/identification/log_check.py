@@ -60,8 +60,8 @@ def check_dive(
     grave = {finding.name for finding in findings if finding.severity != "note"}
     findings = [finding for finding in findings if finding.severity != "note" or finding.name not in grave - {""}]
     findings.sort(key=lambda finding: -SEVERITIES.index(finding.severity))
-    told = {name: offset for name, offset in offsets.items() if math.isfinite(offset.deviation)}
-    return DiveCheck(tuple(findings), told)
+    known = {name: offset for name, offset in offsets.items() if math.isfinite(offset.deviation)}
+    return DiveCheck(tuple(findings), known)
 
 
 def _attitude_findings(attitude: Series, measured: dict, offsets: dict[str, ClockOffset]) -> Iterator[LogFinding]:

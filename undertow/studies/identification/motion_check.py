@@ -12,7 +12,7 @@ from undertow.studies.identification.agreement import Agreement, Stream, agreeme
 from undertow.studies.identification.clock_offset import ClockOffset
 from undertow.studies.identification.finding import WORDS, LogFinding
 
-_MOVES = {"rates": 0.04, "velocity": 0.05}  # rad, m; typical change in a window, below which nothing can be told
+_MOVES = {"rates": 0.04, "velocity": 0.05}  # rad, m; typical change in a window, below which nothing can be concluded
 _BELONGS, _SURELY_BELONGS = 0.15, 0.5  # share explained
 _CONTRIBUTES = 0.4  # share of a number that one of the other stream gives
 _SLOPES = (0.8, 1.25)

@@ -48,8 +48,8 @@ def prepared_dive(plant: HybridVehicle, log: LogSignals, per_axis: bool, step: f
         whose = "axes" if per_axis else "thrusters"
         raise BadInput("log", f"have {expected} inputs, one for each of the {whose}", f"{log.source} with {count}")
     check = check_dive(log, inputs, plant, per_axis)
-    for refusal in check.refusals():
-        raise BadInput("log", "be of a dive of this vehicle", f"{log.source}: {refusal.sentence}", hint=refusal.remedy)
+    for error in check.errors():
+        raise BadInput("log", "be of a dive of this vehicle", f"{log.source}: {error.sentence}", hint=error.remedy)
     sentences = [str(finding) for finding in check.findings]
     offset = check.offsets.get("inputs")
     if offset is not None and offset.is_worth_saying(_SMALLEST_OFFSET):

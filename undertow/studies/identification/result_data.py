@@ -22,7 +22,7 @@ def as_data(identification: Identification) -> dict[str, Any]:
             {"name": dive.name, "duration": dive.duration, "sensors": dive.sensors()} for dive in identification.dives
         ],
         "level": LEVEL,
-        "parameters": {interval.parameter.name: _interval_data(interval) for interval in identification.intervals},
+        "parameters": {interval.parameter.name: interval_data(interval) for interval in identification.intervals},
         "correlation": identification.uncertainty.correlation(range(count)).tolist(),
         "correlation_time": identification.uncertainty.correlation_time,
         "undetermined": [
@@ -53,7 +53,8 @@ def _whiteness(identification: Identification) -> Iterator[tuple[str, Whiteness]
             yield name, whiteness(identification.estimate.residuals[:, :, i][there], inputs[there])
 
 
-def _interval_data(interval: ParameterInterval) -> dict[str, Any]:
+def interval_data(interval: ParameterInterval) -> dict[str, Any]:
+    """What is known of a parameter."""
     return {
         "unit": interval.parameter.unit,
         "value": interval.value,
@@ -62,6 +63,7 @@ def _interval_data(interval: ParameterInterval) -> dict[str, Any]:
         "deviation": interval.deviation,
         "prior": interval.parameter.prior,
         "deviation_left": interval.share,
+        "shift": interval.shift,
         "verdict": interval.verdict,
     }
 

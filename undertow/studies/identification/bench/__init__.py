@@ -1,0 +1,1 @@
+"""Identification of a thruster from the records of a test bench."""
