@@ -24,6 +24,7 @@ from undertow.studies.identification.output_error import fit, scores_of, without
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
 from undertow.studies.identification.uncertainty import uncertainty_of
+from undertow.studies.identification.weak_form import first_estimate
 
 AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 SPREAD = 0.3  # of the true numbers, in the deviations that are usual beforehand; ten times that is another vehicle
@@ -65,9 +66,11 @@ def run(seeds: int, first: int, duration: float, step: float) -> None:
         log = simulated_log(vehicle, volts, generator, current=current)
         dive = dive_of(log, log["input"], step)
         segments = segments_of([dive], 10.0)
-        estimate = fit(model, segments, step, np.zeros(len(unknowns.least())), unknowns.least())
-        estimate = without_step_error(model, segments, step, estimate, unknowns.least())
+        begin = np.zeros(len(unknowns.least()))
+        begin[: len(parameters)] = first_estimate(prior, parameters, [dive]).z
+        estimate = fit(model, segments, step, begin, unknowns.least())
         uncertainty = uncertainty_of(estimate.information, scores_of(model, segments, step, estimate), step)
+        estimate = without_step_error(model, segments, step, estimate, unknowns.least())
         intervals = uncertainty.intervals(parameters, estimate.z)
         values = [parameter.value(z) for parameter, z in zip(parameters, truth, strict=True)]
         inside[number] = [i.low <= value <= i.high for i, value in zip(intervals, values, strict=True)]

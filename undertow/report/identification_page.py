@@ -90,7 +90,7 @@ def _free_run(identification: Identification):
     validation = max(identification.validation, key=lambda one: len(one.identified.free_run))
     step = identification.dives[0].step
     series: dict[str, Series] = {}
-    for axis in AXES:
+    for axis in identification.velocities:
         measured, error = whole_values(validation.dive, axis), validation.identified.error(axis)
         there = np.isfinite(error)
         if there.any():
@@ -137,7 +137,8 @@ def _white(data: Mapping[str, Any]) -> Html:
         return tag("p", "What remains unexplained looks like noise in every sensor (autocorrelation over 20 samples).")
     sentence = (
         f"What remains unexplained in {', '.join(coloured)} is no noise: it lasts longer than a sample, or goes with "
-        "the inputs. The intervals allow for its duration; its cause is a disturbance, or something that the model lacks."
+        "the inputs. The intervals allow for its duration. Its cause is a disturbance, or something that the model "
+        "lacks."
     )
     return tag("p", prose(sentence))
 

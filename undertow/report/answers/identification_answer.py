@@ -43,6 +43,7 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *_fit_line(fits),
         *_convergence(data),
         *_best_known(data),
+        *_refused(data),
         *_unknown(data),
         *_ratios(data),
         *([] if folder is None else [f"Next: undertow simulate {folder / 'identified.yaml'}"]),
@@ -92,6 +93,11 @@ def _best_known(data: Mapping[str, Any]) -> Iterator[str]:
         order = sorted(known, key=lambda name: known[name]["deviation_left"])[:_SHOWN]
         shown = "; ".join(f"{in_words(name)} {interval_words(known[name])}" for name in order)
         yield f"{len(known)} of them are determined by the dives, best: {shown} (95 % intervals)."
+
+
+def _refused(data: Mapping[str, Any]) -> Iterator[str]:
+    if data["refused_axes"]:
+        yield f"Not identified, as the dives do not excite or measure it: {', '.join(data['refused_axes'])}."
 
 
 def _unknown(data: Mapping[str, Any]) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.core.measurement import BODY_AXES
 from undertow.logs.log import Log
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
@@ -27,7 +28,7 @@ from undertow.studies.identification.uncertainty import (
     uncertainty_of,
     undetermined,
 )
-from undertow.studies.identification.validation import PredictionErrors, prediction_errors
+from undertow.studies.identification.validation import AXES, PredictionErrors, prediction_errors
 from undertow.studies.identification.weak_form import first_estimate
 
 Say = Callable[[str], None]
@@ -67,6 +68,7 @@ class Identification(NamedTuple):
         intervals: of the parameters.
         undetermined: combinations that the data do not determine.
         validation: of each dive from the others.
+        refused_axes: that no dive identifies, such as those without motion.
         findings: sentences of the checks before.
     """
 
@@ -79,7 +81,13 @@ class Identification(NamedTuple):
     intervals: tuple[ParameterInterval, ...]
     undetermined: tuple[Combination, ...]
     validation: tuple[Validation, ...]
+    refused_axes: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Those of the axes that were identified, of `validation.AXES`."""
+        return tuple(name for name, axis in zip(AXES, BODY_AXES, strict=True) if axis not in self.refused_axes)
 
     @property
     def z(self) -> np.ndarray:
@@ -131,7 +139,7 @@ def identify(
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
     beforehand = {name: number for name, number in _deviations(built).items() if name in known} | dict(priors or {})
-    refused = set.intersection(*(set(dive.refused_axes) for dive in prepared))
+    refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
     parameters = [p for p in chosen(known, free, beforehand) if p.name.rpartition(".")[2] not in refused]
     if not parameters:
         raise BadInput("logs", "tell something of a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
@@ -142,12 +150,12 @@ def identify(
     estimate = _estimate(model, parameters, dives, segment, begin, say)
     segments = segments_of(dives, segment)
     least = Unknowns(tuple(parameters), len(dives)).least()
+    scores = scores_of(model, segments, step, estimate)
     estimate = without_step_error(model, segments, step, estimate, least)
     parts, validation = None, ()
     if validate:
         parts, validation = _validated(model, parameters, dives, segment, estimate, say)
     say("judging how sure it is")
-    scores = scores_of(model, segments, step, estimate)
     count = len(parameters)
     uncertainty = uncertainty_of(estimate.information, scores, step, _with_nuisances(parts, estimate.z, count))
     return Identification(
@@ -160,6 +168,7 @@ def identify(
         intervals=tuple(uncertainty.intervals(parameters, estimate.z)),
         undetermined=tuple(undetermined(estimate.information, parameters)),
         validation=validation,
+        refused_axes=refused,
         findings=tuple(_findings(prepared)),
     )
 

@@ -246,6 +246,8 @@ def without_step_error(
 ) -> Fit:
     """The estimate for half the step of integration, to first order: what is known to a thousandth needs it.
 
+    One that this does not improve stays as it is.
+
     Args:
         model, segments, step, least: as for the estimate.
         estimate: with steps as they are.
@@ -254,5 +256,7 @@ def without_step_error(
     residuals = _residuals(finer, segments, step, estimate.z, estimate.starts)
     change = np.where(estimate.weights > 0, residuals - estimate.residuals, 0.0)
     gradient = scores_of(model, segments, step, estimate, change).sum(axis=(0, 1))
-    moved = np.maximum(estimate.z - np.linalg.solve(estimate.information, gradient), least)
-    return estimate._replace(z=moved)
+    z = np.maximum(estimate.z - np.linalg.solve(estimate.information, gradient), least)
+    moved = estimate._replace(z=z)
+    cost_of = lambda one: _cost(_residuals(finer, segments, step, one.z, one.starts), one.weights, one.z, one.starts)
+    return moved if cost_of(moved) < cost_of(estimate) else estimate

@@ -1,7 +1,7 @@
 """An identification as plain data for identification.json."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ def as_data(identification: Identification) -> dict[str, Any]:
             {"parameters": list(combination.names), "sentence": combination.sentence(), "share": combination.share}
             for combination in identification.undetermined
         ],
-        "validation": [_validation_data(validation) for validation in identification.validation],
+        "validation": [_validation_data(one, identification.velocities) for one in identification.validation],
+        "refused_axes": list(identification.refused_axes),
         "noise": {
             name: float(noise) for name, noise in zip(RESIDUALS, estimate.noise, strict=True) if np.isfinite(noise)
         },
@@ -68,18 +69,18 @@ def interval_data(interval: ParameterInterval) -> dict[str, Any]:
     }
 
 
-def _validation_data(validation: Validation) -> dict[str, Any]:
+def _validation_data(validation: Validation, velocities: Sequence[str]) -> dict[str, Any]:
     return {
         "name": validation.name,
-        "identified": _errors_data(validation.identified),
-        "prior": _errors_data(validation.prior),
+        "identified": _errors_data(validation.identified, velocities),
+        "prior": _errors_data(validation.prior, velocities),
     }
 
 
-def _errors_data(errors: PredictionErrors) -> dict[str, Any]:
+def _errors_data(errors: PredictionErrors, velocities: Sequence[str]) -> dict[str, Any]:
     ahead = {
         f"{horizon:g}": {name: float(value) for name, value in zip(RESIDUALS, row, strict=True) if np.isfinite(value)}
         for horizon, row in zip(HORIZONS, errors.ahead, strict=True)
     }
-    fit = {axis: value for axis, value in errors.fit.items() if not math.isnan(value)}
+    fit = {axis: value for axis, value in errors.fit.items() if axis in velocities and not math.isnan(value)}
     return {"free_run_fit": fit, "rms_ahead": ahead}
