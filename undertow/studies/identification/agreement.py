@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from undertow.logs import frames
 from undertow.logs.log_signals import Series
 from undertow.studies.identification.clock_offset import ClockOffset, offset_of
-from undertow.studies.identification.stream_check import outliers
+from undertow.studies.identification.outliers import outliers
 
 Stream = tuple[np.ndarray, np.ndarray]  # times (rows,) and values (rows, columns)
 

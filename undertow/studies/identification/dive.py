@@ -11,6 +11,7 @@ from undertow.core.errors import BadInput
 from undertow.logs import frames
 from undertow.logs.log_signals import LogSignals, Series
 from undertow.logs.motion import at_times, without_jumps
+from undertow.studies.identification.outliers import outliers
 
 # What is compared with the model: sensor -> columns of `Dive.values`, and of the residuals, in which an attitude has
 # three numbers instead of four.
@@ -55,7 +56,7 @@ class Dive(NamedTuple):
 
 
 def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
-    """A log on a grid, over the time in which it has inputs and measurements.
+    """A log on a grid, over the time in which it has inputs and measurements; without outliers.
 
     Args:
         log: with some of position or depth, attitude, velocity, angular velocity.
@@ -78,6 +79,9 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
     values, offsets, counts = [], [], []
     for name in SENSORS:
         time, samples = measured.get(name, (np.zeros(0), np.zeros((0, COLUMNS[name]))))
+        if len(samples) >= _AT_LEAST:
+            good = ~outliers(samples)
+            time, samples = time[good], samples[good]
         mean, offset, count = _in_steps(time, samples, start, step, steps)
         values.append(mean)
         offsets.append(offset)

@@ -131,16 +131,17 @@ def identify(
     if not logs:
         raise BadInput("logs", "be given", "none")
     plant = _vehicle(built)
-    say("checking the logs")
-    prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
-    dives = [dive.dive for dive in prepared]
     known = parameters_of(plant)
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
     beforehand = {name: number for name, number in _deviations(built).items() if name in known} | dict(priors or {})
+    asked = chosen(known, free, beforehand)
+    say("checking the logs")
+    prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
+    dives = [dive.dive for dive in prepared]
     refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
-    parameters = [p for p in chosen(known, free, beforehand) if p.name.rpartition(".")[2] not in refused]
+    parameters = [p for p in asked if p.name.rpartition(".")[2] not in refused]
     if not parameters:
         raise BadInput("logs", "tell something of a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-import scipy.ndimage
 
 from undertow.logs.log_signals import LogSignals, Series
 from undertow.studies.identification.finding import WORDS, LogFinding
+from undertow.studies.identification.outliers import outliers
 
 # Names that a sensor has in a log, the one that is used first.
 SIGNALS_OF_SENSOR = {
@@ -28,8 +28,6 @@ _COVERED = 0.5
 _STUCK = 3.0  # s
 _STUCK_SHARE = 0.1
 _REPEATED = 0.3
-_OUTLIER = 6.0  # times the median size
-_NEIGHBOURS = 5
 _OUTLIERS, _TOO_MANY = 0.02, 0.25
 
 
@@ -141,26 +139,13 @@ def outlier_findings(measured: dict[str, tuple[np.ndarray, np.ndarray]]) -> list
     """Sensors with many samples far from their neighbours; attitudes as quaternions."""
     findings = []
     for sensor, (_, values) in measured.items():
-        share = float(outliers(values).mean()) if len(values) > 2 * _NEIGHBOURS else 0.0
+        share = float(outliers(values).mean()) if len(values) > _FEWEST else 0.0
         if share > _OUTLIERS:
             sentence = f"{100 * share:.0f} % of the samples of the {WORDS[sensor]} lie far from those before and after"
             severity = "left_out" if share > _TOO_MANY else "note"
             remedy = "Filter them out before, or improve the sensor" if share > _TOO_MANY else ""
             findings.append(LogFinding("sensor", sensor, severity, sentence, remedy))
     return findings
-
-
-def outliers(values: np.ndarray) -> np.ndarray:
-    """Whether samples lie far from the median of five, in any column; shape (rows,)."""
-    deviation = np.abs(values - scipy.ndimage.median_filter(values, size=(_NEIGHBOURS, 1), mode="nearest"))
-    typical = np.median(deviation, axis=0)
-    spread = np.percentile(values, 90, axis=0) - np.percentile(values, 10, axis=0)
-    # Where most samples are their own median, the typical deviation is near zero and says nothing.
-    scale = np.maximum(1.4826 * typical, 0.02 * spread)
-    # A fast motion that is sampled slowly is no outlier: there the samples before and after differ, too.
-    across = np.zeros(values.shape)
-    across[1:-1] = np.abs(values[2:] - values[:-2])
-    return (deviation > np.maximum(np.maximum(_OUTLIER * scale, 2 * across), _DEAD)).any(axis=1)
 
 
 def _is_constant(values: np.ndarray) -> np.ndarray:

@@ -1,0 +1,217 @@
+"""The estimate: an independent implementation gives the same numbers, and simulated dives give theirs back."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+import undertow as ut
+from undertow.core.measurement import BODY_AXES
+from undertow.core.runtime import in_precision
+from undertow.logs.log import Log
+from undertow.logs.log_signals import Series
+from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.t200 import t200
+from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.scenario.vehicle_file import read_vehicle
+from undertow.studies.identification.dive import dive_of
+from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of
+from undertow.studies.identification.identified_vehicle import prior_vehicle
+from undertow.studies.identification.model import Unknowns, model_of
+from undertow.studies.identification.output_error import fit
+from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.validation import whiteness
+
+pytestmark = pytest.mark.full
+
+AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
+TRUTH = {"linear_damping.surge": 20.0, "quadratic_damping.surge": 90.0, "added_mass.heave": 24.0, "net_buoyancy": 2.0}
+SCENARIO = {
+    "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+    "controller": "robust",
+    "reference": {"kind": "setpoint", "position": [0] * 6},
+    "loop": {"duration": 1, "dt": 0.02, "record": 0.02},
+}
+STEP = 0.05
+
+
+@pytest.fixture(scope="module")
+def plant():
+    with in_precision("float64"):
+        return hybrid_vehicle(bluerov2_heavy(), t200())
+
+
+def dive_log(plant, seed, duration=60.0, truth=TRUTH):
+    generator = np.random.default_rng(seed)
+    with in_precision("float64"):
+        inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
+        thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
+        volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
+        vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
+        return simulated_log(vehicle, volts, generator)
+
+
+def test_scipy_finds_the_same_damping(plant):
+    """Surge alone, by an integrator and a solver of others: both kinds of damping, with priors and without."""
+    generator = np.random.default_rng(4)
+    duration, mass, gain, lag = 10.0, 13.5 + 6.36, 50.0, 0.2
+    commands = np.repeat(generator.uniform(-0.6, 0.6, 10), round(1 / STEP))
+    edges = np.arange(0.0, duration, 1.0)
+    measured_at = STEP * (np.arange(round(duration / STEP)) + 1.0) - 1e-9  # at the ends of steps
+
+    def speeds(linear, quadratic):
+        state, found = np.zeros(2), []
+        for begin in edges:
+            inside = measured_at[(measured_at > begin) & (measured_at < begin + 1.0)]
+            command = commands[round(begin / STEP)]
+
+            def rate(t, x, command=command):
+                return [(x[1] - linear * x[0] - quadratic * abs(x[0]) * x[0]) / mass, (gain * command - x[1]) / lag]
+
+            solution = solve_ivp(
+                rate, (begin, begin + 1.0), state, t_eval=[*inside, begin + 1.0], rtol=1e-9, atol=1e-11
+            )
+            found.append(solution.y[0, :-1])
+            state = solution.y[:, -1]
+        return np.concatenate(found)
+
+    noise = 0.02
+    measured = speeds(22.0, 80.0) + noise * generator.standard_normal(len(measured_at))
+    with in_precision("float64"):
+        known = parameters_of(plant) | axis_parameters()
+        names = ("linear_damping.surge", "quadratic_damping.surge")
+        parameters = chosen(known, names)
+        vehicle = prior_vehicle(plant, has_axis_inputs=True)
+        actuation = vehicle.actuation.with_values({"axis_gain.surge": gain} | {f"axis_lag.{a}": lag for a in BODY_AXES})
+        model = model_of(dataclasses.replace(vehicle, actuation=actuation), parameters)
+        zeros = np.zeros((len(measured), 2))
+        log = Log(
+            {
+                "body_velocity": Series(measured_at, np.column_stack([measured, zeros])),
+                "attitude": Series(measured_at, np.zeros((len(measured), 3))),
+                "input": Series(STEP * np.arange(len(commands)), np.pad(commands[:, None], ((0, 0), (0, 5)))),
+            },
+            "surge",
+            "CSV",
+        )
+        dive = dive_of(log, log["input"], STEP)
+        segments = segments_of([dive], duration)
+        unknowns = Unknowns(tuple(parameters), 1)
+        estimate = fit(model, segments, STEP, np.zeros(len(unknowns.least())), unknowns.least())
+    sigma = estimate.noise[6]
+
+    def residuals(z):
+        values = [parameter.value(one) for parameter, one in zip(parameters, z, strict=True)]
+        return np.concatenate([(speeds(*values) - measured) / sigma, z])
+
+    theirs = least_squares(residuals, [0.0, 0.0], x_scale=0.1)
+    ours = estimate.z[:2]
+    deviations = np.sqrt(np.diagonal(np.linalg.inv(theirs.jac.T @ theirs.jac)))
+    assert np.abs(sigma / noise - 1) < 0.2
+    # Ours also frees current, biases and the begin, which takes a part of what the dive says.
+    assert (np.abs(ours - theirs.x) < 1.0 * deviations).all()
+    values = [parameter.value(z) for parameter, z in zip(parameters, ours, strict=True)]
+    np.testing.assert_allclose(values, [22.0, 80.0], rtol=0.25)
+
+
+@pytest.fixture(scope="module")
+def identified(plant):
+    free = (*TRUTH, "thruster_gain")
+    return ut.identify(SCENARIO, [dive_log(plant, 1, 30.0), dive_log(plant, 2, 30.0)], free=free)
+
+
+def test_known_numbers_are_in_their_intervals(identified):
+    for name, value in TRUTH.items():
+        interval = identified.parameters[name]
+        assert interval.low <= value <= interval.high, name
+        assert interval.share < 0.2, name
+    gain = identified.parameters["thruster_gain"]
+    assert gain.low <= 1.0 <= gain.high
+
+
+def test_dives_left_out_are_predicted(identified):
+    for validation in identified.data["validation"]:
+        assert min(validation["identified"]["free_run_fit"].values()) > 60
+    assert "better than the vehicle file" in repr(identified)
+    assert "free_run" in identified.plot()
+    assert "<svg" in identified._repr_html_() or "<img" in identified._repr_html_()
+
+
+def test_files_say_what_was_found(identified, tmp_path):
+    identified.write(tmp_path)
+    numbers = read_vehicle(tmp_path / "vehicle.yaml").uncertainty.numbers
+    for name, interval in identified.parameters.items():
+        if name != "thruster_gain":
+            np.testing.assert_allclose(numbers[name].value, interval.value, rtol=1e-9)
+            np.testing.assert_allclose(numbers[name].deviation, interval.deviation, rtol=1e-9)
+    text = (tmp_path / "identified.yaml").read_text()
+    assert "vehicle.yaml" in text and "adjusted" in text
+
+
+def test_deviations_of_a_vehicle_file_are_priors(identified, plant, tmp_path):
+    """A second identification begins with what the first one found, and knows more."""
+    identified.write(tmp_path)
+    again = ut.identify(tmp_path / "identified.yaml", dive_log(plant, 3, 30.0), free=("net_buoyancy",))
+    for name in TRUTH:
+        before, after = identified.parameters[name], again.parameters[name]
+        np.testing.assert_allclose(after.parameter.prior, before.value, rtol=1e-9)
+        assert after.deviation < before.deviation
+
+
+def test_a_tenth_of_outliers_moves_little(identified, plant):
+    generator = np.random.default_rng(5)
+
+    def spoiled(log):
+        signals = dict(log.signals)
+        for name, size in {"position": 2.0, "body_velocity": 1.0}.items():
+            values = signals[name].values.copy()
+            hit = generator.random(len(values)) < 0.1
+            values[hit] += size * generator.choice([-1.0, 1.0], (hit.sum(), 3))
+            signals[name] = signals[name]._replace(values=values)
+        return Log(signals, log.source, log.format)
+
+    logs = [spoiled(dive_log(plant, seed, 30.0)) for seed in (1, 2)]
+    estimates = ut.identify(SCENARIO, logs, free=tuple(TRUTH)).parameters
+    for name, value in TRUTH.items():
+        assert estimates[name].low <= value <= estimates[name].high, name
+
+
+def test_a_log_of_a_much_heavier_vehicle_is_not_believed(plant):
+    truth = {"added_mass.surge": 150.0, "added_mass.sway": 170.0, "added_mass.heave": 250.0}
+    heavy = ut.identify(SCENARIO, dive_log(plant, 1, 30.0, truth), free=("added_mass",), priors={"mass": "13.5 +- 0.1"})
+    assert "not believable" in repr(heavy)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"free": ("added_mas",)}, "must name parameters of the vehicle, but is added_mas"),
+        ({"priors": {"mass": "heavy"}}, "must be text such as"),
+        ({"priors": {"lag": "-1 +- 0.1"}}, "must be positive"),
+        ({"step": 0.0}, "`step` must be positive"),
+        ({"per_axis": True}, "must have 6 inputs, one for each of the axes"),
+    ],
+)
+def test_mistakes_are_one_line(plant, options, message):
+    with pytest.raises(ut.BadInput, match=message) as caught:
+        ut.identify(SCENARIO, dive_log(plant, 1, 5.0), **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_correlation_of_residuals_is_that_of_a_first_order_process():
+    """An autoregression of 0.6 has it as its first autocorrelation; white noise has none."""
+    generator = np.random.default_rng(0)
+    noise = generator.standard_normal(20_000)
+    coloured = np.zeros(len(noise))
+    for k in range(1, len(noise)):
+        coloured[k] = 0.6 * coloured[k - 1] + noise[k]
+    inputs = generator.standard_normal((len(noise), 2))
+    assert whiteness(noise, inputs).is_white
+    test = whiteness(coloured, inputs)
+    assert not test.is_white
+    assert test.correlation == pytest.approx(0.6, abs=0.02)
+    assert whiteness(noise + 0.2 * np.roll(inputs[:, 0], 3), inputs).with_inputs == pytest.approx(0.2, abs=0.02)
