@@ -38,7 +38,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
     with (
         output_folder(command.out, Path("runs") / f"{command.scenario.stem}-identified") as folder,
         results_folder(folder, _WRITTEN, "identification.json", command.overwrite) as draft,
-        _live(console) as say,
+        live_stages(console) as say,
     ):
         say("reading")
         logs = [read_log(path, command.mapping) for path in command.logs]
@@ -83,7 +83,7 @@ def priors_of(words: Sequence[str]) -> dict[str, UncertainNumber]:
 
 
 @contextlib.contextmanager
-def _live(console: Console) -> Iterator[Callable[[str], None]]:
+def live_stages(console: Console) -> Iterator[Callable[[str], None]]:
     """Show the current stage and the time."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
