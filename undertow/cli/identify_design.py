@@ -34,7 +34,7 @@ def identify_design(command: IdentifyDesignCommand) -> int:
         priors=priors_of(command.prior or ()),
         depth=command.depth,
         max_rate=command.max_rate,
-        max_tilt=command.max_tilt,
+        max_angle=command.max_angle,
         max_input=command.max_input,
     )
     with (

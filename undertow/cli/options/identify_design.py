@@ -53,7 +53,9 @@ class IdentifyDesignCommand(Command):
         typer.Option(metavar="M", help="Depth of the station. Default: that of the reference, or enough for the room."),
     ] = None
     max_rate: Annotated[float, typer.Option(metavar="RAD/S", help="Angular velocity that ends the script.")] = 2.0
-    max_tilt: Annotated[float, typer.Option(metavar="RAD", help="Roll or pitch that ends the script.")] = 0.8
+    max_angle: Annotated[
+        float, typer.Option(metavar="RAD", help="Roll, pitch, or departure from the heading that ends the script.")
+    ] = 0.6
     max_input: Annotated[
         float | None,
         typer.Option(metavar="V", help="Input of a thruster that ends the script. Default: 90 % of its limit."),

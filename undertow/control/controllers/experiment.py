@@ -30,7 +30,7 @@ class Abort(enum.IntEnum):
     DISTANCE = 1
     DEPTH = 2
     RATE = 3
-    TILT = 4
+    ANGLE = 4
     INPUT = 5
 
 
@@ -54,11 +54,11 @@ class AbortLimits(eqx.Module):
     least_depth: Float[Param, ""] = param("m", "smallest coordinate `down`")
     greatest_depth: Float[Param, ""] = param("m", "largest coordinate `down`")
     rate: Float[Param, ""] = param("rad/s", "largest angular velocity")
-    tilt: Float[Param, ""] = param("rad", "largest roll and pitch")
+    angle: Float[Param, ""] = param("rad", "largest roll, pitch, and departure from the heading of the target")
     input: Float[Param, ""] = param("V or N", "largest input of a thruster")
 
     def __check_init__(self):
-        for name in ("room", "rate", "tilt", "input"):
+        for name in ("room", "rate", "angle", "input"):
             checks.positive(name, getattr(self, name), finite=False)
 
     def exceeded(self, y: Measurement, r: Target, u: Array) -> Float[Array, ""]:
@@ -67,14 +67,15 @@ class AbortLimits(eqx.Module):
         away = y.position[:3] - r.position[:3]
         along = jnp.stack([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2]])
         turning = y.velocity[3:6] if y.body is None else y.body.nu[3:]
-        depth = y.position[2]
+        depth, heading = y.position[2], r.position[5] - y.position[5]
+        angles = jnp.stack([y.position[3], y.position[4], jnp.arctan2(jnp.sin(heading), jnp.cos(heading))])
         exceeded = jnp.stack(
             [
                 jnp.asarray(False),
                 (jnp.abs(along) > self.room / 2).any(),
                 (depth < self.least_depth) | (depth > self.greatest_depth),
                 (jnp.abs(turning) > self.rate).any(),
-                (jnp.abs(y.position[3:5]) > self.tilt).any(),
+                (jnp.abs(angles) > self.angle).any(),
                 (jnp.abs(u) > self.input).any(),
             ]
         )
@@ -93,13 +94,13 @@ class Experiment(AbstractController):
         BadInput: rows that cannot be used, or a model that is not of a vehicle.
     """
 
-    model: Model
     law: AbstractController
     limits: AbortLimits
     samples: Float[Param, "rows columns"] = param("s, then N and N m", "rows (t, X, Y, Z, K, M, N)")
     early: Float[Param, ""] = param("s", "time by which a row counts early, computed from all rows")
+    inverse_mass_matrix: Float[Param, "6 6"] = param("1/kg, ...", "of the nominal vehicle, added mass included")
 
-    def __init__(self, law: AbstractController, limits: AbortLimits, samples):
+    def __init__(self, law: AbstractController, limits: AbortLimits, samples, inverse_mass_matrix):
         rows = np.asarray(samples, dtype=float)
         if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] != 7:
             raise BadInput("samples", "have two or more rows (t, X, Y, Z, K, M, N)", f"of shape {rows.shape}")
@@ -107,8 +108,13 @@ class Experiment(AbstractController):
         steps = np.diff(rows[:, 0])
         if not (steps > 0).all():
             raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
-        self.model, self.law, self.limits = law.model, law, limits
+        self.law, self.limits, self.inverse_mass_matrix = law, limits, inverse_mass_matrix
         self.samples, self.early = jnp.asarray(rows), jnp.asarray(_EARLY * steps.min())
+
+    @property
+    def model(self) -> Model:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of the law: a supervisor that replaces it replaces the law's."""
+        return self.law.model
 
     def init(self, y: Measurement, r: Target) -> ExperimentState:
         zero = jnp.zeros_like(y.position[0])
@@ -130,7 +136,7 @@ class Experiment(AbstractController):
         return self.law.signals() | {
             "excitation": Signal(("axis",), "N, N m", "force and moment added by the experiment, body axes"),
             "experiment_abort": Signal(
-                (), "1", "0 none; excitation ended by 1 distance, 2 depth, 3 rate, 4 tilt, 5 input"
+                (), "1", "0 none; excitation ended by 1 distance, 2 depth, 3 rate, 4 angle, 5 input"
             ),
         }
 
@@ -155,9 +161,8 @@ class Experiment(AbstractController):
         return jnp.where(acts, row, 0.0)
 
     def _accelerated(self, z: ExperimentState, y: Measurement, r: Target) -> Target:
-        coordinates, dynamics = self.model.coordinates, self.model.dynamics
-        added = matvec(dynamics.body.inverse_mass_matrix, self._wrench(z))  # pyright: ignore[reportAttributeAccessIssue] - `experiment` checks it
-        return r._replace(acceleration=r.acceleration + coordinates.output_velocity(y, added))
+        added = matvec(self.inverse_mass_matrix, self._wrench(z))
+        return r._replace(acceleration=r.acceleration + self.model.coordinates.output_velocity(y, added))
 
 
 def experiment(
@@ -168,7 +173,7 @@ def experiment(
     min_depth: float = -1e3,
     max_depth: float = 1e4,
     max_rate: float = 1e3,
-    max_tilt: float = 1e3,
+    max_angle: float = 1e3,
     max_input: float = 1e3,
 ) -> Experiment:
     """An experiment for identification: forces of a script added to a law that keeps the place, with abort limits.
@@ -185,7 +190,7 @@ def experiment(
         min_depth: smallest coordinate `down`, m.
         max_depth: largest coordinate `down`, m.
         max_rate: largest angular velocity about an axis of the body, rad/s.
-        max_tilt: largest roll and pitch, rad.
+        max_angle: largest roll, pitch, and departure from the heading of the target, rad.
         max_input: largest input of a thruster, in its unit.
 
     Raises:
@@ -194,9 +199,10 @@ def experiment(
     laws = tuple(law) if isinstance(law, tuple | list) else (law,)
     if len(laws) != 1 or not isinstance(laws[0], AbstractController):
         raise BadInput("law", "be one controller of one vehicle", f"{len(laws)} laws")
-    if not hasattr(laws[0].model.dynamics, "body") or not laws[0].model.coordinates.axes:
+    body = getattr(laws[0].model.dynamics, "body", None)
+    if body is None or not laws[0].model.coordinates.axes:
         raise BadInput("law", "be a controller in the body axes of a vehicle, such as pid", type(laws[0]).__name__)
     depths = (jnp.asarray(min_depth, dtype=float), jnp.asarray(max_depth, dtype=float))
-    numbers = (jnp.asarray(value, dtype=float) for value in (max_rate, max_tilt, max_input))
+    numbers = (jnp.asarray(value, dtype=float) for value in (max_rate, max_angle, max_input))
     limits = AbortLimits(jnp.asarray(room, dtype=float), *depths, *numbers)
-    return Experiment(laws[0], limits, samples)
+    return Experiment(laws[0], limits, samples, body.inverse_mass_matrix)

@@ -64,7 +64,7 @@ def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
         sentence = combination["sentence"]
         for name in combination["parameters"]:
             sentence = sentence.replace(name, in_words(name))
-        yield f"{sentence[0].upper()}{sentence[1:]}, however long the experiment."
+        yield f"{sentence[0].upper()}{sentence[1:]}: weigh the vehicle, or measure a thrust, to separate them."
 
 
 def _room(data: Mapping[str, Any]) -> str:

@@ -3,7 +3,8 @@
 Candidates are blocks of ten seconds. One long simulated dive has all of them, with rests between; the information of
 each block about the free parameters comes from exact derivatives along that motion. Blocks are then chosen by exchange.
 The whole script is rehearsed, with the vehicle of the file and with others within its deviations, and made smaller
-until all of them stay within the limits. What is predicted is the information of that rehearsal.
+until all of them stay within the limits. What is predicted is the median over these vehicles
+of what their rehearsals tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +22,12 @@ from undertow.studies.identification.block_choice import greedy_choice, shares_l
 from undertow.studies.identification.design_result import Design, DesignRequest, Expected
 from undertow.studies.identification.dive_information import information_of
 from undertow.studies.identification.excitation_blocks import BLOCK, Block, candidates, script
-from undertow.studies.identification.experiment_scenario import ExperimentLimits, experiment_scenario, station_of
+from undertow.studies.identification.experiment_scenario import (
+    ExperimentLimits,
+    experiment_scenario,
+    station_of,
+    with_supervisor,
+)
 from undertow.studies.identification.free_parameters import chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
@@ -68,29 +74,29 @@ def design(built: Built, request: DesignRequest, say: Say = lambda stage: None) 
     picked = [blocks[i] for i in greedy_choice(information, wanted, slots)]
     vehicles = _vehicles(unknowns, {*deviations_in(built), *request.priors})
     scenario, scale, rehearsals = _rehearsed(built, picked, station, limits, model, vehicles, say)
-    rehearsal = rehearsals[0]
     say("predicting")
-    total = information_of(model, np.zeros(len(unknowns.all())), rehearsal.dive, BLOCK).sum(axis=0)
-    shares = shares_left(total, range(len(parameters)))
+    pairs = zip(vehicles, rehearsals, strict=True)
+    totals = [information_of(model, z, rehearsal.dive, BLOCK).sum(axis=0) for z, rehearsal in pairs]
+    shares = np.median([shares_left(total, range(len(parameters))) for total in totals], axis=0)
     expected = tuple(Expected(p, float(shares[i]), i in wanted) for i, p in enumerate(parameters))
     return Design(
-        scenario=scenario,
+        scenario=with_supervisor(built, scenario, limits),
         blocks=tuple(picked),
         scale=scale,
         limits=limits,
         expected=expected,
-        undetermined=tuple(undetermined(total + np.eye(len(total)), parameters)),
-        rehearsal=rehearsal,
+        undetermined=tuple(undetermined(totals[0] + np.eye(len(totals[0])), parameters)),
+        rehearsal=rehearsals[0],
         use=tuple(float(each.use_of(limits).max()) for each in rehearsals),
         model=model,
-        notes=_notes(rehearsal),
+        notes=_notes(rehearsals[0]),
     )
 
 
 def _slots(request: DesignRequest) -> int:
     for i, side in enumerate(request.room):
         checks.positive(f"room[{i}]", side, "m")
-    for name in ("max_rate", "max_tilt"):
+    for name in ("max_rate", "max_angle"):
         checks.positive(name, getattr(request, name))
     slots = int((request.duration - 2 * RUN_IN) // BLOCK)
     if slots < 1:
@@ -116,7 +122,7 @@ def _limits(plant: HybridVehicle, request: DesignRequest, station: Sequence[floa
         raise BadInput("max_input", "be given, because the thrusters have no limit")
     half = request.room[2] / 2
     depth = (station[2] - half, station[2] + half)
-    return ExperimentLimits(request.room, depth, request.max_rate, request.max_tilt, largest_input)
+    return ExperimentLimits(request.room, depth, request.max_rate, request.max_angle, largest_input)
 
 
 def _candidates(built: Built, plant: HybridVehicle, station, limits: ExperimentLimits, model, unknowns: Unknowns):

@@ -19,7 +19,7 @@ def design_data(design: Design) -> dict[str, Any]:
             "room": list(limits.room),
             "depth": list(limits.depth),
             "rate": limits.rate,
-            "tilt": limits.tilt,
+            "angle": limits.angle,
             "input": limits.input,
         },
         "parameters": {expected.parameter.name: _expected_data(expected) for expected in design.expected},

@@ -75,7 +75,7 @@ class DesignRequest(NamedTuple):
         priors: deviations beforehand that are not in the vehicle file.
         depth: of the station, m; None for that of the reference, or less deep a room below the surface.
         max_rate: rad/s.
-        max_tilt: rad.
+        max_angle: roll, pitch, and departure from the heading, rad.
         max_input: of a thruster, in its unit; None for 90 % of its limit.
     """
 
@@ -86,5 +86,5 @@ class DesignRequest(NamedTuple):
     priors: Mapping[str, UncertainNumber] = {}
     depth: float | None = None
     max_rate: float = 2.0
-    max_tilt: float = 0.8
+    max_angle: float = 0.6
     max_input: float | None = None

@@ -1,5 +1,6 @@
 """The scenario of an experiment: the vehicle of another one, a law that keeps the place, and a script."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -16,8 +17,9 @@ LAW: dict[str, Any] = {
     "feedforward": False,
     "reference_frequency": 0,
 }
-_KEPT = ("plant", "model", "disturbance", "navigation", "supervisor", "seed", "precision")
+_KEPT = ("plant", "model", "disturbance", "navigation", "seed", "precision")
 _ABOVE = 0.5  # m of water over the room
+_LATER = 1.2  # limits of the supervisor, which stops the law, as multiples of those that only end the script
 
 
 class ExperimentLimits(NamedTuple):
@@ -27,14 +29,14 @@ class ExperimentLimits(NamedTuple):
         room: m, along the heading of the target, across, and vertical.
         depth: smallest and largest coordinate `down`, m.
         rate: rad/s.
-        tilt: rad.
+        angle: roll, pitch, and departure from the heading, rad.
         input: of a thruster, in its unit.
     """
 
     room: tuple[float, float, float]
     depth: tuple[float, float]
     rate: float
-    tilt: float
+    angle: float
     input: float
 
     def options(self) -> dict[str, Any]:
@@ -45,7 +47,7 @@ class ExperimentLimits(NamedTuple):
             "min_depth": least,
             "max_depth": greatest,
             "max_rate": self.rate,
-            "max_tilt": self.tilt,
+            "max_angle": self.angle,
             "max_input": self.input,
         }
 
@@ -84,6 +86,21 @@ def experiment_scenario(
         **{key: built.resolved[key] for key in _KEPT if key in built.resolved},
         "controller": controller | ({} if limits is None else limits.options()),
         "reference": {"kind": "setpoint", "position": station},
-        "initial": {"position": station},
+        "initial": {"position": list(station)},
         "loop": {"dt": period, "duration": float(duration), "record": period},
     }
+
+
+def with_supervisor(built: Built, scenario: Mapping[str, Any], limits: ExperimentLimits) -> dict[str, Any]:
+    """The scenario of an experiment under supervision, whose tracking errors are allowed what the limits allow.
+
+    Args:
+        built: scenario, whose supervisor is kept if it has one.
+        scenario: of the experiment.
+        limits: of the experiment.
+    """
+    allowed = {
+        "max_position_error": _LATER * float(np.linalg.norm(limits.room)) / 2,
+        "max_angle_error": _LATER * float(np.sqrt(3)) * limits.angle,
+    }
+    return {**scenario, "supervisor": {"kind": "supervisor", **built.resolved.get("supervisor", {}), **allowed}}

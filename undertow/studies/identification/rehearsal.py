@@ -21,7 +21,7 @@ class Rehearsal(NamedTuple):
     Attributes:
         time: of the records, s.
         away: from the station: along its heading, across, vertical, m, (records, 3).
-        tilt: larger of roll and pitch, rad, (records,).
+        angle: largest of roll, pitch, and departure from the heading, rad, (records,).
         rate: largest angular velocity, rad/s, (records,).
         input: largest input of a thruster, (records,).
         depth: coordinate `down`, m, (records,).
@@ -31,7 +31,7 @@ class Rehearsal(NamedTuple):
 
     time: np.ndarray
     away: np.ndarray
-    tilt: np.ndarray
+    angle: np.ndarray
     rate: np.ndarray
     input: np.ndarray
     depth: np.ndarray
@@ -42,7 +42,7 @@ class Rehearsal(NamedTuple):
         """How much of the limits is used at each record: 1 is all of one of them, (records,)."""
         shares = [
             np.abs(self.away / (np.array(limits.room) / 2)).max(axis=1),
-            self.tilt / limits.tilt,
+            self.angle / limits.angle,
             self.rate / limits.rate,
             self.input / limits.input,
         ]
@@ -65,7 +65,7 @@ def rehearse(built: Built, station: list[float], step: float) -> Rehearsal:
     return Rehearsal(
         time=run["time"].values,
         away=np.stack([cosine * north + sine * east, cosine * east - sine * north, down], axis=1),
-        tilt=np.abs(position[:, 3:5]).max(axis=1),
+        angle=np.abs(np.angle(np.exp(1j * (position[:, 3:] - station[3:])))).max(axis=1),
         rate=np.abs(velocity[:, 3:]).max(axis=1),
         input=np.abs(run["input"].values).max(axis=1),
         depth=position[:, 2],
