@@ -168,7 +168,7 @@ class Experiment(AbstractController):
 def experiment(
     model: Model,
     samples,
-    law: Any = None,
+    law,
     room=(1e3, 1e3, 1e3),
     min_depth: float = -1e3,
     max_depth: float = 1e4,

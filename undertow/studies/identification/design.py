@@ -3,8 +3,8 @@
 Candidates are blocks of ten seconds. One long simulated dive has all of them, with rests between; the information of
 each block about the free parameters comes from exact derivatives along that motion. Blocks are then chosen by exchange.
 The whole script is rehearsed, with the vehicle of the file and with others within its deviations, and made smaller
-until all of them stay within the limits. What is predicted is the median over these vehicles
-of what their rehearsals tell.
+until all of them stay within the limits. What is predicted is the median of what these
+rehearsals tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,9 +19,9 @@ from undertow.core.measurement import BODY_AXES
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.studies.identification.block_choice import greedy_choice, shares_left
-from undertow.studies.identification.design_result import Design, DesignRequest, Expected
+from undertow.studies.identification.design_result import Design, DesignRequest, ExpectedDeviation
 from undertow.studies.identification.dive_information import information_of
-from undertow.studies.identification.excitation_blocks import BLOCK, Block, candidates, script
+from undertow.studies.identification.excitation_blocks import BLOCK, ExcitationBlock, candidates, script
 from undertow.studies.identification.experiment_scenario import (
     ExperimentLimits,
     experiment_scenario,
@@ -78,7 +78,7 @@ def design(built: Built, request: DesignRequest, say: Say = lambda stage: None) 
     pairs = zip(vehicles, rehearsals, strict=True)
     totals = [information_of(model, z, rehearsal.dive, BLOCK).sum(axis=0) for z, rehearsal in pairs]
     shares = np.median([shares_left(total, range(len(parameters))) for total in totals], axis=0)
-    expected = tuple(Expected(p, float(shares[i]), i in wanted) for i, p in enumerate(parameters))
+    expected = tuple(ExpectedDeviation(p, float(shares[i]), i in wanted) for i, p in enumerate(parameters))
     return Design(
         scenario=with_supervisor(built, scenario, limits),
         blocks=tuple(picked),
@@ -160,7 +160,13 @@ def _vehicles(unknowns: Unknowns, stated: set[str]) -> list[np.ndarray]:
 
 
 def _rehearsed(
-    built: Built, picked: Sequence[Block], station, limits: ExperimentLimits, model, vehicles: Sequence[np.ndarray], say
+    built: Built,
+    picked: Sequence[ExcitationBlock],
+    station,
+    limits: ExperimentLimits,
+    model,
+    vehicles: Sequence[np.ndarray],
+    say,
 ):
     """Scenario of the script, smaller until all vehicles stay within the limits; the factor, and the rehearsals."""
     scale = 1.0

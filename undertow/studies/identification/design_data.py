@@ -6,7 +6,7 @@ from typing import Any
 from undertow.core.atomic_io import write_whole
 from undertow.scenario.reading import dump
 from undertow.studies.identification.block_choice import HALF
-from undertow.studies.identification.design_result import Design, Expected
+from undertow.studies.identification.design_result import Design, ExpectedDeviation
 
 
 def design_data(design: Design) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def design_data(design: Design) -> dict[str, Any]:
     }
 
 
-def _expected_data(expected: Expected) -> dict[str, Any]:
+def _expected_data(expected: ExpectedDeviation) -> dict[str, Any]:
     return {
         "unit": expected.parameter.unit,
         "value": expected.parameter.prior,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from undertow.scenario.uncertain_number import UncertainNumber
-from undertow.studies.identification.excitation_blocks import Block
+from undertow.studies.identification.excitation_blocks import ExcitationBlock
 from undertow.studies.identification.experiment_scenario import ExperimentLimits
 from undertow.studies.identification.free_parameters import FreeParameter
 from undertow.studies.identification.model import IdentificationModel
@@ -12,7 +12,7 @@ from undertow.studies.identification.rehearsal import Rehearsal
 from undertow.studies.identification.uncertainty import Combination
 
 
-class Expected(NamedTuple):
+class ExpectedDeviation(NamedTuple):
     """What is expected of a parameter.
 
     Attributes:
@@ -53,10 +53,10 @@ class Design(NamedTuple):
     """
 
     scenario: dict[str, Any]
-    blocks: tuple[Block, ...]
+    blocks: tuple[ExcitationBlock, ...]
     scale: float
     limits: ExperimentLimits
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectedDeviation, ...]
     undetermined: tuple[Combination, ...]
     rehearsal: Rehearsal
     use: tuple[float, ...]

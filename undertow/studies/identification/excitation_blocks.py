@@ -16,7 +16,7 @@ _LOWEST, _HIGHEST = 0.1, 1.2  # Hz
 _GROUPS = {"horizontal": (0, 1, 5), "rotation": (3, 4, 5), "translation": (0, 1, 2), "all axes": (0, 1, 2, 3, 4, 5)}
 
 
-class Block(NamedTuple):
+class ExcitationBlock(NamedTuple):
     """A candidate.
 
     Attributes:
@@ -34,7 +34,7 @@ class Block(NamedTuple):
     wrenches: np.ndarray
 
 
-def candidates(largest: np.ndarray, axis_names: Sequence[str], seed: int = 0) -> list[Block]:
+def candidates(largest: np.ndarray, axis_names: Sequence[str], seed: int = 0) -> list[ExcitationBlock]:
     """Candidates for a vehicle.
 
     Args:
@@ -46,7 +46,7 @@ def candidates(largest: np.ndarray, axis_names: Sequence[str], seed: int = 0) ->
     acting = [axis for axis in range(6) if largest[axis] > 0]
     groups = {axis_names[axis]: (axis,) for axis in acting}
     groups |= {name: tuple(a for a in axes if a in acting) for name, axes in _GROUPS.items() if len(acting) > 1}
-    blocks: list[Block] = []
+    blocks: list[ExcitationBlock] = []
     for where, axes in groups.items():
         forms = _FORMS if len(axes) == 1 else _RANDOM_FORMS
         for form, signal in forms.items():
@@ -55,7 +55,7 @@ def candidates(largest: np.ndarray, axis_names: Sequence[str], seed: int = 0) ->
             for axis in axes:
                 unit[:, axis] = largest[axis] * signal(generator)
             together = np.sqrt(len(axes))
-            blocks += [Block(form, axes, where, size, size / together * unit) for size in _SIZES]
+            blocks += [ExcitationBlock(form, axes, where, size, size / together * unit) for size in _SIZES]
     return blocks
 
 
@@ -104,7 +104,7 @@ _RANDOM_FORMS: dict[str, _Signal] = {
 _FORMS = _RANDOM_FORMS | {"steps": _steps, "decay": _decay}
 
 
-def script(blocks: Sequence[Block], lead: float, pause: float = 0.0) -> np.ndarray:
+def script(blocks: Sequence[ExcitationBlock], lead: float, pause: float = 0.0) -> np.ndarray:
     """Rows (t, X, Y, Z, K, M, N) of blocks one after the other, each row held until the next; the last ends the script.
 
     Args:
