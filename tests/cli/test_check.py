@@ -146,6 +146,7 @@ def test_parts_of_the_catalogue_keep_their_contract(undertow, monkeypatch, kind,
     monkeypatch.setattr(check, "_of_feedback", lambda make, axes: check.Report((), ()))
     needed = {
         "table": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]"],
+        "experiment": ["--option", "samples=[[0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1]]", "--option", "law=pid"],
         "policy": ["--option", f"function={Path(__file__).parents[1]}/conformance/proportional_policy.py:act"],
         "rcaf": ["--option", "preset=paper"],
         "replay": ["--option", "commands=[[0, 0, 0, 0, 0, 0, 0, 0, 0], [20, 1, 1, 1, 1, 1, 1, 1, 1]]"],

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.full
 AXIS = double_integrator(1).model()
 LAWS = sorted(
     name for name, law in catalogue.names("controllers").items()
-    if "model" in law.__annotations__ and name not in ("rcaf", "adrc", "indi", "policy", "replay")
+    if "model" in law.__annotations__ and name not in ("rcaf", "adrc", "indi", "policy", "replay", "experiment")
     and isinstance(law(AXIS), AbstractAccelerationLaw)
 )  # fmt: skip
 

@@ -12,6 +12,7 @@ from undertow.cli.options.describe import DescribeCommand, ListCommand
 from undertow.cli.options.export import ExportCommand
 from undertow.cli.options.falsify import FalsifyCommand
 from undertow.cli.options.identify import IdentifyCommand
+from undertow.cli.options.identify_design import IdentifyDesignCommand
 from undertow.cli.options.init import InitCommand
 from undertow.cli.options.logs import LogsCommand
 from undertow.cli.options.mavlink import MavlinkCommand
@@ -25,7 +26,7 @@ from undertow.cli.options.version import VersionCommand
 GROUPS: dict[str, tuple[type[Command], ...]] = {
     "Start": (InitCommand, SimulateCommand),
     "Understand": (AnalyzeCommand, CampaignCommand, CompareCommand, FalsifyCommand, ArenaCommand),
-    "Fit": (IdentifyCommand, TuneCommand),
+    "Fit": (IdentifyCommand, IdentifyDesignCommand, TuneCommand),
     "Deploy": (ExportCommand, RunCommand, Ros2Command, MavlinkCommand, ArdupilotCommand),
     "Paper": (ReproduceCommand,),
     "Inspect": (ListCommand, DescribeCommand, CheckCommand, LogsCommand, BenchCommand, VersionCommand),

@@ -10,16 +10,15 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_AXES
 from undertow.logs.log import Log
-from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.uncertain_number import UncertainNumber
-from undertow.scenario.vehicle_file import vehicle_file_of
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
 from undertow.studies.identification.output_error import Fit, fit, scores_of, without_step_error
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
+from undertow.studies.identification.scenario_vehicle import deviations_in, vehicle_of
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
     Combination,
@@ -130,12 +129,12 @@ def identify(
     checks.positive("segment", segment, "s")
     if not logs:
         raise BadInput("logs", "be given", "none")
-    plant = _vehicle(built)
+    plant = vehicle_of(built)
     known = parameters_of(plant)
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
-    beforehand = {name: number for name, number in _deviations(built).items() if name in known} | dict(priors or {})
+    beforehand = {name: number for name, number in deviations_in(built).items() if name in known} | dict(priors or {})
     asked = chosen(known, free, beforehand)
     say("checking the logs")
     prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
@@ -143,7 +142,7 @@ def identify(
     refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
     parameters = [p for p in asked if p.name.rpartition(".")[2] not in refused]
     if not parameters:
-        raise BadInput("logs", "tell something of a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
+        raise BadInput("logs", "determine a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)
     say("first estimate")
     begin = first_estimate(model.prior, parameters, dives).z
@@ -172,19 +171,6 @@ def identify(
         refused_axes=refused,
         findings=tuple(_findings(prepared)),
     )
-
-
-def _vehicle(built: Built) -> HybridVehicle:
-    plant = built.closed_loop.plant
-    if not isinstance(plant, HybridVehicle):
-        raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
-    return plant
-
-
-def _deviations(built: Built) -> dict[str, UncertainNumber]:
-    """Numbers of the vehicle file that have deviations."""
-    vehicle_file = vehicle_file_of(built.text)
-    return {} if vehicle_file is None or vehicle_file.uncertainty is None else vehicle_file.uncertainty.numbers
 
 
 def _findings(prepared: Sequence[PreparedDive]) -> list[str]:

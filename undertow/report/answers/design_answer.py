@@ -1,0 +1,78 @@
+"""The answer of `undertow identify-design`: which numbers the experiment determines, and how it is carried out."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from undertow.core.number_text import plain
+from undertow.report.answers.identification_answer import in_words
+from undertow.report.answers.plain_answer import PlainAnswer
+
+_SHOWN = 4  # parameters named in a line
+
+
+def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
+    """The answer of a design.
+
+    Args:
+        data: contents of experiment.json.
+        folder: of its files.
+    """
+    wanted = {name: p for name, p in data["parameters"].items() if p["wanted"]}
+    halved = [name for name, p in wanted.items() if p["halved"]]
+    verdict = (
+        f"A script of {data['duration']:.0f} s is expected to halve the deviations of {len(halved)} of "
+        f"{len(wanted)} numbers, or more."
+    )
+    lines = (
+        *_gains(wanted),
+        *_kept(wanted),
+        *_ratios(data),
+        _room(data),
+        *data["notes"],
+        f"Rehearse it: undertow simulate {folder / 'experiment.yaml'}",
+        "Carry it out with `undertow run` or `undertow mavlink` and the same file; then give the log to "
+        "`undertow identify`.",
+    )
+    return PlainAnswer(len(halved) == len(wanted), verdict, lines)
+
+
+def _gains(wanted: Mapping[str, Any]) -> Iterator[str]:
+    order = sorted(wanted, key=lambda name: wanted[name]["deviation_left"])
+    order = [name for name in order if wanted[name]["halved"]]
+    if order:
+        shown = "; ".join(f"{in_words(name)} from {_before_and_after(wanted[name])}" for name in order[-_SHOWN:])
+        yield f"Of these, the least: {shown} (one standard deviation)."
+
+
+def _before_and_after(parameter: Mapping[str, Any]) -> str:
+    unit = parameter["unit"]
+    return f"{plain(parameter['before'])} to {plain(parameter['after'])} {unit}".rstrip()
+
+
+def _kept(wanted: Mapping[str, Any]) -> Iterator[str]:
+    kept = [name for name, p in wanted.items() if not p["halved"]]
+    if kept:
+        shown = "; ".join(f"{in_words(name)} ({100 * wanted[name]['deviation_left']:.0f} % left)" for name in kept)
+        yield f"Not halved: {shown}."
+
+
+def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
+    for combination in data["undetermined"][:1]:
+        sentence = combination["sentence"]
+        for name in combination["parameters"]:
+            sentence = sentence.replace(name, in_words(name))
+        yield f"{sentence[0].upper()}{sentence[1:]}: weigh the vehicle, or measure a thrust, to separate them."
+
+
+def _room(data: Mapping[str, Any]) -> str:
+    along, across, vertical = data["farthest"]
+    use = np.max(data["largest_use_of_limits"])
+    others = len(data["largest_use_of_limits"]) - 1
+    return (
+        f"In the rehearsal the vehicle stays within {along:.2f} m along its heading, {across:.2f} m across and "
+        f"{vertical:.2f} m vertically of its station; with {others} other vehicles within the deviations, "
+        f"{100 * use:.0f} % of the limits are used at most."
+    )
