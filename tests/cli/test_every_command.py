@@ -31,6 +31,10 @@ PATHS = {
     "campaign": [("campaign s.yaml", 2, "is a scenario"), ("campaign status none", 2, "none")],
     "compare": [("compare s.yaml --controllers scenario,pidd", 2, "Did you mean `pid`?")],
     "falsify": [("falsify f.yaml --out broken", 2, "must hold in the nominal scenario, but is violated")],
+    "identify-design": [
+        ("identify-design s.yaml --prior mass=11", 2, "`--prior` must be NAME=VALUE+-DEVIATION"),
+        ("identify-design s.yaml", 2, "`plant` must be a vehicle with thrusters"),
+    ],
     "tune": [("tune s.yaml --method luck", 2, "`--method` must be one of gradient, search, evolution")],
     "identify": [
         ("identify", 2, "needs a SCENARIO and the LOGs"),

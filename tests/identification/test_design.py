@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.core.errors import BadInput
 from undertow.core.runtime import in_precision
 from undertow.scenario.build import build
 from undertow.studies.identification.block_choice import greedy_choice, least_shares, loss, shares_left
@@ -12,7 +13,7 @@ from undertow.studies.identification.design_result import DesignRequest
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.dive_information import information_of
 from undertow.studies.identification.excitation_blocks import BLOCK, HELD, candidates, script
-from undertow.studies.identification.experiment_scenario import experiment_scenario, station_of
+from undertow.studies.identification.experiment_scenario import LEAD, experiment_scenario, station_of
 from undertow.studies.identification.free_parameters import chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, all_residuals, model_of
@@ -88,15 +89,19 @@ def test_information_is_that_of_finite_differences(built):
         model, count = model_of(prior_vehicle(plant), parameters), len(Unknowns(tuple(parameters), 1).all())
         block = next(b for b in candidates(np.full(6, 20.0), "abcdef") if b.form == "telegraph" and b.size == 0.2)
         station = station_of(built, ROOM, None)
-        simulated = rehearse(build(experiment_scenario(built, script([block], 2.0), station)), station, STEP).dive
-        found = information_of(model, np.zeros(count), simulated, BLOCK)[0]
+        simulated = rehearse(build(experiment_scenario(built, script([block], LEAD), station)), station, STEP).dive
+        found = information_of(model, np.zeros(count), simulated, BLOCK)[1]
         segments = segments_of([simulated.dive], BLOCK)
-        counts = segments.counts[0][:, SENSOR_OF_RESIDUAL]
+        counts = segments.counts[1][:, SENSOR_OF_RESIDUAL]
         weights = np.where(counts > 0, counts / simulated.noise**2, 0.0).reshape(-1)
 
         def residuals(unknowns):
             both = jnp.asarray(unknowns)
-            return np.asarray(all_residuals(model, both[:count], both[None, count:], segments, STEP))[0].reshape(-1)
+            return np.asarray(
+                all_residuals(
+                    model, both[:count], jnp.broadcast_to(both[count:], (len(segments.dive), 12)), segments, STEP
+                )
+            )[1].reshape(-1)
 
         steps = 1e-4 * np.eye(count + 12)
         derivative = np.stack([(residuals(step) - residuals(-step)) / 2e-4 for step in steps], axis=1)
@@ -111,7 +116,7 @@ def test_information_is_that_of_finite_differences(built):
 def test_experiment_keeps_its_room_and_lowers_the_deviations(built):
     """A minute, rehearsed anew from the scenario that is written, also with another vehicle."""
     with in_precision("float64"):
-        designed = design(built, DesignRequest(ROOM, 64.0, free=FREE))
+        designed = design(built, DesignRequest(ROOM, 74.0, free=FREE))
         assert len(designed.blocks) == 6
         assert all(expected.share < 0.5 for expected in designed.expected)
         assert max(designed.use) < 1
@@ -128,3 +133,17 @@ def test_experiment_keeps_its_room_and_lowers_the_deviations(built):
         )
         assert narrow.abort == 1
         assert np.abs(narrow.away[-20:, 0]).max() < 0.3  # it is back
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        (DesignRequest((3.0, 0.0, 2.0)), "room"),
+        (DesignRequest(ROOM, duration=23.0), "duration"),
+        (DesignRequest(ROOM, max_rate=-1.0), "max_rate"),
+        (DesignRequest(ROOM, wanted=("added_mas.surge",)), "added_mass.surge"),
+    ],
+)
+def test_requests_that_cannot_be_met(built, request_, words):
+    with pytest.raises(BadInput, match=words):
+        design(built, request_)

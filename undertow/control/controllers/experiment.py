@@ -1,7 +1,8 @@
 """An experiment for identification: a law that keeps the place, and forces that are added to what it commands.
 
-The inputs that result are recorded, so that it does not matter to an output-error identification that a loop was closed
-around the vehicle: residuals are those of the sensors, and the model is driven by what the thrusters were given.
+The inputs that result are recorded, and drive the model of the identification. So output error stays consistent
+although a loop was closed, as long as the noise of the sensors is white: what the law makes of it comes a step later.
+Noise that lasts, such as that of a navigation filter, correlates with the inputs, the less the weaker the law is.
 """
 
 import enum
@@ -87,8 +88,9 @@ class AbortLimits(eqx.Module):
 class Experiment(AbstractController):
     """A law whose target accelerates as forces of a script would accelerate the nominal vehicle.
 
-    The script is held from row to row; before the first row and after the last, after an abort, and from there on,
-    nothing is added. A restart of the law does not begin the script again.
+    Each row of the script is held until the next. Before the first row, from the last one on, and after an abort
+    nothing is added. Limits end the script while it runs: before, the vehicle may still come. A restart of the law does
+    not begin the script again.
 
     Raises:
         BadInput: rows that cannot be used, or a model that is not of a vehicle.
@@ -129,8 +131,9 @@ class Experiment(AbstractController):
         step = dt - z.rest
         time = z.time + step
         abort = jnp.where(z.abort > 0, z.abort, self.limits.exceeded(y, r, u_applied))
-        is_over = z.time + self.early >= self.samples[-1, 0]
-        return ExperimentState(law, time, (time - z.time) - step, jnp.where(is_over, z.abort, abort))
+        now, times = z.time + self.early, self.samples[:, 0]
+        runs = (now >= times[0]) & (now < times[-1])
+        return ExperimentState(law, time, (time - z.time) - step, jnp.where(runs, abort, z.abort))
 
     def signals(self):
         return self.law.signals() | {

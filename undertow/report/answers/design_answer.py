@@ -31,6 +31,8 @@ def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
         *_kept(wanted),
         *_ratios(data),
         _room(data),
+        "These deviations are for a model of the right form and the noise of the scenario; waves, a tether or what the "
+        "model lacks leave more.",
         *data["notes"],
         f"Rehearse it: undertow simulate {folder / 'experiment.yaml'}",
         "Carry it out with `undertow run` or `undertow mavlink` and the same file; then give the log to "
@@ -69,10 +71,10 @@ def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
 
 def _room(data: Mapping[str, Any]) -> str:
     along, across, vertical = data["farthest"]
-    use = np.max(data["largest_use_of_limits"])
-    others = len(data["largest_use_of_limits"]) - 1
+    others = np.array(data["largest_use_of_limits"][1:])
+    staying = int((others <= 1).sum())
     return (
         f"In the rehearsal the vehicle stays within {along:.2f} m along its heading, {across:.2f} m across and "
-        f"{vertical:.2f} m vertically of its station; with {others} other vehicles within the deviations, "
-        f"{100 * use:.0f} % of the limits are used at most."
+        f"{vertical:.2f} m vertically of its station. Of {len(others)} other vehicles within the deviations {staying} "
+        "stay within the limits, which end the script where one does not."
     )

@@ -3,8 +3,7 @@
 Candidates are blocks of ten seconds. One long simulated dive has all of them, with rests between; the information of
 each block about the free parameters comes from exact derivatives along that motion. Blocks are then chosen by exchange.
 The whole script is rehearsed, with the vehicle of the file and with others within its deviations, and made smaller
-until all of them stay within the limits. What is predicted is the median of what these
-rehearsals tell.
+until they stay within the limits. What is predicted is the median of what these rehearsals tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +22,8 @@ from undertow.studies.identification.design_result import Design, DesignRequest,
 from undertow.studies.identification.dive_information import information_of
 from undertow.studies.identification.excitation_blocks import BLOCK, ExcitationBlock, candidates, script
 from undertow.studies.identification.experiment_scenario import (
+    LEAD,
+    REST,
     ExperimentLimits,
     experiment_scenario,
     station_of,
@@ -33,7 +34,6 @@ from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.rehearsal import Rehearsal, rehearse, with_vehicle
 from undertow.studies.identification.scenario_vehicle import deviations_in, vehicle_of
-from undertow.studies.identification.segments import RUN_IN
 from undertow.studies.identification.uncertainty import undetermined
 
 Say = Callable[[str], None]
@@ -44,7 +44,8 @@ _BLOCK_USE = 0.7  # of the limits that a block may use by itself
 _USE = 0.95  # that a rehearsal may use
 _SMALLER = 0.85  # factor on all forces where a rehearsal uses more
 _TRIES = 10
-_OTHERS = 6  # vehicles within the deviations, with which the script is rehearsed
+_OTHERS = 12  # vehicles within the deviations, with which the script is rehearsed
+_LEAVING = 1  # of these may leave: some are hardly stable, and the limits end their script
 _USUAL_SPREAD = 0.3  # of these, where neither the vehicle file nor the user states a deviation
 _LARGEST_INPUT = 0.9  # of the limit of the thrusters, where no other is given
 
@@ -75,7 +76,7 @@ def design(built: Built, request: DesignRequest, say: Say = lambda stage: None) 
     vehicles = _vehicles(unknowns, {*deviations_in(built), *request.priors})
     scenario, scale, rehearsals = _rehearsed(built, picked, station, limits, model, vehicles, say)
     say("predicting")
-    pairs = zip(vehicles, rehearsals, strict=True)
+    pairs = [pair for pair in zip(vehicles, rehearsals, strict=True) if pair[1].abort == 0]
     totals = [information_of(model, z, rehearsal.dive, BLOCK).sum(axis=0) for z, rehearsal in pairs]
     shares = np.median([shares_left(total, range(len(parameters))) for total in totals], axis=0)
     expected = tuple(ExpectedDeviation(p, float(shares[i]), i in wanted) for i, p in enumerate(parameters))
@@ -98,9 +99,9 @@ def _slots(request: DesignRequest) -> int:
         checks.positive(f"room[{i}]", side, "m")
     for name in ("max_rate", "max_angle"):
         checks.positive(name, getattr(request, name))
-    slots = int((request.duration - 2 * RUN_IN) // BLOCK)
+    slots = int((request.duration - LEAD - REST) // BLOCK)
     if slots < 1:
-        raise BadInput("duration", f"be {BLOCK + 2 * RUN_IN:g} s or more", f"{request.duration:g} s")
+        raise BadInput("duration", f"be {BLOCK + LEAD + REST:g} s or more", f"{request.duration:g} s")
     return slots
 
 
@@ -131,17 +132,17 @@ def _candidates(built: Built, plant: HybridVehicle, station, limits: ExperimentL
     mass = np.diagonal(np.asarray(plant.body.mass_matrix))
     largest = np.asarray(authority_of(body_model, plant)) * mass
     blocks = candidates(np.where(np.isfinite(largest), largest, mass), BODY_AXES)
-    rows = script(blocks, RUN_IN, _PAUSE)
+    rows = script(blocks, LEAD, _PAUSE)
     library = rehearse(build(experiment_scenario(built, rows, station)), station, STEP)
     use = library.use_of(limits)
     period = BLOCK + _PAUSE
-    begins = RUN_IN + period * np.arange(len(blocks))
+    begins = LEAD + period * np.arange(len(blocks))
     uses = [use[(library.time >= begin) & (library.time < begin + period)].max() for begin in begins]
     fitting = [number for number in range(len(blocks)) if uses[number] < _BLOCK_USE]
     if not fitting:
         raise BadInput("room", "leave room for some motion", _in_words(limits.room))
-    # Segments begin with the first block, and are as long as a block or a pause.
-    segments = [round(number * period / BLOCK) for number in fitting]
+    # Segments are as long as a block or a pause; the one before the first block is at rest.
+    segments = [1 + round(number * period / BLOCK) for number in fitting]
     information = information_of(model, np.zeros(len(unknowns.all())), library.dive, BLOCK, segments)
     return [blocks[number] for number in fitting], information
 
@@ -168,17 +169,19 @@ def _rehearsed(
     vehicles: Sequence[np.ndarray],
     say,
 ):
-    """Scenario of the script, smaller until all vehicles stay within the limits; the factor, and the rehearsals."""
+    """Scenario of the script, smaller until the vehicles stay within the limits; the factor, and the rehearsals."""
     scale = 1.0
     for trial in range(_TRIES):
         say(f"rehearsal {trial + 1}")
-        rows = script([block._replace(wrenches=scale * block.wrenches) for block in picked], RUN_IN)
+        rows = script([block._replace(wrenches=scale * block.wrenches) for block in picked], LEAD)
         scenario = experiment_scenario(built, rows, station, limits)
         placed = build(scenario)
         rehearsals: list[Rehearsal] = []
+        leaving = 0
         for z in vehicles:
             rehearsals.append(rehearse(with_vehicle(placed, model, z), station, STEP))
-            if rehearsals[-1].use_of(limits).max() > _USE:
+            leaving += rehearsals[-1].use_of(limits).max() > _USE
+            if leaving > (_LEAVING if len(rehearsals) > 1 else 0):
                 break
         else:
             return scenario, scale, rehearsals

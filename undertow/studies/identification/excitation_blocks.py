@@ -112,7 +112,7 @@ def script(blocks: Sequence[ExcitationBlock], lead: float, pause: float = 0.0) -
         lead: s of rest before the first.
         pause: s of rest after each.
     """
-    rows: list[np.ndarray] = [np.zeros((1, 7))]
+    rows: list[np.ndarray] = []
     for number, block in enumerate(blocks):
         begin = lead + number * (BLOCK + pause)
         times = begin + HELD * np.arange(_STEPS)

@@ -18,6 +18,8 @@ LAW: dict[str, Any] = {
     "reference_frequency": 0,
 }
 _KEPT = ("plant", "model", "disturbance", "navigation", "seed", "precision")
+LEAD = 12.0  # s until the law has trimmed the vehicle and the script begins; the second segment of an identification
+REST = 2.0  # s after the script
 _ABOVE = 0.5  # m of water over the room
 _LATER = 1.2  # limits of the supervisor, which stops the law, as multiples of those that only end the script
 
@@ -67,7 +69,7 @@ def station_of(built: Built, room: tuple[float, float, float], depth: float | No
 
 
 def experiment_scenario(
-    built: Built, rows: np.ndarray, station: list[float], limits: ExperimentLimits | None = None, rest: float = 2.0
+    built: Built, rows: np.ndarray, station: list[float], limits: ExperimentLimits | None = None
 ) -> dict[str, Any]:
     """Scenario as plain data, in which nothing depends on another file.
 
@@ -76,10 +78,9 @@ def experiment_scenario(
         rows: script.
         station: place that is kept.
         limits: None for none.
-        rest: s after the script.
     """
     period = built.scenario.loop.dt if built.scenario.loop.kind == "sampled" else built.scenario.loop.record
-    duration = period * np.ceil((rows[-1, 0] + rest) / period - 1e-9)
+    duration = period * np.ceil((rows[-1, 0] + REST) / period - 1e-9)
     controller = {"kind": "experiment", "csv": csv_of(rows), "law": LAW}
     return {
         "description": "experiment for identification",

@@ -10,7 +10,7 @@ from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
 from undertow.scenario.results.run_scenario import run_scenario
 from undertow.studies.identification.dive_information import SimulatedDive, dive_of_run
-from undertow.studies.identification.experiment_scenario import ExperimentLimits
+from undertow.studies.identification.experiment_scenario import LEAD, ExperimentLimits
 from undertow.studies.identification.identified_vehicle import ThrusterActuation
 from undertow.studies.identification.model import CandidateVehicle, IdentificationModel
 
@@ -39,7 +39,7 @@ class Rehearsal(NamedTuple):
     dive: SimulatedDive
 
     def use_of(self, limits: ExperimentLimits) -> np.ndarray:
-        """How much of the limits is used at each record: 1 is all of one of them, (records,)."""
+        """How much of the limits is used at each record: 1 is all of one of them, 0 before the script, (records,)."""
         shares = [
             np.abs(self.away / (np.array(limits.room) / 2)).max(axis=1),
             self.angle / limits.angle,
@@ -47,7 +47,7 @@ class Rehearsal(NamedTuple):
             self.input / limits.input,
         ]
         outside = (self.depth < limits.depth[0]) | (self.depth > limits.depth[1])
-        return np.where(outside, np.inf, np.max(shares, axis=0))
+        return np.where(self.time < LEAD, 0.0, np.where(outside, np.inf, np.max(shares, axis=0)))
 
 
 def rehearse(built: Built, station: list[float], step: float) -> Rehearsal:
