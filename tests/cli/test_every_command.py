@@ -41,10 +41,6 @@ PATHS = {
         ("identify --thruster none.csv", 2, "`bench` must be an existing file"),
         ("identify --thruster b.csv", 2, "Give it with --supply"),
     ],
-    "identify-design": [
-        ("identify-design s.yaml", 2, "must be a vehicle with thrusters"),
-        ("identify-design none.yaml", 2, "`none.yaml` must be an existing file"),
-    ],
     "arena": [("arena --tasks hover", 2, "`--tasks` must name tasks of the arena, but is hover")],
     "bench": [("bench s.yaml", 2, "unexpected extra argument")],
     "reproduce": [("reproduce --out s.yaml", 2, "`--out` must")],

@@ -64,13 +64,13 @@ def test_deviations_left_of_a_diagonal_information():
 
 
 def test_choice_is_never_worse_than_random_ones(information):
-    wanted, slots = [0, 1, 3], 6
-    can = least_shares(information, wanted, slots) < 0.5
-    chosen_loss = loss(information[greedy_choice(information, wanted, slots)].sum(axis=0), wanted, can)
+    desired, slots = [0, 1, 3], 6
+    can = least_shares(information, desired, slots) < 0.5
+    chosen_loss = loss(information[greedy_choice(information, desired, slots)].sum(axis=0), desired, can)
     generator = np.random.default_rng(2)
     for _ in range(300):
         others = generator.integers(len(information), size=slots)
-        assert chosen_loss <= loss(information[others].sum(axis=0), wanted, can) + 1e-12
+        assert chosen_loss <= loss(information[others].sum(axis=0), desired, can) + 1e-12
 
 
 def test_choice_is_for_what_is_wanted():
@@ -141,7 +141,7 @@ def test_experiment_keeps_its_room_and_lowers_the_deviations(built):
         (DesignRequest((3.0, 0.0, 2.0)), "room"),
         (DesignRequest(ROOM, duration=23.0), "duration"),
         (DesignRequest(ROOM, max_rate=-1.0), "max_rate"),
-        (DesignRequest(ROOM, wanted=("added_mas.surge",)), "added_mass.surge"),
+        (DesignRequest(ROOM, desired=("added_mas.surge",)), "added_mass.surge"),
     ],
 )
 def test_requests_that_cannot_be_met(built, request_, words):

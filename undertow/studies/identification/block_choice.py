@@ -10,57 +10,57 @@ _WEIGHT = 3.0  # of that
 _PASSES = 4  # of exchanges
 
 
-def shares_left(information: np.ndarray, wanted: Sequence[int]) -> np.ndarray:
-    """Deviations of wanted unknowns as shares of those beforehand.
+def shares_left(information: np.ndarray, desired: Sequence[int]) -> np.ndarray:
+    """Deviations of desired unknowns as shares of those beforehand.
 
     Args:
         information: of the data alone; beforehand it is the identity.
-        wanted: numbers of the unknowns.
+        desired: numbers of the unknowns.
     """
     covariance = np.linalg.inv(information + np.eye(len(information)))
-    return np.sqrt(np.diagonal(covariance)[list(wanted)])
+    return np.sqrt(np.diagonal(covariance)[list(desired)])
 
 
-def loss(information: np.ndarray, wanted: Sequence[int], can_be_halved: np.ndarray) -> float:
-    """What a choice makes small: log-determinant of the covariance of the wanted, and deviations that are not halved.
+def loss(information: np.ndarray, desired: Sequence[int], can_be_halved: np.ndarray) -> float:
+    """What a choice makes small: log-determinant of the covariance of the desired, and deviations that are not halved.
 
     Args:
         information: of the data.
-        wanted: numbers of the unknowns.
-        can_be_halved: which of the wanted can.
+        desired: numbers of the unknowns.
+        can_be_halved: which of the desired can.
     """
     covariance = np.linalg.inv(information + np.eye(len(information)))
-    indices = list(wanted)
+    indices = list(desired)
     block = covariance[np.ix_(indices, indices)]
     shares = np.sqrt(np.diagonal(block))
     missing = np.maximum(0.0, np.log(shares / _AIM))[can_be_halved].sum()
     return float(np.linalg.slogdet(block)[1] / 2 + _WEIGHT * missing)
 
 
-def least_shares(information: np.ndarray, wanted: Sequence[int], slots: int) -> np.ndarray:
-    """Smallest deviation that any single candidate leaves of each wanted unknown, or a mixture of all, if it has all
+def least_shares(information: np.ndarray, desired: Sequence[int], slots: int) -> np.ndarray:
+    """Smallest deviation that any single candidate leaves of each desired unknown, or a mixture of all, if it has all
     slots.
 
     Args:
         information: of each candidate, (candidates, P, P).
-        wanted: numbers of the unknowns.
+        desired: numbers of the unknowns.
         slots: number of blocks of the experiment.
     """
     designs = [slots * candidate for candidate in information]
     designs.append(slots * information.mean(axis=0))
-    return np.min([shares_left(design, wanted) for design in designs], axis=0)
+    return np.min([shares_left(design, desired) for design in designs], axis=0)
 
 
-def greedy_choice(information: np.ndarray, wanted: Sequence[int], slots: int) -> list[int]:
+def greedy_choice(information: np.ndarray, desired: Sequence[int], slots: int) -> list[int]:
     """Numbers of the candidates, one per slot; a candidate may be taken several times.
 
     Args:
         information: of each candidate, (candidates, P, P).
-        wanted: numbers of the unknowns.
+        desired: numbers of the unknowns.
         slots: number of blocks.
     """
-    can_be_halved = least_shares(information, wanted, slots) < HALF
-    losses = lambda base: np.array([loss(base + candidate, wanted, can_be_halved) for candidate in information])
+    can_be_halved = least_shares(information, desired, slots) < HALF
+    losses = lambda base: np.array([loss(base + candidate, desired, can_be_halved) for candidate in information])
     chosen: list[int] = []
     total = np.zeros(information.shape[1:])
     for _ in range(slots):
