@@ -33,7 +33,7 @@ class IdentifyDesignCommand(Command):
         typer.Option(
             "--for",
             metavar="NAME",
-            help="A parameter to be determined, a group (added_mass) or a pattern (*.yaw); may be repeated. Default: all "
+            help="A parameter to determine, a group (added_mass) or a pattern (*.yaw); may be repeated. Default: all "
             "that are free.",
         ),
     ] = None
