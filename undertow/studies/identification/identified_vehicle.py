@@ -53,9 +53,9 @@ class AbstractActuation(eqx.Module):
     def with_values(self, values: Values) -> "AbstractActuation":
         """The same with some of its numbers replaced."""
 
+    @abc.abstractmethod
     def solved(self, state: Any, u: Float[Array, " N"], step: Float[Array, ""]) -> "SolvedStep | None":
         """The states over a step (s) with a held input; None where they have to be integrated."""
-        return None
 
 
 class SolvedStep(NamedTuple):
@@ -83,6 +83,9 @@ class ThrusterActuation(AbstractActuation):
         if self.inflow_loss is not None:
             thrust = with_inflow(thrust, self.inflow_loss, advance_speed(self.thruster_matrix, nu))
         return matvec(self.thruster_matrix, thrust)
+
+    def solved(self, state, u, step):
+        return None
 
     def with_values(self, values: Values) -> "ThrusterActuation":
         count = self.thruster_matrix.shape[1]

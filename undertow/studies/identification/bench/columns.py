@@ -1,6 +1,6 @@
 """What the columns of a bench record are: a quantity and its unit, from the words of the header.
 
-`pwm_us`, `PWM (µs)`, `Force (Kg f)`, `thrust_N`, `Current (A)`, `rpm` and the like are known.
+`pwm_us`, `PWM (us)`, `Force (Kg f)`, `thrust_N`, `Current (A)`, `rpm` and the like are known.
 """
 
 import re
@@ -28,8 +28,8 @@ _NOT_THESE = frozenset("efficiency temperature torque".split())
 
 # Units as headers spell them, without blanks and in small letters.
 _SPELLINGS = {
-    "µs": "us",
-    "μs": "us",
+    "\u00b5s": "us",
+    "\u03bcs": "us",
     "usec": "us",
     "microseconds": "us",
     "kg": "kgf",
