@@ -1,7 +1,7 @@
 """Whether an experiment of `undertow identify-design` keeps what it promises: deviations predicted and obtained.
 
 The vehicle is a BlueROV2 Heavy each of whose numbers is known to 30 %, in a room of 3 x 3 x 2 m for five minutes. Each
-seed has a vehicle sampled within these deviations, which carries out the script in simulation and is identified.
+seed has a sample of the vehicles within these deviations, which carries out the script in simulation and is identified.
 Obtained are the median of the deviations that the identification states, and the errors of its estimates.
 `python benchmarks/identification_design.py --seeds 50`.
 """

@@ -64,16 +64,16 @@ def test_deviations_left_of_a_diagonal_information():
 
 
 def test_choice_is_never_worse_than_random_ones(information):
-    desired, slots = [0, 1, 3], 6
-    can = least_shares(information, desired, slots) < 0.5
-    chosen_loss = loss(information[greedy_choice(information, desired, slots)].sum(axis=0), desired, can)
+    of_interest, slots = [0, 1, 3], 6
+    can = least_shares(information, of_interest, slots) < 0.5
+    chosen_loss = loss(information[greedy_choice(information, of_interest, slots)].sum(axis=0), of_interest, can)
     generator = np.random.default_rng(2)
     for _ in range(300):
         others = generator.integers(len(information), size=slots)
-        assert chosen_loss <= loss(information[others].sum(axis=0), desired, can) + 1e-12
+        assert chosen_loss <= loss(information[others].sum(axis=0), of_interest, can) + 1e-12
 
 
-def test_choice_is_for_what_is_wanted():
+def test_choice_is_for_what_is_of_interest():
     """Two candidates, each of which tells of one unknown."""
     each = np.stack([np.diag([4.0, 0.0]), np.diag([0.0, 4.0])])
     assert greedy_choice(each, [0], 5) == [0] * 5
@@ -141,7 +141,7 @@ def test_experiment_keeps_its_room_and_lowers_the_deviations(built):
         (DesignRequest((3.0, 0.0, 2.0)), "room"),
         (DesignRequest(ROOM, duration=23.0), "duration"),
         (DesignRequest(ROOM, max_rate=-1.0), "max_rate"),
-        (DesignRequest(ROOM, desired=("added_mas.surge",)), "added_mass.surge"),
+        (DesignRequest(ROOM, of_interest=("added_mas.surge",)), "added_mass.surge"),
     ],
 )
 def test_requests_that_cannot_be_met(built, request_, words):

@@ -29,7 +29,7 @@ def identify_design(command: IdentifyDesignCommand) -> int:
     request = DesignRequest(
         room=command.room,
         duration=command.duration,
-        desired=tuple(command.desired or ()),
+        of_interest=tuple(command.of_interest or ()),
         free=tuple(command.free or ()),
         priors=priors_of(command.prior or ()),
         depth=command.depth,

@@ -28,12 +28,12 @@ class IdentifyDesignCommand(Command):
         typer.Option(metavar="L W H", help="Room around the station: along the heading, across, and vertical, m."),
     ] = (3.0, 3.0, 2.0)
     duration: Annotated[float, typer.Option(metavar="S", help="Length of the script.")] = 300.0
-    desired: Annotated[
+    of_interest: Annotated[
         list[str] | None,
         typer.Option(
             "--for",
             metavar="NAME",
-            help="A parameter to determine, a group (added_mass) or a pattern (*.yaw); may be repeated. Default: all "
+            help="A parameter of interest, a group (added_mass) or a pattern (*.yaw); may be repeated. Default: all "
             "that are free.",
         ),
     ] = None

@@ -20,15 +20,15 @@ def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
         data: contents of experiment.json.
         folder: of its files.
     """
-    desired = {name: p for name, p in data["parameters"].items() if p["desired"]}
-    halved = [name for name, p in desired.items() if p["halved"]]
+    of_interest = {name: p for name, p in data["parameters"].items() if p["of_interest"]}
+    halved = [name for name, p in of_interest.items() if p["halved"]]
     verdict = (
         f"A script of {data['duration']:.0f} s is expected to halve the deviations of {len(halved)} of "
-        f"{len(desired)} numbers, or more."
+        f"{len(of_interest)} numbers, or more."
     )
     lines = (
-        *_gains(desired),
-        *_kept(desired),
+        *_gains(of_interest),
+        *_kept(of_interest),
         *_ratios(data),
         _room(data),
         "These deviations are for a model of the right form and the noise of the scenario; waves, a tether or what the "
@@ -38,14 +38,14 @@ def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
         "Carry it out with `undertow run` or `undertow mavlink` and the same file; then give the log to "
         "`undertow identify`.",
     )
-    return PlainAnswer(len(halved) == len(desired), verdict, lines)
+    return PlainAnswer(len(halved) == len(of_interest), verdict, lines)
 
 
-def _gains(desired: Mapping[str, Any]) -> Iterator[str]:
-    order = sorted(desired, key=lambda name: desired[name]["deviation_left"])
-    order = [name for name in order if desired[name]["halved"]]
+def _gains(of_interest: Mapping[str, Any]) -> Iterator[str]:
+    order = sorted(of_interest, key=lambda name: of_interest[name]["deviation_left"])
+    order = [name for name in order if of_interest[name]["halved"]]
     if order:
-        shown = "; ".join(f"{in_words(name)} from {_before_and_after(desired[name])}" for name in order[-_SHOWN:])
+        shown = "; ".join(f"{in_words(name)} from {_before_and_after(of_interest[name])}" for name in order[-_SHOWN:])
         yield f"Of these, the least: {shown} (one standard deviation)."
 
 
@@ -54,10 +54,10 @@ def _before_and_after(parameter: Mapping[str, Any]) -> str:
     return f"{plain(parameter['before'])} to {plain(parameter['after'])} {unit}".rstrip()
 
 
-def _kept(desired: Mapping[str, Any]) -> Iterator[str]:
-    kept = [name for name, p in desired.items() if not p["halved"]]
+def _kept(of_interest: Mapping[str, Any]) -> Iterator[str]:
+    kept = [name for name, p in of_interest.items() if not p["halved"]]
     if kept:
-        shown = "; ".join(f"{in_words(name)} ({100 * desired[name]['deviation_left']:.0f} % left)" for name in kept)
+        shown = "; ".join(f"{in_words(name)} ({100 * of_interest[name]['deviation_left']:.0f} % left)" for name in kept)
         yield f"Not halved: {shown}."
 
 

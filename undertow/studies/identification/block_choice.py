@@ -10,57 +10,56 @@ _WEIGHT = 3.0  # of that
 _PASSES = 4  # of exchanges
 
 
-def shares_left(information: np.ndarray, desired: Sequence[int]) -> np.ndarray:
-    """Deviations of desired unknowns as shares of those beforehand.
+def shares_left(information: np.ndarray, of_interest: Sequence[int]) -> np.ndarray:
+    """Deviations of unknowns of interest as shares of those beforehand.
 
     Args:
         information: of the data alone; beforehand it is the identity.
-        desired: numbers of the unknowns.
+        of_interest: numbers of the unknowns.
     """
     covariance = np.linalg.inv(information + np.eye(len(information)))
-    return np.sqrt(np.diagonal(covariance)[list(desired)])
+    return np.sqrt(np.diagonal(covariance)[list(of_interest)])
 
 
-def loss(information: np.ndarray, desired: Sequence[int], can_be_halved: np.ndarray) -> float:
-    """What a choice makes small: log-determinant of the covariance of the desired, and deviations that are not halved.
+def loss(information: np.ndarray, of_interest: Sequence[int], can_be_halved: np.ndarray) -> float:
+    """What a choice makes small: log-determinant of the covariance, and deviations that are not halved.
 
     Args:
         information: of the data.
-        desired: numbers of the unknowns.
-        can_be_halved: which of the desired can.
+        of_interest: numbers of the unknowns.
+        can_be_halved: which of these can.
     """
     covariance = np.linalg.inv(information + np.eye(len(information)))
-    indices = list(desired)
+    indices = list(of_interest)
     block = covariance[np.ix_(indices, indices)]
     shares = np.sqrt(np.diagonal(block))
     missing = np.maximum(0.0, np.log(shares / _AIM))[can_be_halved].sum()
     return float(np.linalg.slogdet(block)[1] / 2 + _WEIGHT * missing)
 
 
-def least_shares(information: np.ndarray, desired: Sequence[int], slots: int) -> np.ndarray:
-    """Smallest deviation that any single candidate leaves of each desired unknown, or a mixture of all, if it has all
-    slots.
+def least_shares(information: np.ndarray, of_interest: Sequence[int], slots: int) -> np.ndarray:
+    """Smallest share that a candidate in all slots, or a mixture of all candidates, leaves of each deviation.
 
     Args:
         information: of each candidate, (candidates, P, P).
-        desired: numbers of the unknowns.
+        of_interest: numbers of the unknowns.
         slots: number of blocks of the experiment.
     """
     designs = [slots * candidate for candidate in information]
     designs.append(slots * information.mean(axis=0))
-    return np.min([shares_left(design, desired) for design in designs], axis=0)
+    return np.min([shares_left(design, of_interest) for design in designs], axis=0)
 
 
-def greedy_choice(information: np.ndarray, desired: Sequence[int], slots: int) -> list[int]:
+def greedy_choice(information: np.ndarray, of_interest: Sequence[int], slots: int) -> list[int]:
     """Numbers of the candidates, one per slot; a candidate may be taken several times.
 
     Args:
         information: of each candidate, (candidates, P, P).
-        desired: numbers of the unknowns.
+        of_interest: numbers of the unknowns.
         slots: number of blocks.
     """
-    can_be_halved = least_shares(information, desired, slots) < HALF
-    losses = lambda base: np.array([loss(base + candidate, desired, can_be_halved) for candidate in information])
+    can_be_halved = least_shares(information, of_interest, slots) < HALF
+    losses = lambda base: np.array([loss(base + candidate, of_interest, can_be_halved) for candidate in information])
     chosen: list[int] = []
     total = np.zeros(information.shape[1:])
     for _ in range(slots):

@@ -65,21 +65,21 @@ def design(built: Built, request: DesignRequest, say: Say = lambda stage: None) 
     """
     plant = vehicle_of(built)
     slots = _slots(request)
-    model, parameters, desired = _free(built, plant, request)
+    model, parameters, of_interest = _free(built, plant, request)
     unknowns = Unknowns(tuple(parameters), 1)
     station = station_of(built, request.room, request.depth)
     limits = _limits(plant, request, station)
     say("simulating the candidates")
     blocks, information = _candidates(built, plant, station, limits, model, unknowns)
     say(f"choosing {slots} of {len(blocks)} blocks")
-    picked = [blocks[i] for i in greedy_choice(information, desired, slots)]
+    picked = [blocks[i] for i in greedy_choice(information, of_interest, slots)]
     vehicles = _vehicles(unknowns, {*deviations_in(built), *request.priors})
     scenario, scale, rehearsals = _rehearsed(built, picked, station, limits, model, vehicles, say)
     say("predicting")
     pairs = [pair for pair in zip(vehicles, rehearsals, strict=True) if pair[1].abort == 0]
     totals = [information_of(model, z, rehearsal.dive, BLOCK).sum(axis=0) for z, rehearsal in pairs]
     shares = np.median([shares_left(total, range(len(parameters))) for total in totals], axis=0)
-    expected = tuple(ExpectedDeviation(p, float(shares[i]), i in desired) for i, p in enumerate(parameters))
+    expected = tuple(ExpectedDeviation(p, float(shares[i]), i in of_interest) for i, p in enumerate(parameters))
     return Design(
         scenario=with_supervisor(built, scenario, limits),
         blocks=tuple(picked),
@@ -106,14 +106,14 @@ def _slots(request: DesignRequest) -> int:
 
 
 def _free(built: Built, plant: HybridVehicle, request: DesignRequest):
-    """The model, its free parameters, and the numbers of the desired ones."""
+    """The model, its free parameters, and the numbers of those of interest."""
     known = parameters_of(plant)
     beforehand = {name: n for name, n in deviations_in(built).items() if name in known} | dict(request.priors)
     parameters = chosen(known, request.free, beforehand)
     by_name = {parameter.name: parameter for parameter in parameters}
-    names = {p.name for p in chosen(by_name, request.desired)} if request.desired else set(by_name)
-    desired = [i for i, parameter in enumerate(parameters) if parameter.name in names]
-    return model_of(prior_vehicle(plant), parameters), parameters, desired
+    names = {p.name for p in chosen(by_name, request.of_interest)} if request.of_interest else set(by_name)
+    of_interest = [i for i, parameter in enumerate(parameters) if parameter.name in names]
+    return model_of(prior_vehicle(plant), parameters), parameters, of_interest
 
 
 def _limits(plant: HybridVehicle, request: DesignRequest, station: Sequence[float]) -> ExperimentLimits:

@@ -42,7 +42,7 @@ def _expected_data(expected: ExpectedDeviation) -> dict[str, Any]:
         "after": expected.after,
         "deviation_left": expected.share,
         "halved": expected.share < HALF,
-        "desired": expected.is_desired,
+        "of_interest": expected.is_of_interest,
     }
 
 

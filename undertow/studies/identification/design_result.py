@@ -18,12 +18,12 @@ class ExpectedDeviation(NamedTuple):
     Attributes:
         parameter: with its deviation beforehand.
         share: deviation afterwards as a share of that beforehand.
-        is_desired: whether the experiment is for it.
+        is_of_interest: whether the experiment is for it.
     """
 
     parameter: FreeParameter
     share: float
-    is_desired: bool
+    is_of_interest: bool
 
     @property
     def before(self) -> float:
@@ -70,7 +70,7 @@ class DesignRequest(NamedTuple):
     Attributes:
         room: m, along the heading, across, vertical.
         duration: s.
-        desired: names, groups or patterns of free parameters; () for all.
+        of_interest: names, groups or patterns of free parameters; () for all.
         free: parameters that the identification will estimate; () for the usual ones.
         priors: deviations beforehand that are not in the vehicle file.
         depth: of the station, m; None for that of the reference, or less deep a room below the surface.
@@ -81,7 +81,7 @@ class DesignRequest(NamedTuple):
 
     room: tuple[float, float, float]
     duration: float = 300.0
-    desired: tuple[str, ...] = ()
+    of_interest: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     priors: Mapping[str, UncertainNumber] = {}
     depth: float | None = None

@@ -17,6 +17,7 @@ from undertow.studies.identification.simulated_dive import SENSORS
 
 _MEASURED = ("position", "velocity")  # with a signal `measured_...` beside
 _EXACT = 1e-9  # m, rad, m/s, rad/s: less noise is none
+_AT_ONCE = 32  # segments that one program computes: those of candidates and of a script of five minutes alike
 _LAGS = 40  # steps over which errors of a navigation filter are correlated at most
 # Sensors of a vehicle with an acoustic position, an attitude reference, a DVL and gyros, where a scenario has none.
 _USUAL = [SENSORS[name] for name in ("position", "attitude", "body_velocity", "angular_velocity", "position")]
@@ -104,14 +105,23 @@ def information_of(
     """
     dive, noise = simulated.dive, simulated.noise
     segments = segments_of([dive], length)
-    if only is not None:
-        segments = Segments(*(column[list(only)] for column in segments))
+    numbers = np.arange(len(segments.dive)) if only is None else np.array(only)
+    parts = [numbers[first : first + _AT_ONCE] for first in range(0, len(numbers), _AT_ONCE)]
+    return np.concatenate([_information(model, z, segments, noise, dive.step, part) for part in parts])
+
+
+def _information(
+    model: IdentificationModel, z: np.ndarray, segments: Segments, noise: np.ndarray, step: float, numbers: np.ndarray
+) -> np.ndarray:
+    """Information of some segments, with the program for `_AT_ONCE` of them."""
+    padded = np.concatenate([numbers, np.repeat(numbers[-1:], _AT_ONCE - len(numbers))])
+    segments = Segments(*(column[padded] for column in segments))
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     with np.errstate(divide="ignore"):
         weights = np.where(counts > 0, counts / noise**2, 0.0)
     starts = jnp.zeros((len(segments.dive), 12))
-    parts = normal_equations(model, jnp.asarray(z), starts, segments, jnp.asarray(weights), dive.step)
+    parts = normal_equations(model, jnp.asarray(z), starts, segments, jnp.asarray(weights), step)
     aa, ab, bb = (np.asarray(part) for part in (parts.aa, parts.ab, parts.bb))
     reduction = np.linalg.solve(bb + np.eye(12), ab.transpose(0, 2, 1))
     information = aa - np.einsum("spq,sqr->spr", ab, reduction)
-    return (information + information.transpose(0, 2, 1)) / 2
+    return (information[: len(numbers)] + information[: len(numbers)].transpose(0, 2, 1)) / 2
