@@ -10,6 +10,7 @@ from undertow.core.number_text import plain
 from undertow.report.answers.plain_answer import PlainAnswer
 
 _SHOWN = 4  # parameters named in a line
+_ALIKE = 1.0  # difference of mean fits, %, that is none
 _FAR = 4.0  # deviations beforehand, from which on an estimate is not believable
 _AS_BEFORE = "their intervals are as wide as what was known before"
 
@@ -24,16 +25,8 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
     fits = mean_fits(data)
     seconds = sum(dive["duration"] for dive in data["dives"])
     dives = f"{len(data['dives'])} dives" if len(data["dives"]) > 1 else "one dive"
-    better = None
-    if fits:
-        own, before = (np.mean([pair[i] for pair in fits.values()]) for i in (0, 1))
-        better = bool(own > before)
+    better, verdict = _compared(fits)
     far = [name for name, p in data["parameters"].items() if abs(p["shift"]) > _FAR]
-    verdict = {
-        True: "The identified model predicts dives that it has not seen better than the vehicle file.",
-        False: "The identified model predicts dives that it has not seen worse than the vehicle file: do not use it.",
-        None: "The model was not judged on a dive that it has not seen.",
-    }[better]
     if far:
         better = False
         verdict = "The identified model is not believable: do not use it."
@@ -49,6 +42,19 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *([] if folder is None else [f"Next: undertow simulate {folder / 'identified.yaml'}"]),
     )
     return PlainAnswer(better, verdict, lines)
+
+
+def _compared(fits: Mapping[str, tuple[float, float]]) -> tuple[bool | None, str]:
+    """Whether the model is as good as the vehicle file or better; None without a dive to judge it on."""
+    if not fits:
+        return None, "The model was not judged on a dive that it has not seen."
+    own, before = (float(np.mean([pair[i] for pair in fits.values()])) for i in (0, 1))
+    predicts = "The identified model predicts dives that it has not seen"
+    if abs(own - before) < _ALIKE:
+        return True, f"{predicts} as well as the vehicle file."
+    if own > before:
+        return True, f"{predicts} better than the vehicle file."
+    return False, f"{predicts} worse than the vehicle file: do not use it."
 
 
 def mean_fits(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
