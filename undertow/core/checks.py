@@ -96,6 +96,25 @@ def finite(name: str, value: Any, unit: str = "") -> None:
     _each(name, value, lambda x: abs(x) < np.inf, "be a finite number", unit)
 
 
+def rows_over_time(name: str, rows: Any, columns: str, width: int | None = None) -> None:
+    """Check rows of a time and other numbers: two or more of them, finite, with times that increase.
+
+    Args:
+        name: of the value.
+        rows: shape (rows, columns).
+        columns: their names, for messages.
+        width: number of columns; None for two or more.
+    """
+    shape = np.shape(rows)
+    if len(shape) != 2 or shape[0] < 2 or (shape[1] < 2 if width is None else shape[1] != width):
+        raise BadInput(name, f"have two or more rows ({columns})", f"of shape {shape}")
+    finite(name, rows)
+    if known(rows):
+        steps = np.diff(np.asarray(rows)[:, 0])
+        if not (steps > 0).all():
+            raise BadInput(name, "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+
+
 def numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """A value as numbers of a shape.
 

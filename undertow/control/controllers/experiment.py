@@ -13,15 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from undertow.control.controllers.elapsed_time import EARLY, ElapsedTime, time_at_begin
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.errors import BadInput
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.param import Param, param
 from undertow.core.signals import Signal
-
-# Share of the smallest interval by which a row counts early: times of steps are sums, and may be a rounding below.
-_EARLY = 1e-2
 
 
 class Abort(enum.IntEnum):
@@ -36,11 +34,10 @@ class Abort(enum.IntEnum):
 
 
 class ExperimentState(NamedTuple):
-    """State z: that of the law, the time, what rounding has taken from it (Kahan's summation), and why it ended."""
+    """State z: that of the law, the time, and why the excitation ended."""
 
     law: PyTree
-    time: Float[Array, ""]  # s
-    rest: Float[Array, ""]  # s
+    time: ElapsedTime
     abort: Float[Array, ""]  # code of `Abort`
 
 
@@ -104,14 +101,9 @@ class Experiment(AbstractController):
 
     def __init__(self, law: AbstractController, limits: AbortLimits, samples, inverse_mass_matrix):
         rows = np.asarray(samples, dtype=float)
-        if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] != 7:
-            raise BadInput("samples", "have two or more rows (t, X, Y, Z, K, M, N)", f"of shape {rows.shape}")
-        checks.finite("samples", rows)
-        steps = np.diff(rows[:, 0])
-        if not (steps > 0).all():
-            raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+        checks.rows_over_time("samples", rows, "t, X, Y, Z, K, M, N", width=7)
         self.law, self.limits, self.inverse_mass_matrix = law, limits, inverse_mass_matrix
-        self.samples, self.early = jnp.asarray(rows), jnp.asarray(_EARLY * steps.min())
+        self.samples, self.early = jnp.asarray(rows), jnp.asarray(EARLY * np.diff(rows[:, 0]).min())
 
     @property
     def model(self) -> Model:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -119,8 +111,7 @@ class Experiment(AbstractController):
         return self.law.model
 
     def init(self, y: Measurement, r: Target) -> ExperimentState:
-        zero = jnp.zeros_like(y.position[0])
-        return ExperimentState(self.law.init(y, r), zero, zero, zero)
+        return ExperimentState(self.law.init(y, r), time_at_begin(y.position), jnp.zeros_like(y.position[0]))
 
     def command(self, z: ExperimentState, y: Measurement, r: Target):
         u, signals = self.law.command(z.law, y, self._accelerated(z, y, r))
@@ -128,12 +119,10 @@ class Experiment(AbstractController):
 
     def advance(self, z: ExperimentState, y: Measurement, r: Target, u_applied, dt) -> ExperimentState:
         law = self.law.advance(z.law, y, self._accelerated(z, y, r), u_applied, dt)
-        step = dt - z.rest
-        time = z.time + step
         abort = jnp.where(z.abort > 0, z.abort, self.limits.exceeded(y, r, u_applied))
-        now, times = z.time + self.early, self.samples[:, 0]
+        now, times = z.time.seconds + self.early, self.samples[:, 0]
         runs = (now >= times[0]) & (now < times[-1])
-        return ExperimentState(law, time, (time - z.time) - step, jnp.where(runs, abort, z.abort))
+        return ExperimentState(law, z.time.after(dt), jnp.where(runs, abort, z.abort))
 
     def signals(self):
         return self.law.signals() | {
@@ -158,7 +147,7 @@ class Experiment(AbstractController):
 
     def _wrench(self, z: ExperimentState) -> Float[Array, "6"]:
         times = self.samples[:, 0]
-        count = jnp.searchsorted(times, z.time + self.early, side="right")
+        count = jnp.searchsorted(times, z.time.seconds + self.early, side="right")
         row = self.samples[jnp.clip(count - 1, 0, times.shape[0] - 1), 1:]
         acts = (count > 0) & (count < times.shape[0]) & (z.abort == 0)
         return jnp.where(acts, row, 0.0)

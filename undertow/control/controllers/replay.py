@@ -1,13 +1,12 @@
 """The thruster commands of a log, whatever the vehicle does: open loop."""
 
-from typing import NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from undertow.control.controllers.elapsed_time import EARLY, ElapsedTime, time_at_begin
 from undertow.core import checks
 from undertow.core.contracts import AbstractController, Measurement, Model, Target
 from undertow.core.errors import BadInput
@@ -15,19 +14,9 @@ from undertow.core.param import Param, param
 from undertow.logs.log import Log
 from undertow.logs.motion import inputs_of
 
-# Share of the median interval by which a sample counts early: times of steps are sums, and may be a rounding below.
-_EARLY = 1e-2
-
-
-class ReplayState(NamedTuple):
-    """State z: the time, and what rounding has taken from it (Kahan's summation)."""
-
-    time: Float[Array, ""]  # s
-    rest: Float[Array, ""]  # s
-
 
 class Replay(AbstractController):
-    """Inputs from samples, held or linear in between; the first before, the last after all of them.
+    """Inputs from samples, held or linear in between; the first before, the last after all of them. State z: the time.
 
     Raises:
         BadInput: fewer than two samples, not finite, times that do not increase, or another number of inputs.
@@ -40,37 +29,29 @@ class Replay(AbstractController):
 
     def __init__(self, model: Model, commands, linear: bool):
         rows = np.asarray(commands, dtype=float)
-        if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] < 2:
-            raise BadInput("commands", "have two or more rows (t, u1, u2, ...)", f"of shape {rows.shape}")
-        checks.finite("commands", rows)
-        steps = np.diff(rows[:, 0])
-        if not (steps > 0).all():
-            raise BadInput("commands", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+        checks.rows_over_time("commands", rows, "t, u1, u2, ...")
         inputs = _inputs(model)
         if rows.shape[1] != 1 + inputs:
             must = f"have {inputs} inputs, as many as the vehicle has thrusters"
             raise BadInput("commands", must, f"those of {rows.shape[1] - 1}", hint="Is it the log of another vehicle?")
         self.model, self.linear = model, linear
-        self.commands, self.early = jnp.asarray(rows), jnp.asarray(_EARLY * np.median(steps))
+        self.commands, self.early = jnp.asarray(rows), jnp.asarray(EARLY * np.median(np.diff(rows[:, 0])))
 
-    def init(self, y: Measurement, r: Target) -> ReplayState:
-        zero = jnp.zeros_like(y.position[0])
-        return ReplayState(zero, zero)
+    def init(self, y: Measurement, r: Target) -> ElapsedTime:
+        return time_at_begin(y.position)
 
-    def command(self, z: ReplayState, y: Measurement, r: Target):
+    def command(self, z: ElapsedTime, y: Measurement, r: Target):
         times, inputs = self.commands[:, 0], self.commands[:, 1:]
         if not self.linear:
-            i = jnp.clip(jnp.searchsorted(times, z.time + self.early, side="right") - 1, 0, times.shape[0] - 1)
+            i = jnp.clip(jnp.searchsorted(times, z.seconds + self.early, side="right") - 1, 0, times.shape[0] - 1)
             return inputs[i], {}
-        t = jnp.clip(z.time, times[0], times[-1])
+        t = jnp.clip(z.seconds, times[0], times[-1])
         i = jnp.clip(jnp.searchsorted(times, t, side="right") - 1, 0, times.shape[0] - 2)
         share = (t - times[i]) / (times[i + 1] - times[i])
         return inputs[i] + share * (inputs[i + 1] - inputs[i]), {}
 
-    def advance(self, z: ReplayState, y: Measurement, r: Target, u_applied, dt) -> ReplayState:
-        step = dt - z.rest
-        time = z.time + step
-        return ReplayState(time, (time - z.time) - step)
+    def advance(self, z: ElapsedTime, y: Measurement, r: Target, u_applied, dt) -> ElapsedTime:
+        return z.after(dt)
 
     def signals(self):
         return {}

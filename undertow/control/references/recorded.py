@@ -6,7 +6,6 @@ from jaxtyping import Float
 
 from undertow.core import checks
 from undertow.core.contracts import AbstractReference, Target
-from undertow.core.errors import BadInput
 from undertow.core.numerics.spline import clamped_slopes, spline
 from undertow.core.param import Param, param
 
@@ -23,12 +22,7 @@ class Recorded(AbstractReference):
 
     def __init__(self, samples):
         rows = np.asarray(samples, dtype=float)
-        if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] < 2:
-            raise BadInput("samples", "have two or more rows (t, p1, p2, ...)", f"of shape {rows.shape}")
-        checks.finite("samples", rows)
-        steps = np.diff(rows[:, 0])
-        if not (steps > 0).all():
-            raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+        checks.rows_over_time("samples", rows, "t, p1, p2, ...")
         self.samples = jnp.asarray(rows)
         self.velocities = jnp.asarray(clamped_slopes(rows[:, 0], rows[:, 1:]))
 

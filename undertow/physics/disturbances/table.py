@@ -2,7 +2,6 @@
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
@@ -22,14 +21,7 @@ class TabulatedDisturbance(AbstractSmoothDisturbance):
     samples: Float[Param, "rows columns"] = param("s, then m/s^2 or rad/s^2", "rows (t, d1, d2, ...)")
 
     def __check_init__(self):
-        shape = np.shape(self.samples)
-        if len(shape) != 2 or shape[0] < 2 or shape[1] < 2:
-            raise BadInput("samples", "have two or more rows (t, d1, d2, ...)", f"of shape {shape}")
-        checks.finite("samples", self.samples)
-        if checks.known(self.samples):
-            steps = np.diff(np.asarray(self.samples)[:, 0])
-            if not (steps > 0).all():
-                raise BadInput("samples", "have increasing times", f"row {int(np.argmin(steps > 0)) + 2} too early")
+        checks.rows_over_time("samples", self.samples, "t, d1, d2, ...")
 
     def at(self, realization, t, pose, load: Load) -> Load:
         axes = load.acceleration.shape[0]
