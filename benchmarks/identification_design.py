@@ -13,6 +13,7 @@ import numpy as np
 
 from undertow.core.runtime import in_precision
 from undertow.scenario.build import build
+from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.studies.identification.design import STEP, design
 from undertow.studies.identification.design_result import DesignRequest
@@ -21,7 +22,6 @@ from undertow.studies.identification.free_parameters import USUALLY_FREE, chosen
 from undertow.studies.identification.model import Unknowns
 from undertow.studies.identification.output_error import fit, scores_of
 from undertow.studies.identification.rehearsal import rehearse, with_vehicle
-from undertow.studies.identification.scenario_vehicle import vehicle_of
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import uncertainty_of
 

@@ -7,6 +7,7 @@ import pytest
 from undertow.core.errors import BadInput
 from undertow.core.runtime import in_precision
 from undertow.scenario.build import build
+from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.studies.identification.block_choice import greedy_choice, least_shares, loss, shares_left
 from undertow.studies.identification.design import STEP, design
 from undertow.studies.identification.design_result import DesignRequest
@@ -18,7 +19,6 @@ from undertow.studies.identification.free_parameters import chosen, parameters_o
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, all_residuals, model_of
 from undertow.studies.identification.rehearsal import rehearse, with_vehicle
-from undertow.studies.identification.scenario_vehicle import vehicle_of
 from undertow.studies.identification.segments import segments_of
 
 NOISE = [0.02, 0.02, 0.02, 0.01, 0.01, 0.01]

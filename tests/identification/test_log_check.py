@@ -1,8 +1,8 @@
 """Checks of a log before an identification: each defect is found and named, and a sound log passes."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
+from telegraph_dive import telegraph_dive
 
 from undertow.core.runtime import in_precision
 from undertow.logs import frames
@@ -11,9 +11,7 @@ from undertow.logs.log_signals import Series
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
-from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.log_check import check_dive
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
 
 DURATION = 40.0  # s
 NOISE = {"position": 0.01, "attitude": 0.005, "body_velocity": 0.01, "angular_velocity": 0.005}
@@ -182,12 +180,7 @@ def test_nothing_makes_the_checks_fail(change):
 def test_a_dive_of_a_vehicle_passes_and_a_late_input_is_noticed():
     with in_precision("float64"):
         plant = hybrid_vehicle(bluerov2_heavy(), t200("static"))
-        generator = np.random.default_rng(5)
-        thrust = telegraph_wrenches(generator, DURATION, np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0]))
-        thrust = thrust @ np.linalg.pinv(np.asarray(plant.thruster_matrix)).T
-        volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-        vehicle = prior_vehicle(plant).with_values({"net_buoyancy": jnp.asarray(3.0)})
-        log = simulated_log(vehicle, volts, generator)
+        log = telegraph_dive(plant, {"net_buoyancy": 3.0}, 5, DURATION)
         assert check_dive(log, log["input"], plant).findings == ()
         late = log["input"]._replace(time=log["input"].time + 0.3)
         checked = check_dive(log, late, plant)

@@ -2,11 +2,11 @@
 
 import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
+from telegraph_dive import telegraph_dive
 
 import undertow as ut
 from undertow.core.measurement import BODY_AXES
@@ -24,12 +24,10 @@ from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.segments import segments_of
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
 from undertow.studies.identification.validation import whiteness
 
 pytestmark = pytest.mark.full
 
-AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 TRUTH = {"linear_damping.surge": 20.0, "quadratic_damping.surge": 90.0, "added_mass.heave": 24.0, "net_buoyancy": 2.0}
 SCENARIO = {
     "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
@@ -47,13 +45,8 @@ def plant():
 
 
 def dive_log(plant, seed, duration=60.0, truth=TRUTH):
-    generator = np.random.default_rng(seed)
     with in_precision("float64"):
-        inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
-        thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
-        volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-        vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
-        return simulated_log(vehicle, volts, generator)
+        return telegraph_dive(plant, truth, seed, duration)
 
 
 def test_scipy_finds_the_same_damping(plant):

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from telegraph_dive import telegraph_dive
 
 from undertow.core.runtime import in_precision
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
@@ -13,12 +14,11 @@ from undertow.studies.identification.free_parameters import axis_parameters, cho
 from undertow.studies.identification.gap_filling import filled
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.input_signs import input_gains
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.simulated_dive import simulated_log
 from undertow.studies.identification.weak_form import first_estimate
 from undertow.studies.identification.weak_problem import weak_problem
 
 TRUTH = {"added_mass.surge": 9.0, "quadratic_damping.sway": 160.0, "net_buoyancy": 3.0, "r_b.z": -0.02}
-AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 STEP = 0.05
 
 
@@ -28,19 +28,10 @@ def plant():
         return hybrid_vehicle(bluerov2_heavy(), t200("static"))
 
 
-def log_of(plant, seed, duration=60.0, **options):
-    generator = np.random.default_rng(seed)
-    inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
-    thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
-    volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-    vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in TRUTH.items()})
-    return simulated_log(vehicle, volts, generator, **options)
-
-
 @pytest.fixture(scope="module")
 def log(plant):
     with in_precision("float64"):
-        return log_of(plant, 2)
+        return telegraph_dive(plant, TRUTH, 2)
 
 
 def test_functions_have_integral_one_and_the_slope_of_a_ramp():

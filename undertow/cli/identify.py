@@ -1,18 +1,17 @@
 """`undertow identify`: the numbers of a vehicle from its logs, and how sure they are."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.options.identify import IdentifyCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
+from undertow.cli.stages import live_stages
 from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
@@ -64,7 +63,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         draft.publish()  # before the figures, which may fail
         warn_of(write_identification(scenario.stem, result, data, draft.path, folder, command.pdf))
     if command.details:
-        console.print(_table(data))
+        console.print(interval_table(data["parameters"], has_prior=True))
     print_lines(console, [*answer_of_identification(data, folder).text, f"Results: {folder}"])
     return DONE
 
@@ -85,26 +84,17 @@ def priors_of(words: Sequence[str]) -> dict[str, UncertainNumber]:
     return priors
 
 
-@contextlib.contextmanager
-def live_stages(console: Console) -> Iterator[Callable[[str], None]]:
-    """Show the current stage and the time."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
-        task = live.add_task("starting")
+def interval_table(parameters: Mapping[str, Any], has_prior: bool) -> Table:
+    """Parameters of an identification.
 
-        def say(stage: str) -> None:
-            live.update(task, description=stage)
-            if not console.is_terminal:
-                console.print(stage, highlight=False)
-
-        yield say
-
-
-def _table(data: Mapping[str, Any]):
-    table = titled(
-        "Parameters, with 95 % intervals", "parameter", *map(numbers, ("file", "estimate", "from", "to")), "unit", ""
-    )
-    for name, parameter in data["parameters"].items():
-        cells = (plain(parameter[key]) for key in ("prior", "value", "low", "high"))
-        table.add_row(in_words(name), *cells, parameter["unit"], parameter["verdict"])
+    Args:
+        parameters: as in identification.json, by name.
+        has_prior: whether to show the values of the file.
+    """
+    shown = {"prior": "file", "value": "estimate", "low": "from", "high": "to"}
+    keys = [key for key in shown if has_prior or key != "prior"]
+    columns = ("parameter", *map(numbers, (shown[key] for key in keys)), "unit", "")
+    table = titled("Parameters, with 95 % intervals", *columns)
+    for name, parameter in parameters.items():
+        table.add_row(in_words(name), *(plain(parameter[key]) for key in keys), parameter["unit"], parameter["verdict"])
     return table

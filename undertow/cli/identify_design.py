@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from undertow.cli.exit_codes import DONE
-from undertow.cli.identify import live_stages, priors_of
+from undertow.cli.identify import priors_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.options.identify_design import IdentifyDesignCommand
 from undertow.cli.results_folder import output_folder, results_folder
+from undertow.cli.stages import live_stages
 from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.core.json_text import to_json
 from undertow.core.number_text import plain

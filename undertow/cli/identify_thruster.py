@@ -1,23 +1,21 @@
 """`undertow identify --thruster`: the numbers of a thruster from records of a test bench."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from undertow.cli.exit_codes import DONE, warn_of
-from undertow.cli.identify import live_stages
+from undertow.cli.identify import interval_table
 from undertow.cli.interruptible import interruptible
 from undertow.cli.options.identify import IdentifyCommand
 from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
-from undertow.cli.tables import numbers, print_lines, titled, wide_console
+from undertow.cli.stages import live_stages
+from undertow.cli.tables import print_lines, wide_console
 from undertow.core import checks
 from undertow.core.errors import BadInput, error_location
 from undertow.core.json_text import to_json
-from undertow.core.number_text import plain
 from undertow.core.runtime import in_precision
 from undertow.physics.thrusters.thruster import AbstractThruster
-from undertow.report.answers.identification_answer import in_words
 from undertow.report.answers.thruster_answer import answer_of_thruster
 from undertow.report.thruster_page import write_thruster_page
 from undertow.scenario.factory import make
@@ -55,7 +53,7 @@ def identify_bench(command: IdentifyCommand) -> int:
         draft.publish()  # before the figures, which may fail
         warn_of(write_thruster_page(title, result, others, data, draft.path, folder, command.pdf))
     if command.details:
-        console.print(_table(data["forms"][0]))
+        console.print(interval_table(data["forms"][0]["parameters"], has_prior=False))
     print_lines(console, [*answer_of_thruster(data, folder).text, f"Results: {folder}"])
     return DONE
 
@@ -67,12 +65,3 @@ def _others(names: Sequence[str]) -> dict[str, AbstractThruster]:
         with error_location("--compare"), in_precision("float64"):
             others[name], _ = make("thrusters", name, Path())
     return others
-
-
-def _table(form: Mapping[str, Any]):
-    columns = ("parameter", *map(numbers, ("estimate", "from", "to")), "unit", "")
-    table = titled("Parameters, with 95 % intervals", *columns)
-    for name, parameter in form["parameters"].items():
-        cells = (plain(parameter[key]) for key in ("value", "low", "high"))
-        table.add_row(in_words(name), *cells, parameter["unit"], parameter["verdict"])
-    return table

@@ -41,6 +41,21 @@ def new_lines(console: Console) -> Callable[[str], None]:
 
 
 @contextlib.contextmanager
+def live_stages(console: Console) -> Iterator[Callable[[str], None]]:
+    """A function that shows the current stage, with the time since the begin; as lines where there is no terminal."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
+        task = live.add_task("starting")
+
+        def say(stage: str) -> None:
+            live.update(task, description=stage)
+            if not console.is_terminal:
+                console.print(stage, highlight=False)
+
+        yield say
+
+
+@contextlib.contextmanager
 def shares(console: Console, remaining: bool = False) -> Iterator[Callable[[str, float], None]]:
     """A function that shows a message and the share done: as a bar on a terminal, as lines elsewhere.
 

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core.contracts import Inputs, Outputs
-from undertow.core.errors import BadInput
 from undertow.core.measurement import body_of
 from undertow.core.numerics.integrators import METHODS
 from undertow.core.numerics.random_keys import key_of_seed
@@ -21,6 +20,7 @@ from undertow.logs.log_signals import Series
 from undertow.logs.motion import LoggedMotion
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle, VehicleState
 from undertow.scenario.build import Built
+from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.simulation.loop.closed_loop import Realization
 
 RUN_IN = 2.0  # s; rotors forget within tenths of a second
@@ -87,18 +87,6 @@ def predict(
         dt = jnp.asarray(loop.dt, dtype=float)
         predicted = jax.device_get(_predicted(realization, windows, jnp.asarray(factors), dt, limited, settings))
     return PredictedMotion(np.asarray(predicted), loop.dt * stride * np.arange(1, steps // stride + 1))
-
-
-def vehicle_of(built: Built) -> HybridVehicle:
-    """The vehicle of a scenario.
-
-    Raises:
-        BadInput: its plant is none.
-    """
-    plant = built.closed_loop.plant
-    if not isinstance(plant, HybridVehicle):
-        raise BadInput("plant", "be a vehicle with thrusters", f"a {type(plant).__name__}")
-    return plant
 
 
 def starts_of(motion: LoggedMotion, inputs: Series, longest: float, every: float) -> np.ndarray:

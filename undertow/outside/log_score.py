@@ -17,9 +17,10 @@ from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_OUTPUTS
 from undertow.logs.log import Log
 from undertow.logs.motion import inputs_of, motion_of
-from undertow.outside.log_prediction import RUN_IN, logged, predict, starts_of, time_together, vehicle_of
+from undertow.outside.log_prediction import RUN_IN, logged, predict, starts_of, time_together
 from undertow.outside.log_signs import warnings_of_signs
 from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.scenario_vehicle import vehicle_of
 
 AXES = (*BODY_OUTPUTS, "surge", "sway", "heave", "p", "q", "r")
 UNITS = (*("m",) * 3, *("rad",) * 3, *("m/s",) * 3, *("rad/s",) * 3)

@@ -11,8 +11,9 @@ import numpy as np
 
 from undertow.logs.log_signals import Series
 from undertow.logs.motion import LoggedMotion
-from undertow.outside.log_prediction import logged, predict, starts_of, vehicle_of
+from undertow.outside.log_prediction import logged, predict, starts_of
 from undertow.scenario.build import Built
+from undertow.scenario.scenario_vehicle import vehicle_of
 
 _HORIZON = 0.5  # s
 _WINDOWS = 40  # at most

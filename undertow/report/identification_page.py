@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from undertow.core.atomic_io import write_whole
-from undertow.report.answers.identification_answer import answer_of_identification, in_words
+from undertow.report.answers.identification_answer import answer_of_identification, combination_in_words, in_words
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.identification import Series, free_run_figure, intervals_figure
 from undertow.report.figures.writing import Plots, save_all, small_png
 from undertow.report.formats import number, prose, unit
+from undertow.report.identified_numbers import VERDICTS, findings_of, interval_of
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 from undertow.studies.identification.identify import Identification
 from undertow.studies.identification.validation import AXES, whole_values
@@ -30,7 +31,6 @@ _SURE = (
     "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the "
     "model lacks: the free run above tells whether that matters."
 )
-_VERDICTS = {"determined": "determined", "partly": "partly determined", "unknown": "not determined"}
 
 
 def write_identification(
@@ -60,7 +60,7 @@ def write_identification(
         answer_block(answer_of_identification(data, folder)),
         pictures.get("free_run", Html("")),
         *(tag("p", prose(sentence)) for sentence in saved.failures),
-        section("dives", "The dives", _dives(data), *_findings(data)),
+        section("dives", "The dives", _dives(data), *findings_of(data)),
         section("numbers", "The numbers", pictures.get("intervals", Html("")), tag("p", prose(_SURE)), _numbers(data)),
         *_not_determined(data),
         section("prediction", "Prediction of dives not used", _fits(data), _ahead(data), _white(data)),
@@ -104,15 +104,10 @@ def _dives(data: Mapping[str, Any]) -> Html:
     return table(("log", join("duration, ", unit("s")), "measured"), rows, numeric=(1,))
 
 
-def _findings(data: Mapping[str, Any]) -> list[Html]:
-    return [bullets([prose(sentence) for sentence in data["findings"]])] if data["findings"] else []
-
-
 def _numbers(data: Mapping[str, Any]) -> Html:
     rows = []
     for name, parameter in data["parameters"].items():
-        interval = join(number(parameter["low"]), " to ", number(parameter["high"]))
-        verdict = _VERDICTS[parameter["verdict"]]
+        interval, verdict = interval_of(parameter), VERDICTS[parameter["verdict"]]
         values = (number(parameter["prior"]), number(parameter["value"]))
         rows.append((in_words(name), *values, interval, unit(parameter["unit"]), verdict))
     return table(("number", "file", "estimate", "95 % interval", "unit", ""), rows, numeric=(1, 2, 3))
@@ -121,12 +116,7 @@ def _numbers(data: Mapping[str, Any]) -> Html:
 def _not_determined(data: Mapping[str, Any]) -> list[Html]:
     if not data["undetermined"]:
         return []
-    sentences = []
-    for combination in data["undetermined"]:
-        sentence = combination["sentence"]
-        for name in combination["parameters"]:
-            sentence = sentence.replace(name, in_words(name))
-        sentences.append(prose(f"{sentence[0].upper()}{sentence[1:]}."))
+    sentences = [prose(f"{combination_in_words(combination)}.") for combination in data["undetermined"]]
     return [section("unknown", "What the dives do not tell", bullets(sentences))]
 
 

@@ -16,7 +16,8 @@ from undertow.report.answers.thruster_answer import NAMES, answer_of_thruster
 from undertow.report.figures.thruster_bench import bench_figure
 from undertow.report.figures.writing import save_all
 from undertow.report.formats import number, prose, unit
-from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
+from undertow.report.identified_numbers import VERDICTS, findings_of, interval_of
+from undertow.report.page import Html, document, figure, join, section, table, tag
 from undertow.studies.identification.bench.bench_response import settled_response
 from undertow.studies.identification.bench.bench_table import UNIT_OF
 from undertow.studies.identification.bench.identify_thruster import ThrusterIdentification
@@ -32,7 +33,6 @@ _SURE = (
     "too small, a load cell that is not calibrated, a supply that sags."
 )
 _GRID = 201
-_VERDICTS = {"determined": "determined", "partly": "partly determined", "unknown": "not determined"}
 
 
 def write_thruster_page(
@@ -72,7 +72,7 @@ def write_thruster_page(
         *(tag("p", prose(sentence)) for sentence in saved.failures),
         section("numbers", "The numbers", tag("p", prose(_SURE)), *(_numbers(form) for form in data["forms"])),
         section("prediction", "Prediction of rows left out", _errors(data)),
-        section("records", "The records", _records(data), *_findings(data)),
+        section("records", "The records", _records(data), *findings_of(data)),
     )
     write_whole(out / "identification.html", page)
     return saved.failures
@@ -91,11 +91,10 @@ def _plot(identification: ThrusterIdentification, others: Mapping[str, AbstractT
 def _numbers(form: Mapping[str, Any]) -> Html:
     rows = []
     for name, parameter in form["parameters"].items():
-        interval = join(number(parameter["low"]), " to ", number(parameter["high"]))
-        verdict = _VERDICTS[parameter["verdict"]]
+        interval, verdict = interval_of(parameter), VERDICTS[parameter["verdict"]]
         rows.append((in_words(name), number(parameter["value"]), interval, unit(parameter["unit"]), verdict))
     for direction, thrust in form["full_thrust"].items():
-        interval = join(number(thrust["low"]), " to ", number(thrust["high"]))
+        interval = interval_of(thrust)
         rows.append((f"full thrust, {direction}", number(thrust["value"]), interval, unit("N"), ""))
     kind = f"{NAMES[form['form']]} ({form['section']['kind']})"
     return table((kind, "estimate", "95 % interval", "unit", ""), rows, numeric=(1, 2))
@@ -122,7 +121,3 @@ def _records(data: Mapping[str, Any]) -> Html:
         rows.append((bench["name"], str(bench["rows"]), supply, duration, ", ".join(bench["measured"])))
     head = ("file", "rows", join("supply, ", unit("V")), join("duration, ", unit("s")), "measured")
     return table(head, rows, numeric=(1, 2, 3))
-
-
-def _findings(data: Mapping[str, Any]) -> list[Html]:
-    return [bullets([prose(sentence) for sentence in data["findings"]])] if data["findings"] else []

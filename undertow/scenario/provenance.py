@@ -79,6 +79,21 @@ def file_hash(path: Path) -> str:
         return ""
 
 
+def recording_hash(path: Path) -> str:
+    """SHA-256 of a file, or of all files of a folder, such as a bag of ROS 2, in the order of their names.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    for file in (file for file in files if file.is_file()):
+        with file.open("rb") as stream:
+            while block := stream.read(_PART):
+                digest.update(block)
+    return digest.hexdigest()
+
+
 def _of_values(variable: xr.Variable) -> str:
     numbers = variable.dtype.kind in "fiub"
     form = [*map(str, variable.dims), *map(str, variable.shape), variable.dtype.str if numbers else "text"]

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Priors, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,13 +62,7 @@ class IdentifyCommand(Command):
             "added mass, damping, restoring, gain, reverse gain and lag of the thrusters.",
         ),
     ] = None
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE+-DEVIATION",
-            help="What is known of a parameter beforehand, as mass=11.5+-0.2 or mass=11.5+-2%; may be repeated.",
-        ),
-    ] = None
+    prior: Priors = None
     per_axis: Annotated[
         bool,
         typer.Option(

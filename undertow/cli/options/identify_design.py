@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Details, Overwrite, ScenarioFile, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Priors, ScenarioFile, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,13 +41,7 @@ class IdentifyDesignCommand(Command):
         list[str] | None,
         typer.Option(metavar="NAME", help="As for `undertow identify`: what will be estimated; may be repeated."),
     ] = None
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE+-DEVIATION",
-            help="What is known of a parameter beforehand, as mass=11.5+-0.2 or mass=11.5+-2%; may be repeated.",
-        ),
-    ] = None
+    prior: Priors = None
     depth: Annotated[
         float | None,
         typer.Option(metavar="M", help="Depth of the station. Default: that of the reference, or enough for the room."),

@@ -31,6 +31,15 @@ Pdf = Annotated[
     ),
 ]
 
+Priors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--prior",
+        metavar="NAME=VALUE+-DEVIATION",
+        help="What is known of a parameter beforehand, as mass=11.5+-0.2 or mass=11.5+-2%; may be repeated.",
+    ),
+]
+
 Replay = Annotated[
     bool,
     typer.Option(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from undertow.core.number_text import plain
-from undertow.report.answers.identification_answer import in_words
+from undertow.report.answers.identification_answer import combination_in_words, in_words
 from undertow.report.answers.plain_answer import PlainAnswer
 
 _SHOWN = 4  # parameters named in a line
@@ -63,10 +63,7 @@ def _kept(of_interest: Mapping[str, Any]) -> Iterator[str]:
 
 def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
     for combination in data["undetermined"][:1]:
-        sentence = combination["sentence"]
-        for name in combination["parameters"]:
-            sentence = sentence.replace(name, in_words(name))
-        yield f"{sentence[0].upper()}{sentence[1:]}: weigh the vehicle, or measure a thrust, to separate them."
+        yield f"{combination_in_words(combination)}: weigh the vehicle, or measure a thrust, to separate them."
 
 
 def _room(data: Mapping[str, Any]) -> str:

@@ -116,10 +116,15 @@ def _unknown(data: Mapping[str, Any]) -> Iterator[str]:
 def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
     for combination in data["undetermined"][:1]:
         if len(combination["parameters"]) > 1:
-            sentence = combination["sentence"]
-            for name in combination["parameters"]:
-                sentence = sentence.replace(name, in_words(name))
-            yield f"{sentence[0].upper()}{sentence[1:]}: weigh the vehicle, or measure a thrust, to separate them."
+            yield f"{combination_in_words(combination)}: weigh the vehicle, or measure a thrust, to separate them."
+
+
+def combination_in_words(combination: Mapping[str, Any]) -> str:
+    """Which parameters dives do not separate, without a full stop at the end."""
+    sentence = combination["sentence"]
+    for name in combination["parameters"]:
+        sentence = sentence.replace(name, in_words(name))
+    return f"{sentence[0].upper()}{sentence[1:]}"
 
 
 def in_words(name: str) -> str:

@@ -17,6 +17,7 @@ from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_AXES
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, build, in_its_precision
+from undertow.scenario.scenario_vehicle import deviations_in, vehicle_of
 from undertow.studies.identification.block_choice import greedy_choice, shares_left
 from undertow.studies.identification.design_result import Design, DesignRequest, ExpectedDeviation
 from undertow.studies.identification.dive_information import information_of
@@ -29,11 +30,10 @@ from undertow.studies.identification.experiment_scenario import (
     station_of,
     with_supervisor,
 )
-from undertow.studies.identification.free_parameters import chosen, parameters_of
+from undertow.studies.identification.free_parameters import chosen, chosen_in, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.rehearsal import Rehearsal, rehearse, with_vehicle
-from undertow.studies.identification.scenario_vehicle import deviations_in, vehicle_of
 from undertow.studies.identification.uncertainty import undetermined
 
 Say = Callable[[str], None]
@@ -108,8 +108,7 @@ def _slots(request: DesignRequest) -> int:
 def _free(built: Built, plant: HybridVehicle, request: DesignRequest):
     """The model, its free parameters, and the numbers of those of interest."""
     known = parameters_of(plant)
-    beforehand = {name: n for name, n in deviations_in(built).items() if name in known} | dict(request.priors)
-    parameters = chosen(known, request.free, beforehand)
+    parameters = chosen_in(built, known, request.free, request.priors)
     by_name = {parameter.name: parameter for parameter in parameters}
     names = {p.name for p in chosen(by_name, request.of_interest)} if request.of_interest else set(by_name)
     of_interest = [i for i, parameter in enumerate(parameters) if parameter.name in names]

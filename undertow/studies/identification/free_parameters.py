@@ -15,6 +15,8 @@ import numpy as np
 from undertow.core.errors import BadInput, nearest
 from undertow.core.measurement import BODY_AXES
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.build import Built
+from undertow.scenario.scenario_vehicle import deviations_in
 from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
 from undertow.scenario.vehicle_parameters import unit_of
 
@@ -167,6 +169,14 @@ def chosen(
             raise BadInput("free", "name parameters of the vehicle", pattern, hint=nearest(pattern, known))
         names += [name for name in matching if name not in names]
     return [_with_prior(known[name], priors[name]) if name in priors else known[name] for name in names]
+
+
+def chosen_in(
+    built: Built, known: Mapping[str, FreeParameter], free: Sequence[str], priors: Mapping[str, UncertainNumber]
+) -> list[FreeParameter]:
+    """The same, where the deviations of the vehicle file of a scenario are priors, too, unless others are given."""
+    of_file = {name: number for name, number in deviations_in(built).items() if name in known}
+    return chosen(known, free, of_file | dict(priors))
 
 
 def _in_group(name: str, group: str) -> bool:

@@ -1,7 +1,6 @@
 """What an identification leaves for the other commands: a vehicle file with deviations, and a scenario that uses it."""
 
 import datetime
-import hashlib
 import importlib.metadata
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,13 +9,13 @@ from typing import Any
 from undertow.core.atomic_io import write_whole
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
+from undertow.scenario.provenance import recording_hash
 from undertow.scenario.reading import dump
 from undertow.scenario.vehicle_parameters import is_outside
 from undertow.scenario.vehicle_writer import contents_of, plant_section, write_vehicle
 from undertow.studies.identification.identify import Identification
 
 _OF_INPUTS = ("axis_gain", "axis_lag", "axis_power")  # belong to the sticks of a pilot, and to no vehicle
-_BLOCK = 1 << 20  # bytes that are hashed at once
 
 
 def write_files(built: Built, identification: Identification, logs: Sequence[Path], folder: Path) -> None:
@@ -58,17 +57,6 @@ def _provenance(identification: Identification, logs: Sequence[Path]) -> dict[st
     return {
         "date": datetime.date.today().isoformat(),
         "version": importlib.metadata.version("undertow"),
-        "logs": [{"name": path.name, "sha256": sha256_of(path)} for path in logs],
+        "logs": [{"name": path.name, "sha256": recording_hash(path)} for path in logs],
         "estimated": [parameter.name for parameter in identification.parameters],
     }
-
-
-def sha256_of(path: Path) -> str:
-    """Hash of a file, or of all files of a folder in the order of their names."""
-    digest = hashlib.sha256()
-    files = sorted(path.rglob("*")) if path.is_dir() else [path]
-    for file in (file for file in files if file.is_file()):
-        with file.open("rb") as stream:
-            while block := stream.read(_BLOCK):
-                digest.update(block)
-    return digest.hexdigest()

@@ -11,14 +11,14 @@ from undertow.core.errors import BadInput
 from undertow.core.measurement import BODY_AXES
 from undertow.logs.log import Log
 from undertow.scenario.build import Built, in_its_precision
+from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
+from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen_in, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
 from undertow.studies.identification.output_error import Fit, fit, scores_of, without_step_error
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
-from undertow.studies.identification.scenario_vehicle import deviations_in, vehicle_of
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
     Combination,
@@ -134,8 +134,7 @@ def identify(
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
-    beforehand = {name: number for name, number in deviations_in(built).items() if name in known} | dict(priors or {})
-    asked = chosen(known, free, beforehand)
+    asked = chosen_in(built, known, free, priors or {})
     say("checking the logs")
     prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
     dives = [dive.dive for dive in prepared]

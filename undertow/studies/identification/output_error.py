@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from scipy.ndimage import median_filter
 
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.model import (
@@ -21,10 +20,12 @@ from undertow.studies.identification.model import (
     normal_equations,
     scores,
 )
+from undertow.studies.identification.outliers import NEIGHBOURS, from_neighbours
 from undertow.studies.identification.segments import Segments
 
-_NEIGHBOURS = 5  # samples, with whose median one is compared; what the model lacks moves all of them
-_OUTLIER = 4.0  # standard deviations from that median from which on a sample counts as an outlier
+# Standard deviations from the median of the neighbours, from which on a sample counts as an outlier: what the model
+# lacks moves all of them.
+_OUTLIER = 4.0
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -90,9 +91,10 @@ def fit(
     z = np.maximum(z, least)
     residuals = _residuals(model, segments, step, z, starts)
     noise = _first_noise(counts) if noise is None else noise
+    shares = _shares(residuals, counts)
     damping, converged, iteration = 1e-3, False, 0
     for iteration in range(1, _ITERATIONS + 1):
-        weights = _weights(residuals, counts, noise)
+        weights = shares * counts / noise**2
         cost = _cost(residuals, weights, z, starts)
         watch(iteration, cost)
         parts = _evaluated(model, segments, weights, step, z, starts)
@@ -101,14 +103,15 @@ def fit(
         if trial is not None:
             small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
             z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
-        new_noise = np.clip(_noise(residuals, counts), noise / _FASTEST, noise * _FASTEST)
+            shares = _shares(residuals, counts)
+        new_noise = np.clip(_noise(residuals, counts, shares), noise / _FASTEST, noise * _FASTEST)
         finite = np.isfinite(new_noise)
         steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
         noise = new_noise
         if steady and small:
             converged = True
             break
-    weights = _weights(residuals, counts, noise)
+    weights = shares * counts / noise**2
     parts = _evaluated(model, segments, weights, step, z, starts)
     information, _, reduction = _reduced(parts, z, starts, 0.0)
     cost = _cost(residuals, weights, z, starts)
@@ -202,18 +205,12 @@ def _first_noise(counts: np.ndarray) -> np.ndarray:
     return np.where(counts.sum(axis=(0, 1)) > 0, _FIRST_NOISE, np.inf)
 
 
-def _noise(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Standard deviation of a single sample for each kind of residual, outliers left out."""
-    shares = _shares(residuals, counts)
+def _noise(residuals: np.ndarray, counts: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Standard deviation of a single sample for each kind of residual, outliers counted by their shares."""
     squares = np.where(counts > 0, shares * counts * residuals**2, 0.0).sum(axis=(0, 1))
     samples = np.where(counts > 0, shares, 0.0).sum(axis=(0, 1))
     mean = squares / np.maximum(samples, 1e-300)
     return np.where(samples > 0, np.maximum(np.sqrt(mean), _SMALLEST_NOISE), np.inf)
-
-
-def _weights(residuals: np.ndarray, counts: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """1/variance of each residual, less for outliers, 0 without a sample."""
-    return _shares(residuals, counts) * counts / noise**2
 
 
 def _shares(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -222,8 +219,8 @@ def _shares(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
     for i in range(residuals.shape[2]):
         measured = counts[:, :, i] > 0
         of_one = residuals[:, :, i][measured] * np.sqrt(counts[:, :, i][measured])
-        if len(of_one) >= _NEIGHBOURS:
-            apart = np.abs(of_one - median_filter(of_one, _NEIGHBOURS, mode="nearest"))
+        if len(of_one) >= NEIGHBOURS:
+            apart = from_neighbours(of_one)
             limit = _OUTLIER * max(1.4826 * float(np.median(apart)), _SMALLEST_NOISE)
             shares[:, :, i][measured] = np.where(apart > limit, limit / np.maximum(apart, limit), 1.0)
     return shares

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from undertow.scenario.provenance import recording_hash
 from undertow.studies.identification.bench.bench_fit import JudgedFit
 from undertow.studies.identification.bench.bench_table import MEASURED, BenchTable
 from undertow.studies.identification.bench.identify_thruster import ThrusterIdentification, section_of
 from undertow.studies.identification.bench.thruster_form import joined
-from undertow.studies.identification.identified_files import sha256_of
 from undertow.studies.identification.result_data import interval_data
 from undertow.studies.identification.uncertainty import LEVEL
 
@@ -47,7 +47,7 @@ def _bench_data(table: BenchTable, file: Path) -> dict[str, Any]:
     supplies = np.unique(np.round(table.supply, 1))
     return {
         "name": table.name,
-        "sha256": sha256_of(file),
+        "sha256": recording_hash(file),
         "rows": len(table.volts),
         "supply": [float(supplies[0]), float(supplies[-1])],
         "duration": None if table.time is None else float(table.time[-1]),
@@ -56,8 +56,6 @@ def _bench_data(table: BenchTable, file: Path) -> dict[str, Any]:
 
 
 def _form_data(fit: JudgedFit, largest: float) -> dict[str, Any]:
-    covariance = fit.uncertainty.covariance
-    deviations = np.sqrt(np.diagonal(covariance))
     form = fit.problem.form
     thrust, half = fit.thrust_band(np.array([largest, -largest]))
     full = {
@@ -69,7 +67,7 @@ def _form_data(fit: JudgedFit, largest: float) -> dict[str, Any]:
         "form": form.name,
         "section": section_of(fit, largest),
         "parameters": {interval.parameter.name: interval_data(interval) for interval in fit.intervals},
-        "correlation": (covariance / np.outer(deviations, deviations)).tolist(),
+        "correlation": fit.uncertainty.correlation(range(len(fit.uncertainty.covariance))).tolist(),
         "full_thrust": full,
         "rms": {name: fit.rms(name) for name in fit.left_out},
         "rms_left_out": dict(fit.left_out),
