@@ -104,7 +104,7 @@ def test_an_abort_lasts_and_a_restart_goes_on(law):
         _, outside = excitations(part, (1.0,), at([0.6, 0, 0, 0, 0, 0]))
         restarted = part.restarted(part.knowledge(outside), at(STILL), target())
         assert int(restarted.abort) == Abort.DISTANCE
-        assert float(restarted.time.seconds) == 1.25
+        assert float(restarted.elapsed.time) == 1.25
         np.testing.assert_array_equal(part.command(restarted, at(STILL), target())[1]["excitation"], STILL)
 
 

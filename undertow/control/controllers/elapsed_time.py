@@ -12,14 +12,14 @@ EARLY = 1e-2
 class ElapsedTime(NamedTuple):
     """Time since the begin, and what rounding has taken from it (Kahan's summation)."""
 
-    seconds: Float[Array, ""]
+    time: Float[Array, ""]  # s
     rest: Float[Array, ""]  # s
 
     def after(self, dt: Float[Array, ""]) -> "ElapsedTime":
         """The time a step of dt (s) later."""
         step = dt - self.rest
-        seconds = self.seconds + step
-        return ElapsedTime(seconds, (seconds - self.seconds) - step)
+        time = self.time + step
+        return ElapsedTime(time, (time - self.time) - step)
 
 
 def time_at_begin(like: Array) -> ElapsedTime:

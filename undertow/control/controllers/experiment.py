@@ -37,7 +37,7 @@ class ExperimentState(NamedTuple):
     """State z: that of the law, the time, and why the excitation ended."""
 
     law: PyTree
-    time: ElapsedTime
+    elapsed: ElapsedTime
     abort: Float[Array, ""]  # code of `Abort`
 
 
@@ -120,9 +120,9 @@ class Experiment(AbstractController):
     def advance(self, z: ExperimentState, y: Measurement, r: Target, u_applied, dt) -> ExperimentState:
         law = self.law.advance(z.law, y, self._accelerated(z, y, r), u_applied, dt)
         abort = jnp.where(z.abort > 0, z.abort, self.limits.exceeded(y, r, u_applied))
-        now, times = z.time.seconds + self.early, self.samples[:, 0]
+        now, times = z.elapsed.time + self.early, self.samples[:, 0]
         runs = (now >= times[0]) & (now < times[-1])
-        return ExperimentState(law, z.time.after(dt), jnp.where(runs, abort, z.abort))
+        return ExperimentState(law, z.elapsed.after(dt), jnp.where(runs, abort, z.abort))
 
     def signals(self):
         return self.law.signals() | {
@@ -147,7 +147,7 @@ class Experiment(AbstractController):
 
     def _wrench(self, z: ExperimentState) -> Float[Array, "6"]:
         times = self.samples[:, 0]
-        count = jnp.searchsorted(times, z.time.seconds + self.early, side="right")
+        count = jnp.searchsorted(times, z.elapsed.time + self.early, side="right")
         row = self.samples[jnp.clip(count - 1, 0, times.shape[0] - 1), 1:]
         acts = (count > 0) & (count < times.shape[0]) & (z.abort == 0)
         return jnp.where(acts, row, 0.0)

@@ -43,9 +43,9 @@ class Replay(AbstractController):
     def command(self, z: ElapsedTime, y: Measurement, r: Target):
         times, inputs = self.commands[:, 0], self.commands[:, 1:]
         if not self.linear:
-            i = jnp.clip(jnp.searchsorted(times, z.seconds + self.early, side="right") - 1, 0, times.shape[0] - 1)
+            i = jnp.clip(jnp.searchsorted(times, z.time + self.early, side="right") - 1, 0, times.shape[0] - 1)
             return inputs[i], {}
-        t = jnp.clip(z.seconds, times[0], times[-1])
+        t = jnp.clip(z.time, times[0], times[-1])
         i = jnp.clip(jnp.searchsorted(times, t, side="right") - 1, 0, times.shape[0] - 2)
         share = (t - times[i]) / (times[i + 1] - times[i])
         return inputs[i] + share * (inputs[i + 1] - inputs[i]), {}
