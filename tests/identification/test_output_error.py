@@ -2,11 +2,12 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
-from telegraph_dive import telegraph_dive
+from telegraph_dive import AMPLITUDES, telegraph_dive
 
 import undertow as ut
 from undertow.core.measurement import BODY_AXES
@@ -24,6 +25,7 @@ from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
 from undertow.studies.identification.validation import whiteness
 
 pytestmark = pytest.mark.full
@@ -144,6 +146,21 @@ def test_files_say_what_was_found(identified, tmp_path):
             np.testing.assert_allclose(numbers[name].deviation, interval.deviation, rtol=1e-9)
     text = (tmp_path / "identified.yaml").read_text()
     assert "vehicle.yaml" in text and "adjusted" in text
+
+
+def test_of_sticks_only_the_vehicle_is_written(plant, tmp_path):
+    """Gains, lags and delay of the inputs along the axes are found, and are no numbers of the vehicle."""
+    generator = np.random.default_rng(6)
+    with in_precision("float64"):
+        gains = {f"axis_gain.{axis}": jnp.asarray(gain) for axis, gain in zip(BODY_AXES, AMPLITUDES, strict=True)}
+        lags = {f"axis_lag.{axis}": jnp.asarray(0.2) for axis in BODY_AXES}
+        vehicle = prior_vehicle(plant, has_axis_inputs=True).with_values(gains | lags)
+        log = simulated_log(vehicle, telegraph_wrenches(generator, 40.0, np.ones(6)), generator)
+    model = ut.identify(SCENARIO, log, free=("axis_gain", "axis_lag", "axis_delay", "net_buoyancy"), per_axis=True)
+    surge = model.parameters["axis_gain.surge"]
+    assert surge.low <= AMPLITUDES[0] <= surge.high
+    model.write(tmp_path)
+    assert set(read_vehicle(tmp_path / "vehicle.yaml").uncertainty.numbers) == {"net_buoyancy"}
 
 
 def test_deviations_of_a_vehicle_file_are_priors(identified, plant, tmp_path):

@@ -13,9 +13,8 @@ from undertow.scenario.provenance import recording_hash
 from undertow.scenario.reading import dump
 from undertow.scenario.vehicle_parameters import is_outside
 from undertow.scenario.vehicle_writer import contents_of, plant_section, write_vehicle
+from undertow.studies.identification.free_parameters import axis_parameters
 from undertow.studies.identification.identify import Identification
-
-_OF_INPUTS = ("axis_gain", "axis_lag", "axis_power")  # belong to the sticks of a pilot, and to no vehicle
 
 
 def write_files(built: Built, identification: Identification, logs: Sequence[Path], folder: Path) -> None:
@@ -32,10 +31,9 @@ def write_files(built: Built, identification: Identification, logs: Sequence[Pat
     """
     plant = built.closed_loop.plant
     assert isinstance(plant, HybridVehicle)  # it was identified
+    of_inputs = axis_parameters()  # belong to the sticks of a pilot, and to no vehicle
     chosen = [
-        (i, interval)
-        for i, interval in enumerate(identification.intervals)
-        if interval.parameter.name.partition(".")[0] not in _OF_INPUTS
+        (i, interval) for i, interval in enumerate(identification.intervals) if interval.parameter.name not in of_inputs
     ]
     values = {interval.parameter.name: interval.value for _, interval in chosen}
     deviations = {interval.parameter.name: interval.deviation for _, interval in chosen}
