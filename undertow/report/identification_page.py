@@ -23,7 +23,7 @@ _CAPTIONS = {
     "the beginning and is then driven by the logged inputs alone. The number at the right is the fit: 100 % is "
     "perfect, 0 % is no better than the mean.",
     "intervals": "Estimates as multiples of the value in the vehicle file, with their 95 % intervals. Blue: determined "
-    "by the dives. Orange: partly. Grey: the dives say nothing, and the value is that of the file. Numbers that are 0 "
+    "by the dives. Orange: partly. Grey: the interval is about as wide as what was known before. Numbers that are 0 "
     "in the file are in the table below only.",
 }
 _SURE = (
