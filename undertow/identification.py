@@ -12,6 +12,7 @@ from undertow.report.identification_page import identification_plots, in_noteboo
 from undertow.scenario.build import Built, build
 from undertow.scenario.log_file import read_log
 from undertow.scenario.reading import from_data, read
+from undertow.scenario.scenario_vehicle import with_reference
 from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
 from undertow.studies.identification import identify as identifying
 from undertow.studies.identification.identified_files import write_files
@@ -101,8 +102,8 @@ def identify(
     """
     several = [logs] if isinstance(logs, str | Path | Log) else list(logs)
     columns = None if mapping is None else Path(mapping)
+    built = build(with_reference(from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario))))
     opened = [log if isinstance(log, Log) else read_log(Path(log), columns) for log in several]
-    built = build(from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario)))
     result = identifying.identify(
         built,
         opened,

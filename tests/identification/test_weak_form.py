@@ -40,7 +40,7 @@ def test_functions_have_integral_one_and_the_slope_of_a_ramp():
     present = np.ones((count, 5), dtype=int)
     values = np.zeros((count, 14))
     values[:, 3] = 1.0
-    dive = Dive("still", 0.0, STEP, np.zeros((count, 8)), values, 0.5 * present, present)
+    dive = Dive("still", 0.0, STEP, np.zeros((count, 8)), values, 0.5 * present, 0.0 * present, present)
     problem = weak_problem([dive])
     time = STEP * np.arange(problem.test.shape[1])
     np.testing.assert_allclose(problem.test.sum(axis=1), 1.0, rtol=1e-12)
@@ -58,7 +58,9 @@ def test_velocities_come_from_poses_where_there_are_no_others():
     values[:, 3], values[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
     counts = np.zeros((count, 5), dtype=int)
     counts[:, :2] = 1
-    dive = Dive("circle", 0.0, STEP, np.zeros((count, 8)), values, 0.5 * np.ones((count, 5)), counts)
+    dive = Dive(
+        "circle", 0.0, STEP, np.zeros((count, 8)), values, 0.5 * np.ones((count, 5)), np.zeros((count, 5)), counts
+    )
     moving = filled(dive).values[2:-2, 7:13]
     np.testing.assert_allclose(moving, np.tile([0.5, 0, 0, 0, 0, 0.3], (len(moving), 1)), atol=1e-4)
 

@@ -21,6 +21,7 @@ from undertow.report.identification_page import write_identification
 from undertow.scenario.build import build
 from undertow.scenario.log_file import read_log
 from undertow.scenario.reading import read
+from undertow.scenario.scenario_vehicle import with_reference
 from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
 from undertow.studies.identification.identified_files import write_files
 from undertow.studies.identification.identify import identify
@@ -43,8 +44,8 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         live_stages(console) as say,
     ):
         say("reading")
+        built = build(with_reference(read(scenario, allow_code=command.allow_code)))
         logs = [read_log(path, command.mapping) for path in log_files]
-        built = build(read(scenario, allow_code=command.allow_code))
         result = interruptible(
             lambda: identify(
                 built,

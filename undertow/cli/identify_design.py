@@ -17,6 +17,7 @@ from undertow.report.answers.design_answer import answer_of_design
 from undertow.report.answers.identification_answer import in_words
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
+from undertow.scenario.scenario_vehicle import with_reference
 from undertow.studies.identification.design import design
 from undertow.studies.identification.design_data import design_data, write_experiment
 from undertow.studies.identification.design_result import DesignRequest
@@ -43,7 +44,7 @@ def identify_design(command: IdentifyDesignCommand) -> int:
         results_folder(folder, _WRITTEN, "experiment.json", command.overwrite) as draft,
         live_stages(console) as say,
     ):
-        built = build(read(command.scenario, allow_code=command.allow_code))
+        built = build(with_reference(read(command.scenario, allow_code=command.allow_code)))
         result = interruptible(lambda: design(built, request, say))
         data = design_data(result)
         (draft.path / "experiment.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")

@@ -3,8 +3,17 @@
 from undertow.core.errors import BadInput
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built
+from undertow.scenario.reading import Text
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.scenario.vehicle_file import vehicle_file_of
+
+
+_STATION = {"kind": "setpoint", "position": [0.0] * 6}
+
+
+def with_reference(scenario: Text) -> Text:
+    """A scenario of which only the vehicle matters: where it says no reference, it keeps station."""
+    return scenario._replace(data={"reference": _STATION} | scenario.data)
 
 
 def vehicle_of(built: Built) -> HybridVehicle:

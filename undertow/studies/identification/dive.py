@@ -34,6 +34,7 @@ class Dive(NamedTuple):
         inputs: mean over each step, shape (steps, N).
         values: position (m), quaternion, body velocity (m/s), body rates (rad/s), depth (m), shape (steps, 14).
         offsets: mean time of the samples after the begin of the step, as a share of it, shape (steps, 5).
+        spreads: variance of these times, in squares of a step, shape (steps, 5).
         counts: samples of each sensor, shape (steps, 5).
     """
 
@@ -43,12 +44,19 @@ class Dive(NamedTuple):
     inputs: np.ndarray
     values: np.ndarray
     offsets: np.ndarray
+    spreads: np.ndarray
     counts: np.ndarray
 
     @property
     def duration(self) -> float:
         """In s."""
         return self.step * len(self.inputs)
+
+    def part(self, name: str, first: int, steps: int) -> "Dive":
+        """Some of its steps."""
+        rows = slice(first, first + steps)
+        arrays = (self.inputs, self.values, self.offsets, self.spreads, self.counts)
+        return Dive(name, self.start + first * self.step, self.step, *(array[rows] for array in arrays))
 
     def sensors(self) -> list[str]:
         """Sensors with samples."""
@@ -76,15 +84,16 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
     steps = int((end - start) / step)
     if steps < 2:
         raise BadInput("log", "have inputs and a motion at the same time", log.source)
-    values, offsets, counts = [], [], []
+    values, offsets, spreads, counts = [], [], [], []
     for name in SENSORS:
         time, samples = measured.get(name, (np.zeros(0), np.zeros((0, COLUMNS[name]))))
         if len(samples) >= _AT_LEAST:
             good = ~outliers(samples)
             time, samples = time[good], samples[good]
-        mean, offset, count = _in_steps(time, samples, start, step, steps)
+        mean, offset, spread, count = _in_steps(time, samples, start, step, steps)
         values.append(mean)
         offsets.append(offset)
+        spreads.append(spread)
         counts.append(count)
     means = np.concatenate(values, axis=1)
     means[:, 3:7] /= np.maximum(np.linalg.norm(means[:, 3:7], axis=1, keepdims=True), 1e-12)
@@ -97,6 +106,7 @@ def dive_of(log: LogSignals, inputs: Series, step: float) -> Dive:
         inputs=_averaged(inputs, grid),
         values=means,
         offsets=np.stack(offsets, axis=1),
+        spreads=np.stack(spreads, axis=1),
         counts=np.stack(counts, axis=1),
     )
 
@@ -150,7 +160,7 @@ def _continuous(quaternions: np.ndarray) -> np.ndarray:
 
 
 def _in_steps(time: np.ndarray, samples: np.ndarray, start: float, step: float, steps: int):
-    """Means of samples and of their times in each step, and their number."""
+    """Means of samples and of their times in each step, variance of these times, and number of samples."""
     position = (time - start) / step
     inside = (position >= 0) & (position < steps)
     position, samples = position[inside], samples[inside]
@@ -158,8 +168,9 @@ def _in_steps(time: np.ndarray, samples: np.ndarray, start: float, step: float, 
     count = np.bincount(index, minlength=steps)
     divisor = np.maximum(count, 1)
     offset = np.bincount(index, position - index, minlength=steps) / divisor
+    spread = np.bincount(index, (position - index - offset[index]) ** 2, minlength=steps) / divisor
     mean = np.stack([np.bincount(index, column, minlength=steps) / divisor for column in samples.T], axis=1)
-    return mean, offset, count
+    return mean, offset, spread, count
 
 
 def _averaged(inputs: Series, grid: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ _DAMPING_SHARE = 1.0  # of the damping at that speed
 _ARM = 0.03  # m, of the centre of buoyancy
 _NET_WEIGHT = 0.02  # of the weight
 _DELAY = 0.1  # s, of commands
+_SHORTEST_LAG = 0.75  # steps of the integration; it becomes unstable at 0.36, and motors are faster at full speed
 
 
 class FreeParameter(NamedTuple):
@@ -59,7 +60,9 @@ class FreeParameter(NamedTuple):
     @property
     def least_z(self) -> float:
         """The number that belongs to the smallest value."""
-        return -math.inf if self.is_ratio else (self.least - self.prior) / self.deviation
+        if not self.is_ratio:
+            return (self.least - self.prior) / self.deviation
+        return math.log(self.least / self.prior) / self.deviation if self.least > 0 else -math.inf
 
 
 def parameters_of(plant: HybridVehicle) -> dict[str, FreeParameter]:
@@ -169,6 +172,15 @@ def chosen(
             raise BadInput("free", "name parameters of the vehicle", pattern, hint=nearest(pattern, known))
         names += [name for name in matching if name not in names]
     return [_with_prior(known[name], priors[name]) if name in priors else known[name] for name in names]
+
+
+def resolved_by(step: float, plant: HybridVehicle, parameters: Sequence[FreeParameter]) -> list[FreeParameter]:
+    """The same parameters, with a lag of the thrusters no shorter than a step of the integration (s) can show."""
+    time_constant = plant.thruster.actuator_model(plant.inputs(), False).time_constant()
+    if time_constant is None or not np.all(np.asarray(time_constant) > 0):
+        return list(parameters)
+    least = _SHORTEST_LAG * step / float(np.min(time_constant))
+    return [p._replace(least=min(least, p.prior)) if p.name == "lag" else p for p in parameters]
 
 
 def chosen_in(

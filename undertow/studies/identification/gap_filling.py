@@ -30,7 +30,9 @@ def filled(dive: Dive) -> Dive:
         if not dive.counts[:, SENSORS.index(name)].any():
             joined[:, columns] /= dive.step
     counts = np.stack(near, axis=1).astype(int)
-    return dive._replace(values=joined, offsets=np.full(counts.shape, 0.5), counts=counts)
+    return dive._replace(
+        values=joined, offsets=np.full(counts.shape, 0.5), spreads=np.zeros(counts.shape), counts=counts
+    )
 
 
 def usable_axes(complete: np.ndarray) -> np.ndarray:

@@ -14,10 +14,16 @@ from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen_in, parameters_of
+from undertow.studies.identification.free_parameters import (
+    FreeParameter,
+    axis_parameters,
+    chosen_in,
+    parameters_of,
+    resolved_by,
+)
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
-from undertow.studies.identification.output_error import Fit, fit, scores_of, without_step_error
+from undertow.studies.identification.output_error import Fit, fit, scores_of
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
@@ -139,7 +145,7 @@ def identify(
     prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
     dives = [dive.dive for dive in prepared]
     refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
-    parameters = [p for p in asked if p.name.rpartition(".")[2] not in refused]
+    parameters = [p for p in resolved_by(step, plant, asked) if p.name.rpartition(".")[2] not in refused]
     if not parameters:
         raise BadInput("logs", "determine a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)
@@ -148,9 +154,7 @@ def identify(
     say("estimating")
     estimate = _estimate(model, parameters, dives, segment, begin, say)
     segments = segments_of(dives, segment)
-    least = Unknowns(tuple(parameters), len(dives)).least()
     scores = scores_of(model, segments, step, estimate)
-    estimate = without_step_error(model, segments, step, estimate, least)
     parts, validation = None, ()
     if validate:
         parts, validation = _validated(model, parameters, dives, segment, estimate, say)
@@ -213,13 +217,7 @@ def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimat
 def parts_of(dive: Dive, number: int) -> list[Dive]:
     """A dive divided into equal parts."""
     length = len(dive.inputs) // number
-    parts = []
-    for i in range(number):
-        rows = slice(i * length, (i + 1) * length)
-        arrays = (dive.inputs[rows], dive.values[rows], dive.offsets[rows], dive.counts[rows])
-        name = f"{dive.name}, part {i + 1} of {number}"
-        parts.append(Dive(name, dive.start + i * length * dive.step, dive.step, *arrays))
-    return parts
+    return [dive.part(f"{dive.name}, part {i + 1} of {number}", i * length, length) for i in range(number)]
 
 
 def _with_nuisances(parts: np.ndarray | None, z: np.ndarray, count: int) -> np.ndarray | None:

@@ -66,7 +66,6 @@ class IdentificationModel(eqx.Module):
     names: tuple[str, ...] = eqx.field(static=True)
     is_ratio: tuple[bool, ...] = eqx.field(static=True)
     nuisance_deviations: Float[Array, "5"]
-    substeps: int = eqx.field(static=True, default=1)  # of the integration in each step
 
     def candidate(self, z: Float[Array, " unknowns"]) -> CandidateVehicle:
         """What a vector of unknown numbers stands for."""
@@ -84,7 +83,7 @@ class IdentificationModel(eqx.Module):
         """Residuals of a segment; `start` in standard deviations of the guess."""
         candidate = self.candidate(z)
         change = jnp.asarray(START_DEVIATION) * start
-        return residuals(candidate.vehicle, candidate.sensing(segment.dive), change, segment, step, self.substeps)
+        return residuals(candidate.vehicle, candidate.sensing(segment.dive), change, segment, step)
 
 
 def model_of(prior: PriorVehicle, parameters: Sequence[FreeParameter]) -> IdentificationModel:

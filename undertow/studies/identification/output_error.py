@@ -5,7 +5,6 @@ equations segment by segment, so that an iteration costs what the derivatives co
 would store a matrix of all residuals by all unknowns, which is a gigabyte for ten minutes of a dive.
 """
 
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -26,6 +25,7 @@ from undertow.studies.identification.segments import Segments
 # Standard deviations from the median of the neighbours, from which on a sample counts as an outlier: what the model
 # lacks moves all of them.
 _OUTLIER = 4.0
+_LARGE = 3.0  # standard deviations of the residual, below which no sample is an outlier
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -221,39 +221,22 @@ def _shares(residuals: np.ndarray, counts: np.ndarray) -> np.ndarray:
         of_one = residuals[:, :, i][measured] * np.sqrt(counts[:, :, i][measured])
         if len(of_one) >= NEIGHBOURS:
             apart = from_neighbours(of_one)
-            limit = _OUTLIER * max(1.4826 * float(np.median(apart)), _SMALLEST_NOISE)
+            scatter = max(_OUTLIER * _deviation(apart), _LARGE * _deviation(np.abs(of_one)))
+            limit = max(scatter, _OUTLIER * _SMALLEST_NOISE)
             shares[:, :, i][measured] = np.where(apart > limit, limit / np.maximum(apart, limit), 1.0)
     return shares
 
 
-def scores_of(
-    model: IdentificationModel, segments: Segments, step: float, estimate: Fit, residuals: np.ndarray | None = None
-) -> np.ndarray:
-    """Gradient of each step, (S, length, P); of other residuals than those of the estimate, if they are given."""
+def _deviation(sizes: np.ndarray) -> float:
+    """Standard deviation of numbers of a normal distribution with these sizes, whatever a few of them are."""
+    return 1.4826 * float(np.median(sizes))
+
+
+def scores_of(model: IdentificationModel, segments: Segments, step: float, estimate: Fit) -> np.ndarray:
+    """Gradient of each step, (S, length, P)."""
     return np.asarray(
         scores(
             model, jnp.asarray(estimate.z), jnp.asarray(estimate.starts), segments, jnp.asarray(estimate.weights),
-            jnp.asarray(estimate.residuals if residuals is None else residuals), jnp.asarray(estimate.reduction), step,
+            jnp.asarray(estimate.residuals), jnp.asarray(estimate.reduction), step,
         )
     )  # fmt: skip
-
-
-def without_step_error(
-    model: IdentificationModel, segments: Segments, step: float, estimate: Fit, least: np.ndarray
-) -> Fit:
-    """The estimate for half the step of integration, to first order: what is known to a thousandth needs it.
-
-    One that this does not improve stays as it is.
-
-    Args:
-        model, segments, step, least: as for the estimate.
-        estimate: with steps as they are.
-    """
-    finer = dataclasses.replace(model, substeps=2)
-    residuals = _residuals(finer, segments, step, estimate.z, estimate.starts)
-    change = np.where(estimate.weights > 0, residuals - estimate.residuals, 0.0)
-    gradient = scores_of(model, segments, step, estimate, change).sum(axis=(0, 1))
-    z = np.maximum(estimate.z - np.linalg.solve(estimate.information, gradient), least)
-    moved = estimate._replace(z=z)
-    cost_of = lambda one: _cost(_residuals(finer, segments, step, one.z, one.starts), one.weights, one.z, one.starts)
-    return moved if cost_of(moved) < cost_of(estimate) else estimate

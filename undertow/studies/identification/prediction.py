@@ -31,12 +31,7 @@ class Sensing(NamedTuple):
 
 
 def residuals(
-    vehicle: IdentifiedVehicle,
-    sensing: Sensing,
-    change: Float[Array, "12"],
-    segment: Any,
-    step: Float[Array, ""],
-    substeps: int = 1,
+    vehicle: IdentifiedVehicle, sensing: Sensing, change: Float[Array, "12"], segment: Any, step: Float[Array, ""]
 ) -> Float[Array, "length 13"]:
     """Predicted less measured, at the times of the samples; m, rad, m/s, rad/s, m. Without a sample: any number.
 
@@ -46,36 +41,33 @@ def residuals(
         change: of the guessed motion at the begin of the segment: m, rad (a turn in body axes), m/s, rad/s.
         segment: one of `Segments`.
         step: s.
-        substeps: of the integration in each step.
     """
-    states = motion(vehicle, sensing, change, segment, step, substeps)
-    return jax.vmap(_differences, (0, 0, 0, 0, None, None))(
-        jax.tree.map(lambda leaf: leaf[:-1], states),
-        jax.tree.map(lambda leaf: leaf[1:], states),
-        segment.values,
-        segment.offsets,
-        sensing.rate_bias,
-        step,
-    )
+    states, rates = motion(vehicle, sensing, change, segment, step)
+    before = jax.tree.map(lambda leaf: leaf[:-1], states)
+    after = jax.tree.map(lambda leaf: leaf[1:], states)
+    curve = jax.tree.map(lambda a, b, rate: 2 * (b - a - step * rate), before, after, rates)
+    of_step = lambda *rows: _differences(*rows, sensing.rate_bias, step)
+    return jax.vmap(of_step)(before, after, curve, segment.values, segment.offsets, segment.spreads)
 
 
-def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step, substeps: int = 1) -> MotionState:
-    """States at the begin of each step of a segment and at its end, actuators left out (zero)."""
+def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step) -> tuple[MotionState, MotionState]:
+    """States at the begin of each step of a segment and at its end, and their derivatives at these begins.
+
+    Actuators are left out.
+    """
     inputs = delayed(segment.inputs, sensing.command_delay / step)
     length = segment.values.shape[0]
     before = segment.inputs.shape[0] - length
 
     def run_in(state, u):
-        for _ in range(substeps):
-            state = vehicle.actuators_after(state, u, step / substeps)
-        return state, None
+        return vehicle.actuators_after(state, u, step), None
 
     actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
 
     def advance(x: MotionState, u):
-        for _ in range(substeps):
-            x = vehicle.advance(x, u, sensing.current, step / substeps)
-        return x, x._replace(actuators=())
+        rate = vehicle.dynamics(x, u, sensing.current)
+        x = vehicle.advance(x, u, sensing.current, step)
+        return x, (x._replace(actuators=()), rate._replace(actuators=()))
 
     guess = segment.start
     start = MotionState(
@@ -84,9 +76,9 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
         nu=guess[7:] + change[6:],
         actuators=actuators,
     )
-    _, after = jax.lax.scan(advance, start, inputs[before:])
+    _, (after, rates) = jax.lax.scan(advance, start, inputs[before:])
     first = start._replace(actuators=())
-    return jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after)
+    return jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after), rates
 
 
 def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[Array, "steps N"]:
@@ -98,20 +90,30 @@ def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[A
     return (1 - part) * earlier(0) + part * earlier(1)
 
 
-def _differences(before: MotionState, after: MotionState, measured, offsets, rate_bias, step) -> Float[Array, "13"]:
-    """Of one step, whose samples were taken between two states."""
-    position, attitude, velocity, rates, depth = offsets
-    blend = lambda share, a, b: (1 - share) * a + share * b
-    placed = _place(before, after, position, step)
-    quaternion = blend(attitude, before.attitude, after.attitude)
+def _differences(
+    before: MotionState, after: MotionState, curve: MotionState, measured, offsets, spreads, rate_bias, step
+) -> Float[Array, "13"]:
+    """Of one step, whose samples were taken between two states.
+
+    The mean of samples differs from the value at their mean time where the motion is curved: `curve` is its second
+    derivative, times the square of the step.
+    """
+    below_chord = 0.5 * (offsets - offsets**2 - spreads)
+
+    def blend(sensor: int, a, b, curved):
+        share = offsets[sensor]
+        return (1 - share) * a + share * b - below_chord[sensor] * curved
+
+    placed = _place(before, after, offsets[0], step) + 0.5 * spreads[0] * curve.position
+    quaternion = blend(1, before.attitude, after.attitude, curve.attitude)
     quaternion = quaternion / jnp.sqrt((quaternion * quaternion).sum())
-    down = _place(before, after, depth, step)[2]
+    down = _place(before, after, offsets[4], step)[2] + 0.5 * spreads[4] * curve.position[2]
     return jnp.concatenate(
         [
             placed - measured[:3],
             attitude_error(quaternion, measured[3:7]),
-            blend(velocity, before.nu[:3], after.nu[:3]) - measured[7:10],
-            blend(rates, before.nu[3:], after.nu[3:]) + rate_bias - measured[10:13],
+            blend(2, before.nu[:3], after.nu[:3], curve.nu[:3]) - measured[7:10],
+            blend(3, before.nu[3:], after.nu[3:], curve.nu[3:]) + rate_bias - measured[10:13],
             (down - measured[13])[None],
         ]
     )

@@ -18,7 +18,7 @@ class Segments(NamedTuple):
 
     Attributes:
         inputs: of the run-in and the segment, shape (S, run-in + length, N).
-        values, offsets, counts: as in `Dive`, of the segment, shape (S, length, ...).
+        values, offsets, spreads, counts: as in `Dive`, of the segment, shape (S, length, ...).
         start: guess of position, quaternion, nu, shape (S, 13).
         dive: number of the dive, shape (S,).
         first: step of the dive at which the segment begins, shape (S,).
@@ -27,6 +27,7 @@ class Segments(NamedTuple):
     inputs: np.ndarray
     values: np.ndarray
     offsets: np.ndarray
+    spreads: np.ndarray
     counts: np.ndarray
     start: np.ndarray
     dive: np.ndarray
@@ -66,7 +67,8 @@ def _segment(dive: Dive, number: int, first: int, before: int, steps: int):
     part = slice(first, first + steps)
     values = pad(dive.values[part])
     values[len(dive.values[part]) :, 3] = 1.0
-    return inputs, values, pad(dive.offsets[part]), pad(dive.counts[part]), start_of(dive, first), number, first
+    measured = (pad(rows[part]) for rows in (dive.offsets, dive.spreads, dive.counts))
+    return inputs, values, *measured, start_of(dive, first), number, first
 
 
 def start_of(dive: Dive, first: int) -> np.ndarray:

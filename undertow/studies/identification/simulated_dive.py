@@ -114,8 +114,10 @@ def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: f
     start = jnp.zeros(13).at[2].set(depth).at[3].set(1.0)
     nothing = jnp.zeros((steps, 1))
     with_run_in = jnp.concatenate([jnp.zeros((_BEFORE, inputs.shape[1])), inputs])
-    segment = Segments(with_run_in, nothing, nothing, nothing, start, jnp.zeros(()), jnp.zeros(()))  # pyright: ignore[reportArgumentType] - JAX arrays
-    states = motion(vehicle, Sensing(command_delay, current, jnp.zeros(3)), jnp.zeros(12), segment, jnp.asarray(_FINE))
+    arrays = (with_run_in, nothing, nothing, nothing, nothing, start, jnp.zeros(()), jnp.zeros(()))
+    segment = Segments(*arrays)  # pyright: ignore[reportArgumentType] - JAX arrays
+    sensing = Sensing(command_delay, current, jnp.zeros(3))
+    states, _ = motion(vehicle, sensing, jnp.zeros(12), segment, jnp.asarray(_FINE))
     return {
         "position": states.position,
         "attitude": states.attitude,
