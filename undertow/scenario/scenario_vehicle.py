@@ -7,7 +7,6 @@ from undertow.scenario.reading import Text
 from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.scenario.vehicle_file import vehicle_file_of
 
-
 _STATION = {"kind": "setpoint", "position": [0.0] * 6}
 
 
