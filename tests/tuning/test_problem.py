@@ -1,5 +1,7 @@
 """What is tuned, on what, and its slope."""
 
+from pathlib import Path
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,6 +10,7 @@ import pytest
 from messages import named
 
 from undertow.analysis.linearization.jacobians import Parts, without
+from undertow.cli.main import run
 from undertow.control.controllers import pid
 from undertow.control.navigation import observer
 from undertow.control.references import setpoint
@@ -19,7 +22,8 @@ from undertow.physics.plants import hybrid_vehicle
 from undertow.physics.sensors import depth, dvl, imu
 from undertow.physics.thrusters import t200
 from undertow.physics.vehicles import bluerov2_heavy
-from undertow.scenario.reading import from_data
+from undertow.scenario.reading import from_data, read
+from undertow.scenario.vehicle_file import read_vehicle
 from undertow.simulation.checkpoint import Checkpoint
 from undertow.simulation.loop import sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -222,3 +226,22 @@ def test_disturbance_of_another_size():
     np.testing.assert_allclose(two.acceleration - 1, 0.5 * (one.acceleration - 1))
     np.testing.assert_allclose(two.wrench, 0.5 * one.wrench)
     np.testing.assert_allclose(two.water.velocity, [0.15, 0.05, 0.0])
+
+
+def test_a_vehicle_file_with_deviations_gives_other_vehicles_to_each_set(tmp_path, monkeypatch):
+    """Plants of the trials: the values of the file first, then samples; the controller knows the values of the file."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["init", "--own-vehicle"]) == 0
+    file = Path("my_rov.yaml").read_text()
+    Path("my_rov.yaml").write_text(file.replace("mass: 13.5  ", "mass: 13.5 +- 2"))
+    text = read(Path("scenario.yaml"))
+    found = problem(text._replace(data=text.data | {"tune": {"train": {"seeds": 2, "vehicles": 3}}}))
+    masses = [np.asarray(trials.plants.vehicle.mass).tolist() for trials in (found.train, found.held_out)]
+    assert [len(mass) for mass in masses] == [2 * 4, 4 * 5]
+    assert masses[0][0] == masses[1][0] == 13.5
+    assert masses[0][:4] == masses[0][4:]  # every vehicle with every seed
+    others = [*masses[0][1:4], *masses[1][1:5]]
+    assert len(set(others)) == 7 and all(8 < mass < 20 for mass in others)
+    nominal = hybrid_vehicle(read_vehicle(Path("my_rov.yaml")).vehicle(), t200()).model().dynamics.body
+    known = found.built.closed_loop.controller.model.dynamics.body
+    np.testing.assert_array_equal(known.mass_matrix, nominal.mass_matrix)

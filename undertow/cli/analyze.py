@@ -35,7 +35,7 @@ def analyze(command: AnalyzeCommand) -> int:
     ):
         built = build(read(command.scenario, allow_code=command.allow_code))
         with shares(console) as progress:
-            prediction = interruptible(lambda: predict(built, progress))
+            prediction = interruptible(lambda: predict(built, progress, command.vehicles))
         all_advice = (*built.advice(), *flow_advice(built))
         warnings = (*(piece.sentence for piece in all_advice), *advice(prediction))
         text = to_json(summary(prediction), indent=1) + "\n"

@@ -79,7 +79,7 @@ def _section(number: int, rows: PredictionTable):
 
 def tables(prediction: Prediction) -> list[PredictionTable]:
     """All tables, the most important first, without empty ones."""
-    makers = (_points, _margins, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
+    makers = (_points, _margins, _vehicles, _estimators, _errors, _noise, _closed_forms, _authority, _metrics)
     return [table for make in makers if (table := make(prediction)).rows]
 
 
@@ -116,6 +116,27 @@ def _margins(prediction: Prediction) -> PredictionTable:
     ]
     return PredictionTable(
         "Robustness margins", ("margin", "limit", "remark"), rows, "At the operating point closest to instability."
+    )
+
+
+def _vehicles(prediction: Prediction) -> PredictionTable:
+    rows = [
+        (
+            vehicle.name.removesuffix(" within its deviations"),
+            *(_time(vehicle.margins[name]) for name in ("sampling_time", "delay", "lag")),
+            *(_number(vehicle.margins[name]) for name in ("gain_low", "gain_high")),
+            f"{vehicle.radius:.6f}",
+            "stable" if vehicle.is_stable else "unstable" if vehicle.found else "no equilibrium",
+        )
+        for vehicle in sorted(prediction.vehicles, key=lambda vehicle: -vehicle.radius)
+    ]
+    head = ("vehicle", "sampling limit", "delay margin", "lag margin", "gain at least", "gain at most")
+    return PredictionTable(
+        "Margins of vehicles within the deviations of the file",
+        (*head, "spectral radius", "verdict"),
+        rows,
+        "Vehicles at random, each at its operating point closest to instability; the controller has the numbers of the "
+        "file. That closest to instability comes first.",
     )
 
 

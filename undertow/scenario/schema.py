@@ -156,6 +156,13 @@ class TrainingRuns(Strict):
     sets: list[str] | None = Field(
         None, description="plant variants: parameter sets of the vehicle; default: every second published set"
     )
+    vehicles: int = Field(
+        4,
+        ge=0,
+        le=1000,
+        description="plant variants where the vehicle file has deviations: vehicles at random within them, beside the "
+        "values of the file",
+    )
 
 
 class Weights(Strict):

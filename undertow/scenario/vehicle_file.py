@@ -53,10 +53,19 @@ def vehicle_file_of(scenario: Text) -> VehicleFile | None:
     Raises:
         BadInput: the file cannot be read.
     """
-    description = scenario.data.get("plant", {}).get("vehicle", "")
+    plant = scenario.data.get("plant")
+    description = plant.get("vehicle") if isinstance(plant, Mapping) else None
+    if not isinstance(description, str | Mapping):
+        return None
     options = {"kind": description} if isinstance(description, str) else dict(description)
     kind = str(options.pop("kind", ""))
     return read_vehicle(scenario.folder / kind, options, "plant.vehicle.kind") if is_vehicle_file(kind) else None
+
+
+def has_deviations(scenario: Text) -> bool:
+    """Whether a scenario has a vehicle file whose numbers have deviations."""
+    vehicle_file = vehicle_file_of(scenario)
+    return vehicle_file is not None and vehicle_file.uncertainty is not None
 
 
 def read_vehicle(path: Path, changes: Mapping[str, Any] | None = None, what: str = "kind") -> VehicleFile:

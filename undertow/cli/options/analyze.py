@@ -4,6 +4,8 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+import typer
+
 from undertow.cli.options.command import Command
 from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, ScenarioFile, results
 
@@ -21,6 +23,14 @@ class AnalyzeCommand(Command):
     scenario: ScenarioFile
     out: Annotated[Path | None, results("runs/NAME-prediction")] = None
     overwrite: Overwrite = False
+    vehicles: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Also judge N vehicles at random within the deviations of the vehicle file, where it has any.",
+        ),
+    ] = 8
     allow_code: AllowCode = False
     pdf: Pdf = None
     details: Details = False

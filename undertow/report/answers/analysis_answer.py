@@ -17,8 +17,10 @@ def answer_of_prediction(prediction: Prediction) -> PlainAnswer:
     lost = [point.where for point in prediction.points if not point.found]
     unstable = [point.where for point in prediction.points if point.found and point.radius >= 1]
     held = prediction.authority.held >= _ENOUGH
-    lines = (*_errors(prediction), *_margins(prediction), *_noise(prediction), *_actuators(prediction))
-    return PlainAnswer(not lost and not unstable and held, _verdict(prediction, lost, unstable, held), lines)
+    parts = (_errors, _margins, _vehicles, _noise, _actuators)
+    lines = tuple(line for part in parts for line in part(prediction))
+    good = not lost and not unstable and held and all(vehicle.is_stable for vehicle in prediction.vehicles)
+    return PlainAnswer(good, _verdict(prediction, lost, unstable, held), lines)
 
 
 def _verdict(prediction: Prediction, lost: list[str], unstable: list[str], held: bool) -> str:
@@ -70,6 +72,22 @@ def _margins(prediction: Prediction) -> Iterator[str]:
     if np.isfinite(margins["sampling_time"]):
         limit = _milliseconds(margins["sampling_time"])
         yield f"These gains need a sampling time below {limit}; it is {_milliseconds(dt)}."
+
+
+def _vehicles(prediction: Prediction) -> Iterator[str]:
+    """How the margins differ between the vehicles that the one of the file may be."""
+    count = len(prediction.vehicles)
+    if not count:
+        return
+    unstable = sum(not vehicle.is_stable for vehicle in prediction.vehicles)
+    which = f"{count} vehicles within the deviations of the file"
+    if unstable:
+        yield f"Of {which} {unstable} {'is' if unstable == 1 else 'are'} not stable with these gains."
+        return
+    delays = [vehicle.margins["delay"] for vehicle in prediction.vehicles]
+    smallest, largest = _milliseconds(min(delays)), _milliseconds(max(delays))
+    spread = f", with a delay margin of {smallest} to {largest}" if np.isfinite(max(delays)) else ""
+    yield f"It is stable with {which}{spread}."
 
 
 def _milliseconds(seconds: float) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.scenario.sampled_plants import OF_FILE
 from undertow.studies.tuning.cost import times_other
 from undertow.studies.tuning.tune import Tuned
 
@@ -23,7 +24,7 @@ def answer_of_tuning(tuning: Tuned, folder: Path) -> PlainAnswer:
         verdict = f"The tuned gains are taken: {cost} with the given gains."
     else:
         verdict = f"The given gains are kept. Others were found, but {cost} with the given ones."
-    lines = (*_gains(tuning), *_certificate(tuning), _search(tuning), *_next(tuning, folder))
+    lines = (*_gains(tuning), *_certificate(tuning), *_vehicles(tuning), _search(tuning), *_next(tuning, folder))
     return PlainAnswer(True if better else None, verdict, lines)
 
 
@@ -40,6 +41,12 @@ def _certificate(tuning: Tuned) -> Iterator[str]:
         yield f"The linearised loop is stable with them: spectral radius {kept.certificate.worst:.5f}, below 1."
     if not initial.certificate.holds:
         yield "The given gains have no certificate of stability."
+
+
+def _vehicles(tuning: Tuned) -> Iterator[str]:
+    others = len(set(tuning.problem.train.variants)) - 1
+    if OF_FILE in tuning.problem.train.variants and others > 0:
+        yield f"They are tuned for the vehicle of the file and {others} within its deviations, and judged on others."
 
 
 def _search(tuning: Tuned) -> str:

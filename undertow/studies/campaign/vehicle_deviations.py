@@ -3,9 +3,6 @@
 A campaign keeps the distributions, not the file, so that its results can be read and resumed without it.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from undertow.core.errors import BadInput
@@ -13,13 +10,13 @@ from undertow.scenario.correlation import lower_triangle
 from undertow.scenario.reading import Text
 from undertow.scenario.uncertain_number import UncertainNumber, log_deviation
 from undertow.scenario.vehicle_file import vehicle_file_of
-from undertow.scenario.vehicle_parameters import ADJUSTED_OPTIONS, NOT_NEGATIVE, POSITIVE, is_outside, sign_of
+from undertow.scenario.vehicle_keys import vehicle_keys
+from undertow.scenario.vehicle_parameters import NOT_NEGATIVE, POSITIVE, sign_of
 from undertow.scenario.vehicle_uncertainty import VehicleUncertainty
 from undertow.studies.campaign.campaign_schema import Campaign, Correlation, Distribution
 
-_VEHICLE, _THRUSTER = "plant.vehicle", "plant.thruster"
+_VEHICLE = "plant.vehicle"
 _NAME = f"vary.{_VEHICLE}"
-_DELAY = "command_delay"  # no plant has one
 
 
 def with_vehicle_deviations(campaign: Campaign, scenario: Text) -> Campaign:
@@ -40,8 +37,8 @@ def with_vehicle_deviations(campaign: Campaign, scenario: Text) -> Campaign:
     if campaign.correlation is not None:
         raise BadInput("correlation", f"be left out beside the deviations of `{_VEHICLE}`, which have their own")
     uncertainty = _uncertainty(scenario)
-    names = [name for name in uncertainty.numbers if name != _DELAY]
-    key_of = {name: _key(name, scenario) for name in names}
+    key_of = vehicle_keys(uncertainty.numbers, scenario)
+    names = list(key_of)
     vary: dict[str, Distribution] = {}
     for key, spread in campaign.vary.items():
         vary |= {key: spread} if key != _VEHICLE else {key_of[name]: _spread(name, uncertainty) for name in names}
@@ -75,20 +72,3 @@ def _spread(name: str, uncertainty: VehicleUncertainty) -> Distribution:
     if sign_of(name) == NOT_NEGATIVE:
         return Distribution.model_validate({"cut_normal": [number.value, number.deviation, 0.0]})
     return Distribution.model_validate({"normal": [number.value, number.deviation]})
-
-
-def _key(name: str, scenario: Text) -> str:
-    """Key path of a parameter in a scenario."""
-    if not is_outside(name):
-        return f"{_VEHICLE}.values.{name}"
-    outer: Any = scenario.data.get("plant", {}).get("thruster")
-    if not isinstance(outer, Mapping) or outer.get("kind") != "adjusted":
-        hint = f"Write `thruster: {{kind: adjusted, thruster: ..., {ADJUSTED_OPTIONS.get(name, 'gain')}: ...}}` there"
-        must = f"be `adjusted`, because the vehicle file has a deviation of `{name}`"
-        raise BadInput(_THRUSTER, must, hint=hint, where=scenario.location(_THRUSTER))
-    if name in ADJUSTED_OPTIONS:
-        return f"{_THRUSTER}.{ADJUSTED_OPTIONS[name]}"
-    inner = outer.get("thruster")
-    is_nested = isinstance(inner, Mapping) and inner.get("kind") == "adjusted"
-    number = int(name.partition(".T")[2])
-    return f"{_THRUSTER}{'.thruster' if is_nested else ''}.gain[{number - 1}]"

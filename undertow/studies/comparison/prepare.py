@@ -14,6 +14,7 @@ from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.consistency import whole_steps
 from undertow.scenario.reading import Text, from_data, read
 from undertow.scenario.schema import named_law
+from undertow.scenario.vehicle_file import has_deviations
 from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.campaign_schema import Campaign, validate
 from undertow.studies.campaign.prepare import Prepared, prepare_campaign
@@ -127,7 +128,7 @@ def _read_request(
         raise BadInput("--tune", "be given with --controllers, whose gains are tuned", "given without")
     differing: dict[str, list[str]] = {}
     dimension = "controller"
-    path = None
+    path, vary = None, {}
     if not isinstance(sources, Mapping) and len(sources) > 1:
         if entries is not None:
             strays = [str(path) for path in sources[1:] if not path.suffix and not path.exists()]
@@ -153,9 +154,11 @@ def _read_request(
         if tuner is not None:
             candidates, budgets = tuner(candidates, base)
             text = held_out(text, base, budgets)
+        if "scenario" not in text.data and has_deviations(base):
+            vary = {"plant.vehicle": {"deviations": "file"}}
     if "scenario" not in text.data:
         lines = {("scenario", *key_path): line for key_path, line in text.lines.items()}
-        text = text._replace(data={"scenario": text.data}, lines=lines)
+        text = text._replace(data={"scenario": text.data} | ({"vary": vary} if vary else {}), lines=lines)
     variants = {"variants": {candidate.name: candidate.changes for candidate in candidates}}
     text = text._replace(data={"trials": TRIALS} | text.data | variants | {"requirements": {}})
     return _Request(text, dimension, [candidate.source for candidate in candidates], differing, budgets)

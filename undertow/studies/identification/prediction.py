@@ -46,8 +46,9 @@ def residuals(
     before = jax.tree.map(lambda leaf: leaf[:-1], states)
     after = jax.tree.map(lambda leaf: leaf[1:], states)
     curve = jax.tree.map(lambda a, b, rate: 2 * (b - a - step * rate), before, after, rates)
-    of_step = lambda *rows: _differences(*rows, sensing.rate_bias, step)
-    return jax.vmap(of_step)(before, after, curve, segment.values, segment.offsets, segment.spreads)
+    in_axes = (0, 0, 0, 0, 0, 0, None, None)
+    measured = (segment.values, segment.offsets, segment.spreads)
+    return jax.vmap(_differences, in_axes)(before, after, curve, *measured, sensing.rate_bias, step)
 
 
 def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step) -> tuple[MotionState, MotionState]:

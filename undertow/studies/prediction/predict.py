@@ -8,40 +8,26 @@ import numpy as np
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.actuator_authority import ActuatorAuthority, actuator_authority
 from undertow.analysis.linearization.closed_forms import ClosedForm, closed_form_poles
-from undertow.analysis.linearization.disturbance_profile import OperatingConditions
-from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
 from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.physics.plants.reachability import open_loop_advice
 from undertow.scenario.build import Built, in_its_precision
+from undertow.studies.prediction.linearized_points import (
+    LinearizedPoint,
+    linearized_points,
+    nearest_to_instability,
+    robustness,
+)
 from undertow.studies.prediction.operating_point import OperatingPoint, input_limits, operating_point, predicted
+from undertow.studies.prediction.vehicle_margins import VehicleMargins, margins_over_vehicles
 
-# Quantiles of the loads along the reference at which the loop is linearised.
-SHARES = (0.1, 0.5, 0.9)
-
-_SLOWEST, _LONGEST = 1e-2, 10.0  # rad/s and s: ranges of frequencies and margins
+_SLOWEST = 1e-2  # rad/s
 _HIGHEST = 1.0  # frequency times sampling time: a third of the Nyquist frequency
 _NOISE = 0.01  # m/s and rad/s, for gains per unit of noise
 _DEVIATIONS = 3.0  # standard deviations of noise between the input at rest and its limit
 
 Progress = Callable[[str, float], None]  # called with a message and the share done
-
-
-class LinearizedPoint(NamedTuple):
-    """One operating point."""
-
-    where: str
-    flow: float | None  # speed of the water past the vehicle, m/s; None for other plants
-    at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
-    used: float  # largest |u| as a share of its limit; 0 without a limit
-    poles: np.ndarray  # 1/s
-    radius: float  # spectral radius over one control step; stable below 1
-
-    @property
-    def found(self) -> bool:
-        """Whether the equilibrium exists."""
-        return self.at.found
 
 
 class VelocityNoise(NamedTuple):
@@ -71,20 +57,27 @@ class Prediction(NamedTuple):
     lost: tuple[str, ...]
     metrics: dict[str, float] | None  # of the steady window
     why_not: str  # reason where there are none
+    vehicles: tuple[VehicleMargins, ...] = ()  # within the deviations of the vehicle file; () without any
 
 
 @in_its_precision
-def predict(built: Built, progress: Progress = lambda message, share: None) -> Prediction:
-    """Predict a scenario from its linearised closed loop."""
+def predict(built: Built, progress: Progress = lambda message, share: None, vehicles: int = 0) -> Prediction:
+    """Predict a scenario from its linearised closed loop.
+
+    Args:
+        built: scenario.
+        progress: called with the current stage.
+        vehicles: number of vehicles within the deviations of the vehicle file whose margins are computed, too.
+    """
     progress("equilibrium", 0.0)
     op_point = operating_point(built)
     loop, settings = op_point.built.closed_loop, built.scenario.loop
-    progress("poles at the operating points", 0.5)
-    points = tuple(_point(op_point, conditions) for conditions in op_point.around.operating_points(SHARES))
-    worst = max(points, key=lambda point: point.radius).at
-    progress("margins", 0.6)
-    loop_margins = _margins(worst, settings.dt)
-    progress("noise and disturbances", 0.9)
+    progress("poles at the operating points", 0.3)
+    points = linearized_points(op_point)
+    worst = nearest_to_instability(points).at
+    progress("margins", 0.4)
+    loop_margins = robustness(worst, settings.dt)
+    progress("noise and disturbances", 0.7)
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
     error, estimation = _responses(op_point.linear, frequency)
     law = loop.controller
@@ -108,30 +101,8 @@ def predict(built: Built, progress: Progress = lambda message, share: None) -> P
         lost=open_loop_advice("the gain matrix", gains, names),
         metrics=metrics,
         why_not=why_not,
+        vehicles=margins_over_vehicles(built, vehicles, progress),
     )
-
-
-def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
-    loop, settings = op_point.built.closed_loop, op_point.built.scenario.loop
-    at = equilibrium(loop, settings.dt, op_point.mean.parts.target.position, acting.load, acting.flow)
-    linear = margins.closed(at, settings.dt, settings.kind)
-    low, high = input_limits(op_point.built, at)
-    used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
-    speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
-    return LinearizedPoint(
-        acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear)
-    )
-
-
-def _margins(at: Equilibrium, dt: float) -> dict[str, float]:
-    low, high = margins.gain_range(at, dt)
-    return {
-        "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),
-        "delay": margins.largest_delay(at, dt, _LONGEST),
-        "lag": margins.largest_lag(at, dt, _LONGEST),
-        "gain_low": low,
-        "gain_high": high,
-    }
 
 
 def _noise(op_point: OperatingPoint) -> VelocityNoise:
@@ -208,4 +179,5 @@ def summary(prediction: Prediction) -> dict[str, Any]:
         "uncontrollable": list(prediction.lost),
         "metrics": prediction.metrics,
         "why_no_metrics": prediction.why_not,
+        "vehicles": [vehicle._asdict() for vehicle in prediction.vehicles],
     }

@@ -17,7 +17,9 @@ from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario import factory
 from undertow.scenario.build import Built
 from undertow.scenario.reading import Text
+from undertow.scenario.sampled_plants import sampled_plants
 from undertow.scenario.schema import TrainingRuns
+from undertow.scenario.vehicle_file import has_deviations
 
 _HELD_OUT_SEEDS = 1_000_000  # far from the training seeds
 
@@ -46,7 +48,8 @@ def training_and_held_out(text: Text, built: Built) -> tuple[PlantVariants, Plan
     """Both sets of trials of a scenario, with different seeds and, where there are several, different parameter sets.
 
     The nominal model stays the same. Published sets, starting with the nominal one, alternate between the training and
-    the held-out set, which also contains the nominal one.
+    the held-out set, which also contains the nominal one. A vehicle file with deviations gives other vehicles at random
+    to each set.
 
     Raises:
         BadInput: a parameter set that the vehicle does not have.
@@ -80,10 +83,11 @@ def trials(
         checks.not_negative(f"tune.{key}.sizes[{i}]", size)
     if not runs.sizes:
         raise BadInput(f"tune.{key}.sizes", "have an entry")
-    if names == ():
-        names = published[:1] if published else ("",)
-    plants = {name: _plant(text, built, name) for name in names}
-    pairs = [(name, seed) for seed in range(runs.seeds) for name in names]
+    if has_deviations(text):
+        plants = sampled_plants(built, first_seed, runs.vehicles)
+    else:
+        plants = {name: _plant(text, built, name) for name in names or published[:1] or ("",)}
+    pairs = [(name, seed) for seed in range(runs.seeds) for name in plants]
     return PlantVariants(
         plants=stacked([plants[name] for name, _ in pairs]),
         keys=jnp.stack([key_of_seed((first_seed + seed) % 2**32) for _, seed in pairs]),

@@ -1,0 +1,65 @@
+"""The loop of a scenario linearised at operating points along its reference, and its margins there."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.analysis.linearization import margins
+from undertow.analysis.linearization.disturbance_profile import OperatingConditions
+from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
+from undertow.studies.prediction.operating_point import OperatingPoint, input_limits
+
+# Quantiles of the loads along the reference at which the loop is linearised.
+_SHARES = (0.1, 0.5, 0.9)
+_LONGEST = 10.0  # s, of margins
+
+
+class LinearizedPoint(NamedTuple):
+    """One operating point."""
+
+    where: str
+    flow: float | None  # speed of the water past the vehicle, m/s; None for other plants
+    at: Equilibrium  # with its load, m/s^2 or rad/s^2, and its input
+    used: float  # largest |u| as a share of its limit; 0 without a limit
+    poles: np.ndarray  # 1/s
+    radius: float  # spectral radius over one control step; stable below 1
+
+    @property
+    def found(self) -> bool:
+        """Whether the equilibrium exists."""
+        return self.at.found
+
+
+def linearized_points(op_point: OperatingPoint) -> tuple[LinearizedPoint, ...]:
+    """The loop at small, middle and large loads along its reference."""
+    return tuple(_point(op_point, conditions) for conditions in op_point.around.operating_points(_SHARES))
+
+
+def nearest_to_instability(points: Sequence[LinearizedPoint]) -> LinearizedPoint:
+    """The point with the largest spectral radius."""
+    return max(points, key=lambda point: point.radius)
+
+
+def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
+    loop, settings = op_point.built.closed_loop, op_point.built.scenario.loop
+    at = equilibrium(loop, settings.dt, op_point.mean.parts.target.position, acting.load, acting.flow)
+    linear = margins.closed(at, settings.dt, settings.kind)
+    low, high = input_limits(op_point.built, at)
+    used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
+    speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
+    return LinearizedPoint(
+        acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear)
+    )
+
+
+def robustness(at: Equilibrium, dt: float) -> dict[str, float]:
+    """Margins at an equilibrium: sampling time, further delay and lag, s, and factors on the effect of the input."""
+    low, high = margins.gain_range(at, dt)
+    return {
+        "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),
+        "delay": margins.largest_delay(at, dt, _LONGEST),
+        "lag": margins.largest_lag(at, dt, _LONGEST),
+        "gain_low": low,
+        "gain_high": high,
+    }
