@@ -39,6 +39,8 @@ _PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
 
 # Measured numbers below this share of the largest predicted one count as zero.
 _NOTHING = 1e-9
+# Below it, in the run and in the prediction, a number matters to nobody: m, rad, their rates, V.
+_NEGLIGIBLE = 1e-5
 
 
 class PredictedMetrics(NamedTuple):
@@ -129,7 +131,11 @@ def comparison(predicted: PredictedMetrics, result: ScenarioResult) -> str:
         return f"No prediction: {predicted.why_not}"
     assert result.steady is not None  # or there were no prediction
     zero = _NOTHING * max(predicted.metrics.values())
-    metrics = [metric for metric in compare_metrics(predicted.metrics, result.steady) if metric.measured > zero]
+    metrics = [
+        metric
+        for metric in compare_metrics(predicted.metrics, result.steady)
+        if metric.measured > zero and max(metric.measured, metric.predicted) > _NEGLIGIBLE
+    ]
     departing = [metric for metric in metrics if metric.name not in _PEAKS and metric.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"

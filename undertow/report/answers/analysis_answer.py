@@ -17,7 +17,8 @@ def answer_of_prediction(prediction: Prediction) -> PlainAnswer:
     lost = [point.where for point in prediction.points if not point.found]
     unstable = [point.where for point in prediction.points if point.found and point.radius >= 1]
     held = prediction.authority.held >= _ENOUGH
-    parts = (_errors, _margins, _vehicles, _noise, _actuators)
+    # Errors and margins are those of a loop that is stable.
+    parts = (_actuators,) if unstable else (_errors, _margins, _vehicles, _noise, _actuators)
     lines = tuple(line for part in parts for line in part(prediction))
     good = not lost and not unstable and held and all(vehicle.is_stable for vehicle in prediction.vehicles)
     return PlainAnswer(good, _verdict(prediction, lost, unstable, held), lines)
@@ -36,7 +37,7 @@ def _verdict(prediction: Prediction, lost: list[str], unstable: list[str], held:
 
 def _listed(places: list[str]) -> str:
     shown = ", ".join(places[:3])
-    return shown if len(places) <= 3 else f"{shown} and {len(places) - 3} more operating points"
+    return shown if len(places) <= 3 else f"{shown}, and {len(places) - 3} more"
 
 
 def _errors(prediction: Prediction) -> Iterator[str]:

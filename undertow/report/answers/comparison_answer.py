@@ -23,7 +23,7 @@ def answer_of_comparison(findings: Findings, noun: str) -> PlainAnswer:
         noun: what is compared: `controller`, `scenario` or `variant`.
     """
     failing = [name for name in findings.names if findings.completed(name) < findings.trials]
-    lines = (*_candidates(findings), *_established(findings), *_fairness(findings, noun))
+    lines = (*_candidates(findings), *_established(findings), *_known(findings), *_fairness(findings, noun))
     return PlainAnswer(_good(findings, failing), _verdict(findings, failing, noun), lines)
 
 
@@ -44,6 +44,12 @@ def _verdict(findings: Findings, failing: list[str], noun: str) -> str:
         return f"{subject}: all completed, but {', '.join(missed)} did not always keep to the criterion of success."
     kept = " within the criterion of success" if any(judged for _, judged in findings.successes.values()) else ""
     return f"{subject}: all completed{kept}."
+
+
+def _known(findings: Findings) -> Iterator[str]:
+    """What controllers know of a plant that varies."""
+    if findings.nominal_model:
+        yield findings.nominal_model
 
 
 def _error(findings: Findings) -> str:

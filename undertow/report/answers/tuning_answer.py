@@ -44,9 +44,14 @@ def _certificate(tuning: Tuned) -> Iterator[str]:
 
 
 def _vehicles(tuning: Tuned) -> Iterator[str]:
-    others = len(set(tuning.problem.train.variants)) - 1
-    if OF_FILE in tuning.problem.train.variants and others > 0:
-        yield f"They are tuned for the vehicle of the file and {others} within its deviations, and judged on others."
+    variants = set(tuning.problem.train.variants)
+    if len(variants) < 2:
+        return
+    if OF_FILE in variants:
+        vehicles = f"the vehicle of the file and {len(variants) - 1} within its deviations"
+    else:
+        vehicles = f"{len(variants)} published vehicles"
+    yield f"They are tuned for {vehicles}, and judged on others. The controller knows that of the scenario."
 
 
 def _search(tuning: Tuned) -> str:

@@ -10,6 +10,7 @@ from undertow.studies.campaign.labels import is_number
 
 # A published parameter set is a set of numbers, too.
 _SETS = "parameters"
+_MOST = 4  # keys that a sentence names
 
 
 def varied_scenario(
@@ -47,6 +48,8 @@ def nominal_model_sentence(data: Mapping[str, Any], values: Mapping[str, Any], k
     varied = [f"`{key}`" for key in _unknown(values, known_keys)]
     if not varied:
         return ""
+    if len(varied) > _MOST:
+        varied = [*varied[: _MOST - 1], f"{len(varied) - _MOST + 1} other numbers"]
     keys = " and ".join(filter(None, (", ".join(varied[:-1]), varied[-1])))
     if (data.get("model") or {}).get("follow"):
         return f"The controller knows the plant of each trial: its nominal model follows {keys}."

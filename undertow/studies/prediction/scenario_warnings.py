@@ -30,7 +30,7 @@ def _stability(prediction: Prediction) -> tuple[str, ...]:
     turning = f" at {abs(pole.imag):.3g} rad/s" if pole.imag else ""
     sentence = (
         f"the loop is unstable at {len(unstable)} of {len(prediction.points)} operating points: rightmost pole "
-        f"{pole.real:+.3g} 1/s{turning}. Use `preset: robust`, or a slower estimator"
+        f"{pole.real:+.3g} 1/s{turning}. A higher rate of control, or other gains, may help: `undertow tune`"
     )
     if theory_of(prediction.operating_point.built.closed_loop.controller).adapts:
         sentence += ". This holds for fixed weights: drifting weights add damping, so that a run may still last. "
