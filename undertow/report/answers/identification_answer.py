@@ -79,7 +79,7 @@ def _far_line(far: Sequence[str]) -> Iterator[str]:
 
 def _fit_line(fits: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     if fits:
-        pairs = ", ".join(f"{axis} {own:.0f} % ({_or_worse(before)})" for axis, (own, before) in fits.items())
+        pairs = ", ".join(f"{axis} {_or_worse(own)} ({_or_worse(before)})" for axis, (own, before) in fits.items())
         yield f"Fit of the velocities over whole dives, with that of the file in brackets: {pairs}; 100 % is perfect."
 
 
