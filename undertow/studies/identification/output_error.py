@@ -30,6 +30,7 @@ _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
 _ITERATIONS = 60
+_REWEIGHTED = 20  # iterations after which noise and outliers stay: where the model lacks something, they may alternate
 _TRIES = 10  # dampings of a step
 _GOOD, _POOR = 0.75, 0.25  # shares of the expected decrease above and below which the damping changes
 _CONVERGED = 0.05  # decrease of the cost; 0.5 is one standard deviation of a parameter
@@ -103,11 +104,13 @@ def fit(
         if trial is not None:
             small = cost - trial.cost < max(_CONVERGED, _RELATIVE * cost)
             z, starts, residuals, damping = trial.z, trial.starts, trial.residuals, trial.damping
+        steady = True
+        if iteration <= _REWEIGHTED:
             shares = _shares(residuals, counts)
-        new_noise = np.clip(_noise(residuals, counts, shares), noise / _FASTEST, noise * _FASTEST)
-        finite = np.isfinite(new_noise)
-        steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
-        noise = new_noise
+            new_noise = np.clip(_noise(residuals, counts, shares), noise / _FASTEST, noise * _FASTEST)
+            finite = np.isfinite(new_noise)
+            steady = np.abs(new_noise[finite] / noise[finite] - 1).max() < _NOISE_CONVERGED
+            noise = new_noise
         if steady and small:
             converged = True
             break

@@ -45,16 +45,17 @@ def residuals(
     states, rates = motion(vehicle, sensing, change, segment, step)
     before = jax.tree.map(lambda leaf: leaf[:-1], states)
     after = jax.tree.map(lambda leaf: leaf[1:], states)
-    curve = jax.tree.map(lambda a, b, rate: 2 * (b - a - step * rate), before, after, rates)
+    curve = jax.tree.map(lambda a, b, rate: 2 * (step * rate - (b - a)), before, after, rates)
     in_axes = (0, 0, 0, 0, 0, 0, None, None)
     measured = (segment.values, segment.offsets, segment.spreads)
     return jax.vmap(_differences, in_axes)(before, after, curve, *measured, sensing.rate_bias, step)
 
 
 def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step) -> tuple[MotionState, MotionState]:
-    """States at the begin of each step of a segment and at its end, and their derivatives at these begins.
+    """States at the begin of each step of a segment and at its end, and their derivatives at the end of each step.
 
-    Actuators are left out.
+    Those at the begin would be of a force that has just changed, which a short lag forgets within the step. Actuators
+    are left out.
     """
     inputs = delayed(segment.inputs, sensing.command_delay / step)
     length = segment.values.shape[0]
@@ -66,8 +67,8 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
     actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
 
     def advance(x: MotionState, u):
-        rate = vehicle.dynamics(x, u, sensing.current)
         x = vehicle.advance(x, u, sensing.current, step)
+        rate = vehicle.dynamics(x, u, sensing.current)
         return x, (x._replace(actuators=()), rate._replace(actuators=()))
 
     guess = segment.start
