@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -119,7 +120,8 @@ def evaluated(name, cost, radius=0.9, **options):
 
 
 def tuning(given, tuned):
-    return Tuned(None, "search", (given, tuned, tuned), [], 40, 3, 12.0, True, 28)
+    problem = SimpleNamespace(train=SimpleNamespace(variants=("",)))  # one vehicle
+    return Tuned(problem, "search", (given, tuned, tuned), [], 40, 3, 12.0, True, 28)
 
 
 def test_given_gains_are_kept_where_no_others_are_better():
