@@ -122,7 +122,7 @@ def _margins(prediction: Prediction) -> PredictionTable:
 def _vehicles(prediction: Prediction) -> PredictionTable:
     rows = [
         (
-            vehicle.name.removesuffix(" within its deviations"),
+            vehicle.name,
             *(_time(vehicle.margins[name]) for name in ("sampling_time", "delay", "lag")),
             *(_number(vehicle.margins[name]) for name in ("gain_low", "gain_high")),
             f"{vehicle.radius:.6f}",

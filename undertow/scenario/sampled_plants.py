@@ -37,7 +37,7 @@ def sampled_plants(built: Built, seed: int, count: int) -> dict[str, AbstractPla
     keys = vehicle_keys(samples, built.text)
     for number in range(count):
         values = {key: samples[name][number] for name, key in keys.items()}
-        plants[f"vehicle {number + 1} within its deviations"] = _plant(built, values)
+        plants[f"vehicle {number + 1}"] = _plant(built, values)
     return plants
 
 
