@@ -164,13 +164,16 @@ def test_of_sticks_only_the_vehicle_is_written(plant, tmp_path):
 
 
 def test_deviations_of_a_vehicle_file_are_priors(identified, plant, tmp_path):
-    """A second identification begins with what the first one found, and knows more."""
+    """A second identification begins with what the first one found, is nowhere less sure, and on the whole surer."""
     identified.write(tmp_path)
     again = ut.identify(tmp_path / "identified.yaml", dive_log(plant, 3, 30.0), free=("net_buoyancy",))
+    left = []
     for name in TRUTH:
         before, after = identified.parameters[name], again.parameters[name]
         np.testing.assert_allclose(after.parameter.prior, before.value, rtol=1e-9)
-        assert after.deviation < before.deviation
+        left.append(after.deviation / before.deviation)
+    assert max(left) <= 1 + 1e-9
+    assert np.median(left) < 0.8
 
 
 def test_a_tenth_of_outliers_moves_little(identified, plant):
