@@ -23,7 +23,7 @@ from undertow.report.plotted import Plotted
 from undertow.report.plotting import PlottingProcess
 from undertow.report.replay.replay_data import ReplayData, hull_size
 from undertow.report.run_page import RunPageContents, page_contents, write_run_page
-from undertow.report.run_tables import prediction_rows
+from undertow.report.run_tables import departure_words, prediction_rows
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.results.netcdf import write_metrics
 from undertow.scenario.results.run_result import ScenarioResult
@@ -32,7 +32,6 @@ from undertow.studies.prediction.operating_point import operating_point, predict
 
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10
-_MANIFOLD = 10.0  # a departure of which nobody wants the percentage
 
 # Peak metrics depend on single moments: shown, not compared.
 _PEAKS = ("position_max", "attitude_max", "tracking_max", "input_peak")
@@ -139,14 +138,10 @@ def comparison(predicted: PredictedMetrics, result: ScenarioResult) -> str:
     departing = [metric for metric in metrics if metric.name not in _PEAKS and metric.departure > _DEPARTS]
     if not departing:
         return "The run agrees with the prediction: no metric departs by more than 10 %"
-    departures = ", ".join(f"{metric.name} {_by(metric.departure)}" for metric in departing)
+    departures = ", ".join(f"{metric.name} {departure_words(metric.departure)}" for metric in departing)
     return (
         f"The run departs from the linear prediction by more than 10 %: {departures}{_because(result, result.steady)}"
     )
-
-
-def _by(departure: float) -> str:
-    return f"by {100 * departure:.0f} %" if departure < _MANIFOLD else "more than tenfold"
 
 
 def in_results(predicted: PredictedMetrics) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _NOTHING_FOUND = (
 )
 
 
+_MANIFOLD = 10.0  # a departure of which nobody wants the percentage
 WORDS = ("unit", "key")  # columns that are no numbers
 
 
@@ -63,10 +64,15 @@ def prediction_rows(
     for comparison in compared:
         unit = metrics[comparison.name].unit
         cells = (_measured(value, unit) for value in (comparison.predicted, comparison.measured))
-        departure = "-" if isinf(comparison.departure) else f"{100 * comparison.departure:.0f} %"
+        departure = "-" if isinf(comparison.departure) else departure_words(comparison.departure)
         name = metrics[comparison.name].named(comparison.name)
         rows.append((name, *cells, departure, display_units(0.0, unit)[1]))
-    return RunTable("Prediction", ("metric", "predicted", _span(window), "departs by", "unit"), rows)
+    return RunTable("Prediction", ("metric", "predicted", _span(window), "departs", "unit"), rows)
+
+
+def departure_words(departure: float) -> str:
+    """By how much a run departs from its prediction."""
+    return f"by {100 * departure:.0f} %" if departure < _MANIFOLD else "more than tenfold"
 
 
 def certificate_rows(certificate: Mapping[str, Any], window: tuple[float, float] | None) -> RunTable:

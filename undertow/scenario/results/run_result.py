@@ -24,7 +24,7 @@ from undertow.control.supervision.supervised_controller import state_in, unsuper
 from undertow.control.supervision.transition_log import transitions
 from undertow.core.contracts import AbstractController
 from undertow.core.json_text import finite_numbers
-from undertow.core.metric import AbstractMetric
+from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
 from undertow.physics.faults.of_computation import law_of_computed
 from undertow.physics.power.ledger import closure
@@ -172,7 +172,11 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         seed=origin.seed,
         steady=steady,
         whole=whole,
-        meanings={name: metric for name, metric in meanings(loop, settings.own).items() if name in metric_names},
+        meanings={
+            name: _between_records(name, metric, settings)
+            for name, metric in meanings(loop, settings.own).items()
+            if name in metric_names
+        },
         scenario=origin.scenario,
         success=None if lasted_but_unseen else evaluate_success(settings.criterion, steady),
         requirements=_verdicts(outcome, settings, steady or {}),
@@ -184,6 +188,14 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         versions=versions(),
     )
     return RunResult(series, facts, loop, outcome)
+
+
+def _between_records(name: str, metric: Metric, settings: MetricsSettings) -> Metric:
+    """A metric, and the variation of the input as what it is where records are further apart than control steps."""
+    if name != "input_variation" or settings.gathered or not settings.record > 1.5 * settings.dt:
+        return metric
+    unseen = "; what changes between records is not in it: `steady: {every_step: true}` counts every control step"
+    return metric._replace(name=f"{metric.name} between records", meaning=metric.meaning + unseen)
 
 
 def _metrics(
