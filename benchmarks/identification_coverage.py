@@ -18,7 +18,7 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.studies.identification.dive import dive_of
-from undertow.studies.identification.free_parameters import chosen, parameters_of
+from undertow.studies.identification.free_parameters import chosen, parameters_of, resolved_by
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
 from undertow.studies.identification.output_error import fit, scores_of
@@ -48,7 +48,8 @@ def run(seeds: int, first: int, duration: float, step: float) -> None:
     """Identify one vehicle per seed, and count."""
     plant = hybrid_vehicle(bluerov2_heavy(), t200())
     prior = prior_vehicle(plant)
-    parameters = [p._replace(deviation=PRIOR * p.deviation) for p in chosen(parameters_of(plant))]
+    usual = resolved_by(step, plant, chosen(parameters_of(plant)))
+    parameters = [p._replace(deviation=PRIOR * p.deviation) for p in usual]
     model = model_of(prior, parameters)
     unknowns = Unknowns(tuple(parameters), 1)
     inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))

@@ -5,6 +5,7 @@ import json
 import jsonschema
 import pytest
 
+import undertow as ut
 from undertow.analysis.metrics import MEANINGS
 from undertow.core import catalogue
 from undertow.core.errors import BadInput
@@ -27,7 +28,9 @@ def test_every_part_is_listed_with_its_kind(undertow, kind):
 @pytest.mark.parametrize(("kind", "name"), PARTS)
 def test_every_part_is_described(undertow, kind, name):
     described = undertow("describe", f"{kind}/{name}")
-    assert described.code == 0 and described.out.startswith(f"{name} {kind}")
+    presets = list(catalogue.presets_of(catalogue.names(kind)[name]))
+    title = f"{presets[0]}, preset of {name} ({kind})" if presets else f"{name} ({kind})"
+    assert described.code == 0 and described.out.startswith(title)
 
 
 @pytest.mark.full
@@ -55,7 +58,8 @@ def test_presets_are_found_by_their_names(undertow):
     }.items():
         assert rows[preset]["description"].startswith(f"Preset of `{law}`: ")
         (described,) = describing.describe(preset)
-        assert (described.name, described.options[0].default) == (law, preset)
+        usual = "required" if law == "rcaf" else "placed"
+        assert (described.name, described.options[0].default) == (f"{preset}, preset of {law}", usual)
         assert catalogue.spelled_out("controllers", {"kind": preset}) == {"kind": law, "preset": preset}
     assert not set(catalogue.presets("controllers")) & set(catalogue.names("controllers"))
     with pytest.raises(BadInput, match="`preset` must be left out, because `robust` is a preset of `rcaf`"):
@@ -72,8 +76,7 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
 @pytest.mark.full
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
     rcaf, sound, learning = describing.describe("rcaf")
-    presets = [option.default for one in (rcaf, sound, learning) for option in one.options[:1]]
-    assert presets == ["paper", "robust", "learning"]
+    assert [one.name for one in (rcaf, sound, learning)] == [f"{p}, preset of rcaf" for p in catalogue.presets_of(catalogue.names("controllers")["rcaf"])]
     assert "bandwidth" in {option.name for option in sound.options}
     options = {option.name: option for option in rcaf.options}
     assert "model" not in options
@@ -127,3 +130,20 @@ def test_signals_are_those_that_are_declared(undertow):
     assert all(name in out and signal.meaning in out for name, signal in RECORDED.items())
     out = undertow("describe", "pid").out
     assert "estimate d_hat of the lumped uncertainty" in out and "attained_share" in out and "weights" not in out
+
+
+def test_presets_and_mistakes_in_python():
+    """`ut.controllers.robust` is what `controller: robust` is, and a mistyped option is one line."""
+    model = ut.HybridVehicle(ut.vehicles.odin(), ut.thrusters.paper_table3()).model()
+    assert ut.controllers.robust(model) == ut.rcaf(model, preset="robust")
+    assert set(catalogue.presets("controllers")) < set(dir(ut.controllers))
+    for part in (ut.controllers.robust, ut.controllers.adrc):
+        with pytest.raises(BadInput, match=f"`bandwidht` must be an option of `{part.__name__}`.*`bandwidth`"):
+            part(model, bandwidht=3)
+    with pytest.raises(BadInput, match="`model` must be the nominal model of a plant"):
+        ut.rcaf()
+
+
+def test_a_dead_thruster_is_off():
+    with pytest.raises(BadInput, match="Did you mean `off`"):
+        catalogue.find("faults", "dead")

@@ -42,6 +42,7 @@ _OTHER_WORDS = {"gps": "position_fix", "gnss": "position_fix", "usbl": "position
 _OTHER_WORDS |= {"magnetometer": "compass", "heading": "compass", "ahrs": "imu", "gyro": "imu", "accelerometer": "imu"}
 _OTHER_WORDS |= {"pressure": "depth", "barometer": "depth", "tachometer": "propeller_speed", "rpm": "propeller_speed"}
 _OTHER_WORDS |= {"step": "setpoint", "hover": "setpoint", "station_keeping": "setpoint", "lawnmower": "lawn_mower"}
+_OTHER_WORDS |= dict.fromkeys(("dead", "failed", "failure", "broken", "lost"), "off")
 _OTHER_WORDS |= {"wave": "waves", "ocean_current": "current", "cable": "tether", "noise": "white_noise"}
 
 Part = Callable[..., Any]
@@ -51,17 +52,17 @@ FILE = "file"
 
 
 class PartPackage(ModuleType):
-    """A package whose attributes are its parts, where Python would put the modules of the same names."""
+    """A package whose attributes are its parts and their presets, where Python would put modules of the same names."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if isinstance(value, ModuleType) and value.__name__ == f"{self.__name__}.{name}":
             vars(self).update(_parts_in(value))
-            if name in _parts_in(value):
+            if name in _parts_in(value) or hasattr(value, "__path__"):  # a folder may have the name of a preset
                 return
         super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
-        return sorted({*vars(self), *collect(self)})
+        return sorted({*vars(self), *collect(self), *_preset_parts(self)})
 
 
 @functools.cache
@@ -99,22 +100,36 @@ def _shipped(kind: str, name: str) -> Part | None:
 
 
 def _of_a_model(part: Part) -> Part:
-    """A part that is made from a nominal model, with the error that a plant in its place is; any other as it is."""
-    if next(iter(inspect.signature(part).parameters), "") != "model":
+    """A part that is made from a nominal model, with errors for a plant in its place and for unknown options.
+
+    Any other part as it is.
+    """
+    parameters = inspect.signature(part).parameters
+    if next(iter(parameters), "") != "model":
         return part
+    takes_any = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
 
     @functools.wraps(part)
-    def made(model: Any, *arguments: Any, **options: Any) -> Any:
+    def made(model: Any = None, *arguments: Any, **options: Any) -> Any:
         if not isinstance(model, Model):
             hint = "Give it `plant.model()`"
             raise BadInput("model", "be the nominal model of a plant", f"of type {type(model).__name__}", hint=hint)
+        if not takes_any:
+            _check_options(part, options, f"`{part.__name__}`")
         return part(model, *arguments, **options)
 
     return made
 
 
+def _check_options(part: Part, options: Mapping[str, Any], called: str) -> None:
+    known = list(inspect.signature(part).parameters)[1:]
+    for name in options:
+        if name not in known:
+            raise BadInput(name, f"be an option of {called}", "unknown", hint=did_you_mean(name, known))
+
+
 def publish(package_name: str) -> Callable[[str], Any]:
-    """Make every part an attribute of its package, loaded when it is first used; returns the package's `__getattr__`.
+    """Make parts and presets attributes of their package, loaded when first used; returns the package's `__getattr__`.
 
     In the `__init__` of a package, `WITH_PRESETS` names the parts that have presets, if any have.
     """
@@ -128,8 +143,9 @@ def publish(package_name: str) -> Callable[[str], Any]:
             raise AttributeError(f"{package_name} has no `{name}`")
         if name in _module_names(package):
             module = importlib.import_module(f"{package_name}.{name}")
-            return _parts_in(module).get(name, module)
-        parts = collect(package)
+            of_that_name = _preset_parts(package) if hasattr(module, "__path__") else _parts_in(module)
+            return of_that_name.get(name, module)
+        parts = _preset_parts(package) | collect(package)
         if name not in parts:
             raise AttributeError(f"{package_name} has no part `{name}`. {did_you_mean(name, parts)}")
         return parts[name]
@@ -160,11 +176,19 @@ def usual_preset(part: Part) -> str:
 
 def presets(kind: str) -> dict[str, str]:
     """Every preset of the parts of a kind, with the name of its part: `robust` is one of `rcaf`."""
-    package = importlib.import_module(PACKAGE_OF[kind]) if kind in PACKAGE_OF else None
-    with_presets = {name: getattr(package, name) for name in getattr(package, "WITH_PRESETS", ())}
-    return {
-        preset: name for name, part in (with_presets | _from_elsewhere(kind)).items() for preset in presets_of(part)
-    }
+    shipped = _with_presets(importlib.import_module(PACKAGE_OF[kind])) if kind in PACKAGE_OF else {}
+    return {preset: name for name, part in (shipped | _from_elsewhere(kind)).items() for preset in presets_of(part)}
+
+
+def _with_presets(package: ModuleType) -> dict[str, Part]:
+    return {name: getattr(package, name) for name in vars(package).get("WITH_PRESETS", ())}
+
+
+@functools.cache
+def _preset_parts(package: ModuleType) -> dict[str, Part]:
+    """The presets of the parts of a package, by name."""
+    of_parts = (presets_of(part) for part in _with_presets(package).values())
+    return {name: double_outside_runs(_of_a_model(part)) for presets in of_parts for name, part in presets.items()}
 
 
 def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Mapping[str, Any]) -> Any:
@@ -174,10 +198,7 @@ def by_preset(presets: Mapping[str, Part], preset: str, model: Any, options: Map
         BadInput: there is no such preset, or it has no such option.
     """
     check_preset(presets, preset)
-    option_names = list(inspect.signature(presets[preset]).parameters)[1:]
-    for name in options:
-        if name not in option_names:
-            raise BadInput(name, f"be an option of preset `{preset}`", "unknown", hint=did_you_mean(name, option_names))
+    _check_options(presets[preset], options, f"preset `{preset}`")
     return presets[preset](model, **options)
 
 

@@ -103,8 +103,10 @@ def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, 
         if short not in (name, preset):
             continue
         description = _describe(kind, name, function, {"kind": name, "preset": preset})
-        preset_option = Option("preset", preset, f"one of {', '.join(presets)}.")
-        descriptions.append(description._replace(options=(preset_option, *description.options)))
+        usual = catalogue.usual_preset(part) or "required"
+        preset_option = Option("preset", usual, f"one of {', '.join(presets)}; these are the options of {preset}.")
+        title = f"{preset}, preset of {name}"
+        descriptions.append(description._replace(name=title, options=(preset_option, *description.options)))
     return tuple(descriptions)
 
 

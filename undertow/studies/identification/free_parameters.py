@@ -42,6 +42,8 @@ class FreeParameter(NamedTuple):
         deviation: standard deviation beforehand: of the logarithm where `is_ratio`, else in the unit.
         is_ratio: whether it must be positive and is compared by ratios.
         least: smallest value; -infinity where any is possible.
+        resolution: smallest standard deviation that the integration allows: of the logarithm where `is_ratio`, else in
+            the unit.
     """
 
     name: str
@@ -50,6 +52,7 @@ class FreeParameter(NamedTuple):
     deviation: float
     is_ratio: bool = False
     least: float = -math.inf
+    resolution: float = 0.0
 
     def value(self, z):
         """Value of a number of prior variance 1; arrays go through."""
@@ -175,12 +178,21 @@ def chosen(
 
 
 def resolved_by(step: float, plant: HybridVehicle, parameters: Sequence[FreeParameter]) -> list[FreeParameter]:
-    """The same parameters, with a lag of the thrusters no shorter than a step of the integration (s) can show."""
+    """The same parameters, with a lag of the thrusters no shorter, and no surer, than a step of the integration allows.
+
+    The fourth-order step multiplies what a lag leaves of a jump by the first terms of the series of an exponential. An
+    estimate makes up for the difference with another lag.
+    """
     time_constant = plant.thruster.actuator_model(plant.inputs(), False).time_constant()
     if time_constant is None or not np.all(np.asarray(time_constant) > 0):
         return list(parameters)
-    least = _SHORTEST_LAG * step / float(np.min(time_constant))
-    return [p._replace(least=min(least, p.prior)) if p.name == "lag" else p for p in parameters]
+    steps = step / float(np.min(time_constant))
+    least, left = _SHORTEST_LAG * steps, math.exp(-steps)
+    by_series = 1 - steps + steps**2 / 2 - steps**3 / 6 + steps**4 / 24
+    resolution = abs(by_series - left) / (steps * left)  # change of the logarithm of the lag with the same effect
+    return [
+        p._replace(least=min(least, p.prior), resolution=resolution) if p.name == "lag" else p for p in parameters
+    ]
 
 
 def chosen_in(

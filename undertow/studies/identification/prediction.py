@@ -42,20 +42,23 @@ def residuals(
         segment: one of `Segments`.
         step: s.
     """
-    states, rates = motion(vehicle, sensing, change, segment, step)
+    states, rates_before, rates_after = motion(vehicle, sensing, change, segment, step)
     before = jax.tree.map(lambda leaf: leaf[:-1], states)
     after = jax.tree.map(lambda leaf: leaf[1:], states)
-    curve = jax.tree.map(lambda a, b, rate: 2 * (step * rate - (b - a)), before, after, rates)
-    in_axes = (0, 0, 0, 0, 0, 0, None, None)
+    early = jax.tree.map(lambda a, b, rate: 2 * (b - a - step * rate), before, after, rates_before)
+    late = jax.tree.map(lambda a, b, rate: 2 * (step * rate - (b - a)), before, after, rates_after)
+    in_axes = (0, 0, 0, 0, 0, 0, 0, None, None)
     measured = (segment.values, segment.offsets, segment.spreads)
-    return jax.vmap(_differences, in_axes)(before, after, curve, *measured, sensing.rate_bias, step)
+    return jax.vmap(_differences, in_axes)(before, after, early, late, *measured, sensing.rate_bias, step)
 
 
-def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step) -> tuple[MotionState, MotionState]:
-    """States at the begin of each step of a segment and at its end, and their derivatives at the end of each step.
+def motion(
+    vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, step
+) -> tuple[MotionState, MotionState, MotionState]:
+    """States at the begin of each step of a segment and at its end, and derivatives at begin and end of each step.
 
-    Those at the begin would be of a force that has just changed, which a short lag forgets within the step. Actuators
-    are left out.
+    Inputs jump from step to step, so that the derivative at the end of one is not that at the begin of the next.
+    Actuators are left out.
     """
     inputs = delayed(segment.inputs, sensing.command_delay / step)
     length = segment.values.shape[0]
@@ -67,9 +70,10 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
     actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
 
     def advance(x: MotionState, u):
+        rate_before = vehicle.dynamics(x, u, sensing.current)
         x = vehicle.advance(x, u, sensing.current, step)
-        rate = vehicle.dynamics(x, u, sensing.current)
-        return x, (x._replace(actuators=()), rate._replace(actuators=()))
+        rate_after = vehicle.dynamics(x, u, sensing.current)
+        return x, tuple(one._replace(actuators=()) for one in (x, rate_before, rate_after))
 
     guess = segment.start
     start = MotionState(
@@ -78,9 +82,10 @@ def motion(vehicle: IdentifiedVehicle, sensing: Sensing, change, segment: Any, s
         nu=guess[7:] + change[6:],
         actuators=actuators,
     )
-    _, (after, rates) = jax.lax.scan(advance, start, inputs[before:])
+    _, (after, rates_before, rates_after) = jax.lax.scan(advance, start, inputs[before:])
     first = start._replace(actuators=())
-    return jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after), rates
+    states = jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after)
+    return states, rates_before, rates_after
 
 
 def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[Array, "steps N"]:
@@ -93,29 +98,41 @@ def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[A
 
 
 def _differences(
-    before: MotionState, after: MotionState, curve: MotionState, measured, offsets, spreads, rate_bias, step
+    before: MotionState,
+    after: MotionState,
+    early: MotionState,
+    late: MotionState,
+    measured,
+    offsets,
+    spreads,
+    rate_bias,
+    step,
 ) -> Float[Array, "13"]:
     """Of one step, whose samples were taken between two states.
 
-    The mean of samples differs from the value at their mean time where the motion is curved: `curve` is its second
-    derivative, times the square of the step.
+    The mean of samples differs from the value at their mean time where the motion is curved. `early` and `late` are
+    its second derivatives, times the square of the step, by the derivative at the begin and at the end of the step: a
+    cubic through both states with both derivatives has the one at the begin, the other at the end, and their mean
+    between, weighted with the time.
     """
     below_chord = 0.5 * (offsets - offsets**2 - spreads)
+    curved = lambda sensor, of: (1 - offsets[sensor]) * of(early) + offsets[sensor] * of(late)
 
-    def blend(sensor: int, a, b, curved):
+    def blend(sensor: int, of):
         share = offsets[sensor]
-        return (1 - share) * a + share * b - below_chord[sensor] * curved
+        return (1 - share) * of(before) + share * of(after) - below_chord[sensor] * curved(sensor, of)
 
-    placed = _place(before, after, offsets[0], step) + 0.5 * spreads[0] * curve.position
-    quaternion = blend(1, before.attitude, after.attitude, curve.attitude)
+    position = lambda x: x.position
+    placed = _place(before, after, offsets[0], step) + 0.5 * spreads[0] * curved(0, position)
+    quaternion = blend(1, lambda x: x.attitude)
     quaternion = quaternion / jnp.sqrt((quaternion * quaternion).sum())
-    down = _place(before, after, offsets[4], step)[2] + 0.5 * spreads[4] * curve.position[2]
+    down = _place(before, after, offsets[4], step)[2] + 0.5 * spreads[4] * curved(4, position)[2]
     return jnp.concatenate(
         [
             placed - measured[:3],
             attitude_error(quaternion, measured[3:7]),
-            blend(2, before.nu[:3], after.nu[:3], curve.nu[:3]) - measured[7:10],
-            blend(3, before.nu[3:], after.nu[3:], curve.nu[3:]) + rate_bias - measured[10:13],
+            blend(2, lambda x: x.nu[:3]) - measured[7:10],
+            blend(3, lambda x: x.nu[3:]) + rate_bias - measured[10:13],
             (down - measured[13])[None],
         ]
     )

@@ -89,14 +89,14 @@ def simulated_log(
     """
     held = np.repeat(inputs[::5], 5, axis=0)[: len(inputs)]
     truth = _motion(vehicle, jnp.asarray(command_delay), jnp.asarray(current), jnp.asarray(held), depth)
-    series = {name: np.asarray(values) for name, values in truth.items()}
+    curves = {name: _Curve(*(np.asarray(values) for values in curve)) for name, curve in truth.items()}
     duration = _FINE * len(inputs)
     time = _FINE * np.arange(len(inputs) + 1)
     signals = {}
     for signal, sensor in sensors.items():
         stamps = np.arange(0.0, duration, 1 / sensor.rate)
         stamps = stamps + generator.uniform(0.0, _JITTER / sensor.rate, len(stamps))
-        values = np.stack([np.interp(stamps, time, column) for column in series[signal].T], axis=1)
+        values = curves[signal].at(stamps)
         if signal == "attitude":  # of quaternions between two steps
             values = np.asarray(_euler(jnp.asarray(values / np.linalg.norm(values, axis=1, keepdims=True))))
         values = values + sensor.noise * generator.standard_normal(values.shape)
@@ -107,9 +107,26 @@ def simulated_log(
     return Log(signals, name, "undertow")
 
 
+class _Curve(NamedTuple):
+    """A signal at every fine step, and its derivatives at begin and end of each: inputs jump between two steps."""
+
+    values: np.ndarray  # (steps + 1, columns)
+    rates_before: np.ndarray  # (steps, columns)
+    rates_after: np.ndarray
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """By the cubic through two values with both derivatives: straight lines would show a lag as longer."""
+        steps = np.clip((times / _FINE).astype(int), 0, len(self.rates_before) - 1)
+        share = (times / _FINE - steps)[:, None]
+        begin, end = self.values[steps], self.values[steps + 1]
+        early = end - begin - _FINE * self.rates_before[steps]
+        late = _FINE * self.rates_after[steps] - (end - begin)
+        return begin + share * (end - begin) - share * (1 - share) * ((1 - share) * early + share * late)
+
+
 @eqx.filter_jit
 def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: float):
-    """True signals at every fine step."""
+    """True signals."""
     steps = inputs.shape[0]
     start = jnp.zeros(13).at[2].set(depth).at[3].set(1.0)
     nothing = jnp.zeros((steps, 1))
@@ -117,12 +134,12 @@ def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: f
     arrays = (with_run_in, nothing, nothing, nothing, nothing, start, jnp.zeros(()), jnp.zeros(()))
     segment = Segments(*arrays)  # pyright: ignore[reportArgumentType] - JAX arrays
     sensing = Sensing(command_delay, current, jnp.zeros(3))
-    states, _ = motion(vehicle, sensing, jnp.zeros(12), segment, jnp.asarray(_FINE))
+    found = motion(vehicle, sensing, jnp.zeros(12), segment, jnp.asarray(_FINE))
     return {
-        "position": states.position,
-        "attitude": states.attitude,
-        "body_velocity": states.nu[:, :3],
-        "angular_velocity": states.nu[:, 3:],
+        "position": _Curve(*(x.position for x in found)),
+        "attitude": _Curve(*(x.attitude for x in found)),
+        "body_velocity": _Curve(*(x.nu[:, :3] for x in found)),
+        "angular_velocity": _Curve(*(x.nu[:, 3:] for x in found)),
     }
 
 

@@ -77,7 +77,8 @@ class Uncertainty(NamedTuple):
 
     def intervals(self, parameters: Sequence[FreeParameter], z: np.ndarray) -> list[ParameterInterval]:
         """Of each parameter."""
-        deviations = np.sqrt(np.diagonal(self.covariance))
+        of_data = np.sqrt(np.diagonal(self.covariance))[: len(parameters)]
+        deviations = np.hypot(of_data, [p.resolution / p.deviation for p in parameters])
         reach = stats.t.ppf(0.5 + LEVEL / 2, self.freedom) * deviations
         return [_interval(p, z[i], deviations[i], reach[i]) for i, p in enumerate(parameters)]
 
