@@ -43,7 +43,7 @@ from undertow.scenario.changed_values import put_value
 from undertow.scenario.consistency import check_fit, check_start, check_times, rounded_times
 from undertow.scenario.fault_injection import with_faults
 from undertow.scenario.part_cache import PartCache
-from undertow.scenario.plausibility import angles_meant
+from undertow.scenario.plausibility import start_and_angles
 from undertow.scenario.reading import from_data, read
 from undertow.scenario.results.netcdf import save
 from undertow.scenario.results.run_result import MetricsSettings, Origin, RunResult, ScenarioResult, make_result
@@ -216,7 +216,7 @@ def simulate(
     duration: float = 20.0,
     loop: Literal["sampled", "continuous"] = "sampled",
     dt: float = 1e-3,
-    record: float = 1e-2,
+    record: float | None = None,
     seed: int = 0,
     position: Any = None,
     velocity: Any = None,
@@ -235,7 +235,7 @@ def simulate(
         duration: s. The steady metrics are taken over its second half.
         loop: `sampled` (input held over each dt) or `continuous` (one ODE, the paper's setting).
         dt: sampling time of the controller, or step of the ODE, s.
-        record: time between records, s.
+        record: time between records, s; None for 0.01 s, or the next whole number of `dt`.
         seed: of everything random.
         position: outputs at t = 0, shape (n,), m and rad; None for zero.
         velocity: their rates, shape (n,), m/s and rad/s; None for zero.
@@ -305,7 +305,8 @@ def _with_faults(
 def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], seed: int, position, velocity) -> Run:
     nowhere = from_data({})
     try:
-        plain = dict(zip(("duration", "dt", "record"), map(_plain, times), strict=True))
+        given = zip(("duration", "dt", "record"), map(_plain, times), strict=True)
+        plain = {name: value for name, value in given if value is not None}
         settings = ClosedLoopSettings.model_validate({"kind": kind, **plain})
         start = Initial(position=_plain(position), velocity=_plain(velocity))
         window = Window()
@@ -315,7 +316,7 @@ def _simulate(closed_loop: ClosedLoop, kind: str, times: tuple[Any, Any, Any], s
     check_times(settings)
     check_start(closed_loop, start)
     check_fit(closed_loop)
-    for advice in (*rounded_times(settings), *angles_meant(closed_loop, settings.duration, start.position)):
+    for advice in (*rounded_times(settings), *start_and_angles(closed_loop, settings.duration, start.position)):
         warnings.warn(advice.sentence, stacklevel=3)
     outcome, left_to_xla = run_loop(closed_loop, settings, start, seed)
     criterion = criterion_of(None, meanings(closed_loop))

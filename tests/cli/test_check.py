@@ -218,9 +218,13 @@ def test_a_law_that_prints_and_has_no_slope_gets_advice(undertow, tmp_path):
     assert said.code == 0 and "error JitTracer(float64[6])" in said.out
     assert "`Terminal` prints `JitTracer(float64[6])`, once, while it is compiled, and never again" in said.out
     assert "`command` should have a finite slope where the error is zero" in said.out
+    scenario = "plant: double_integrator\nreference: {kind: setpoint, position: [1]}\ncontroller: ./law.py:terminal\n"
+    (tmp_path / "s.yaml").write_text(scenario)
+    assert "`command` should have a finite slope where the error is zero" in undertow("check", "s.yaml").out
     smooth = TERMINAL.replace("print(", "repr((").replace("off.error)\n", "off.error))\n", 1)
     smooth = smooth.replace("jnp.sign(off.error) * jnp.abs(off.error) ** 0.6", "off.error")
     (tmp_path / "law.py").write_text(smooth)
+    assert "finite slope" not in undertow("check", "s.yaml").out
     *_, verdict, following = undertow("check", "law.py:terminal").out.splitlines()
     assert verdict.startswith("law.py:terminal: 0 errors, 0 pieces of advice. It can be used")
     assert following.startswith("Next: write `controller: law.py:terminal` in a scenario")

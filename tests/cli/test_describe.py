@@ -76,7 +76,9 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
 @pytest.mark.full
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
     rcaf, sound, learning = describing.describe("rcaf")
-    assert [one.name for one in (rcaf, sound, learning)] == [f"{p}, preset of rcaf" for p in catalogue.presets_of(catalogue.names("controllers")["rcaf"])]
+    assert [one.name for one in (rcaf, sound, learning)] == [
+        f"{p}, preset of rcaf" for p in catalogue.presets_of(catalogue.names("controllers")["rcaf"])
+    ]
     assert "bandwidth" in {option.name for option in sound.options}
     options = {option.name: option for option in rcaf.options}
     assert "model" not in options

@@ -90,3 +90,5 @@ def test_dominated_candidates_are_pale_and_failed_ones_hollow(compared):
     assert [float(a.get_xdata()[0]), float(c.get_xdata()[0])] == [1.0, 3.0]
     assert float(a.get_ydata()[0]) == found.medians["position_rms"]["a"].value
     assert [text.get_text() for text in panel.texts] == ["a", "b", "c"]
+    # Of a point in the right half the name stands to the left, so that a long one is not cut off.
+    assert [text.get_horizontalalignment() for text in panel.texts] == ["left", "left", "right"]

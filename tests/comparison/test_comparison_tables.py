@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 
 import numpy as np
 import pytest
@@ -101,6 +102,8 @@ def test_latex(findings):
     assert "position error, rms per axis (m) & 1.04 [1.01, 1.08] & 0.590 [0.520, 0.660]$^{*}$ & " in text
     assert "input variation (m/s$^{2}$/s) & $1.04 \\times 10^{-5}$ [" in text
     assert "b\\_1 $-$ a & position error, rms per axis (m) & $-$0.455 [" in text and "$-$43.5 \\%" in text
+    shares = re.findall(r"([\d.]+) \\%", text)
+    assert all(len(share.replace(".", "").lstrip("0")) == 3 for share in shares if share not in ("95", "0"))
     for line in text.splitlines():
         if "&" in line:
             assert line.count(" & ") in (3, 6) and line.endswith(" \\\\")

@@ -41,7 +41,9 @@ def test_mean_of_samples_on_a_parabola():
     """u = 1 + 2 s + 3 s^2 over a step, sampled at three shares s: the mean of the samples is predicted exactly."""
     shares = np.array([0.1, 0.35, 0.9])
     motion = lambda s: 1 + 2 * s + 3 * s**2
-    assert predicted_surge(motion(0.0), motion(1.0), 6.0, 6.0, shares) == pytest.approx(motion(shares).mean(), rel=1e-12)
+    assert predicted_surge(motion(0.0), motion(1.0), 6.0, 6.0, shares) == pytest.approx(
+        motion(shares).mean(), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.8])

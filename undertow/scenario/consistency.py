@@ -17,14 +17,12 @@ from undertow.core.errors import Advice, BadInput, advice, error_location, joine
 from undertow.core.return_checks import check_state, form
 from undertow.core.signals import check_declared
 from undertow.core.user_code import RAISED, fault_of
-from undertow.scenario.schema import ClosedLoopSettings, Initial, Window
+from undertow.scenario.schema import LONG_STEP, ClosedLoopSettings, Initial, Window
 from undertow.simulation.loop.closed_loop import ClosedLoop
 
 # A record takes about a kilobyte, a control step some microseconds.
 MOST_RECORDS = 1_000_000
 MOST_STEPS = 2_000_000_000
-
-_LONG = 0.5  # s; few vehicles are stable with a controller that is sampled more slowly
 
 # Relative tolerance for multiples of decimal steps.
 _ROUNDING = 1e-9
@@ -40,7 +38,7 @@ def check_times(loop: ClosedLoopSettings) -> None:
     if loop.method not in allowed:
         raise BadInput("method", f"be {' or '.join(allowed)} when {loop.kind}", loop.method)
     stepped = loop.method != "adaptive"
-    if stepped and loop.dt > max(_LONG, loop.record * (1 + _ROUNDING)):
+    if stepped and loop.dt > max(LONG_STEP, loop.record * (1 + _ROUNDING)):
         hint = f"It is in seconds: {loop.dt:g} ms are {loop.dt / 1e3:g}"
         raise BadInput("dt", f"be at most `loop.record` ({loop.record:g} s)", f"{loop.dt:g} s", hint=hint)
     shortest = max(loop.record, loop.dt if stepped else 0.0)

@@ -66,9 +66,11 @@ def plausibility(loop: ClosedLoop, duration: float, start: list[float] | None) -
     return tuple(all_advice)
 
 
-def angles_meant(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
-    """Of `plausibility`, for the same arguments, what is said of angles."""
-    return tuple(_angles(loop, _desired(loop, duration, start)))
+def start_and_angles(loop: ClosedLoop, duration: float, start: list[float] | None) -> tuple[Advice, ...]:
+    """Of `plausibility`, for the same arguments, what is said of angles and of a path that begins elsewhere."""
+    desired = _desired(loop, duration, start)
+    elsewhere = _begins_elsewhere(desired) if isinstance(loop.plant, HybridVehicle) else ()
+    return (*_angles(loop, desired), *elsewhere)
 
 
 def top_speed(plant: HybridVehicle) -> float:

@@ -1,11 +1,14 @@
 """Keys of a scenario file, their defaults and their checks. Validated before anything is built or compiled."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from undertow.core import catalogue
+
+LONG_STEP = 0.5  # s; few vehicles are stable with a controller that is sampled more slowly
 
 
 def _named(default: str | None = None) -> BeforeValidator:
@@ -74,7 +77,12 @@ class ClosedLoopSettings(Strict, title="Loop"):
     )
     duration: float = Field(20.0, gt=0, le=1e6, description="duration of the run, s")
     dt: float = Field(1e-3, gt=0, le=10, description="sampling time of the controller, or step of the ODE, s")
-    record: float = Field(1e-2, gt=0, le=1e5, description="time between records, s")
+    record: float = Field(
+        1e-2,
+        gt=0,
+        le=1e5,
+        description="time between records, s; where 0.01 is no whole number of `dt`, the default is the next one",
+    )
     method: Literal["rk4", "euler", "adaptive"] = Field(
         "rk4",
         description="integration method: rk4; euler (sampled only); adaptive with rtol and atol (continuous only)",
@@ -87,6 +95,14 @@ class ClosedLoopSettings(Strict, title="Loop"):
     )
     rtol: float = Field(1e-8, gt=0, lt=1, description="relative tolerance (adaptive only)")
     atol: float = Field(1e-9, gt=0, lt=1, description="absolute tolerance (adaptive only)")
+
+    @model_validator(mode="after")
+    def _record_whole_steps(self) -> "ClosedLoopSettings":
+        steps = self.record / self.dt
+        if "record" not in self.model_fields_set and self.method != "adaptive" and self.dt <= LONG_STEP:
+            if abs(steps - round(steps)) > 1e-6 * steps:
+                self.record = math.ceil(steps) * self.dt
+        return self
 
 
 class Initial(Strict):

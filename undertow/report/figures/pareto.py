@@ -11,7 +11,8 @@ from undertow.report.figures.campaign import looks_of
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.pareto import Front
 
-_COLUMNS, _PALE = 2, 0.3
+_COLUMNS, _PALE, _PALE_NAME = 2, 0.3, 0.55
+_MIDDLE = 0.5  # of a panel
 _WIDE = 30.0  # ratio of largest and smallest from which on an axis is logarithmic
 _WIDTH, _HEIGHT = 4.0, 2.4  # of a panel, in
 
@@ -42,17 +43,6 @@ def _plot(panel: Axes, findings: Findings, front: Front) -> None:
         panel.plot(x_interval, [y, y], color=look.colour, alpha=alpha, linewidth=1.2)
         panel.plot([x, x], y_interval, color=look.colour, alpha=alpha, linewidth=1.2)
         panel.plot(x, y, "o", color=look.colour, markerfacecolor=fill, alpha=alpha, markersize=5)
-        weight = "bold" if strong else "normal"
-        panel.annotate(
-            name,
-            (x, y),
-            xytext=(4, 4),
-            textcoords="offset points",
-            fontsize=style.SMALL,
-            color=style.INK,
-            alpha=max(alpha, 0.55),
-            fontweight=weight,
-        )
     steps = np.array([front.points[name] for name in front.front]).reshape(-1, 2)
     panel.step(scales[0][0] * steps[:, 1], scales[1][0] * steps[:, 0], where="pre", color=style.INK, linewidth=0.7)
     for axis, values in ((panel.set_xscale, 1), (panel.set_yscale, 0)):
@@ -60,5 +50,27 @@ def _plot(panel: Axes, findings: Findings, front: Front) -> None:
         if column.min() > 0 and column.max() > _WIDE * column.min():
             axis("log")
     panel.margins(0.14)
+    _name_points(panel, front, scales[0][0], scales[1][0])
     words = lambda metric, unit: ", ".join([titled_name(metric), *([style.power(unit)] if unit else [])])
     style.label(panel, words(front.effort, scales[0][1]), words(front.error, scales[1][1]))
+
+
+def _name_points(panel: Axes, front: Front, effort_scale: float, error_scale: float) -> None:
+    """Names beside the points, to the left of those in the right half, where a long one would be cut off."""
+    panel.autoscale_view()
+    to_axes = panel.transData + panel.transAxes.inverted()
+    for name, (error, effort) in front.points.items():
+        at = (effort_scale * effort, error_scale * error)
+        strong = name in front.front
+        leftwards = to_axes.transform(at)[0] > _MIDDLE
+        panel.annotate(
+            name,
+            at,
+            xytext=(-4 if leftwards else 4, 4),
+            textcoords="offset points",
+            horizontalalignment="right" if leftwards else "left",
+            fontsize=style.SMALL,
+            color=style.INK,
+            alpha=1.0 if strong else _PALE_NAME,
+            fontweight="bold" if strong else "normal",
+        )

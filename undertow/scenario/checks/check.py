@@ -17,7 +17,7 @@ from undertow.physics.plants.double_integrator import double_integrator
 from undertow.physics.thrusters.thruster import AbstractThruster
 from undertow.physics.vehicles.vehicle import VehicleModel
 from undertow.scenario import factory
-from undertow.scenario.build import build, in_its_precision
+from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.checks.controller_check import check_stability
 from undertow.scenario.checks.finding import Finding
 from undertow.scenario.checks.flow_stability import flow_advice
@@ -113,12 +113,12 @@ def _of_part(name: str, part: Any) -> Report:
     return _report([*findings, *part_advice], where, title=f"{name} (plant)", rows=rows)
 
 
-def _of_feedback(make: Callable[..., Any], axes: int) -> Report:
+def _of_feedback(make: Callable[..., Any], axes: int, dt: float = 1e-3) -> Report:
     """A controller in a loop with a double integrator of as many outputs as the vehicle of its check."""
     plant = double_integrator(axes)
     try:
         law = make(plant.model())
-        return _report(check_stability(law, plant), partial(_place, law))
+        return _report(check_stability(law, plant, dt), partial(_place, law))
     except Exception:  # a law may be for vehicles only, or not differentiable
         return _report(())
 
@@ -160,7 +160,21 @@ def _of_scenario(text: Text) -> list[Report]:
         for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller):
             findings = kept_result("contract", Constant((part, around)), partial(check_contract, part, around))
             reports.append(_report(findings, partial(_place, part)))
+        if not any(report.errors for report in reports):
+            reports.append(_of_own_law(built))
     return reports
+
+
+def _of_own_law(built: Built) -> Report:
+    """Slopes of a controller in a file of the user's: those of the catalogue have some. Its gains are for its plant."""
+    law = built.resolved["controller"]
+    if ".py:" not in law["kind"]:
+        return _report(())
+    axes = len(built.closed_loop.plant.outputs)
+    report = _of_feedback(
+        lambda model: factory.make("controllers", law, built.text.folder, (model,))[0], axes, built.scenario.loop.dt
+    )
+    return report._replace(found=tuple((finding, where) for finding, where in report.found if finding.rule == "slope"))
 
 
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:

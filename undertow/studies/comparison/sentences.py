@@ -1,6 +1,7 @@
 """The findings of a comparison in sentences: failures, and what is established between every two candidates."""
 
 import math
+from collections.abc import Callable
 
 from undertow.analysis.metrics import titled_name
 from undertow.core.number_text import display_units
@@ -77,12 +78,12 @@ def digits(value: float) -> str:
     return f"{value:.3g}" if not 1000 <= abs(value) < math.inf else f"{value:.0f}"
 
 
-def relative(difference: PairedDifference, unit: str) -> str:
+def relative(difference: PairedDifference, unit: str, number: Callable[[float], str] = digits) -> str:
     """Median difference in percent of the baseline; in the unit of the metric where the baseline has zeros."""
     if math.isnan(difference.relative):
         return f"{'+' if difference.median > 0 else ''}{value_with_unit(difference.median, unit)}"
     sign = "+" if difference.relative > 0 else ""
-    return f"{sign}{digits(100 * difference.relative)} %"
+    return f"{sign}{number(100 * difference.relative)} %"
 
 
 def _between(findings: Findings, candidate: str, baseline: str) -> str:

@@ -73,9 +73,9 @@ def paired(findings: Findings, number: Callable[[float], str] = digits) -> TextT
                 f"{difference.candidate} - {difference.baseline}",
                 titled(findings, difference.metric),
                 median(Median(difference.median, difference.low, difference.high, difference.pairs), unit, number),
-                _NOTHING if math.isnan(difference.relative) else relative(difference, unit),
+                _NOTHING if math.isnan(difference.relative) else relative(difference, unit, number),
                 of(difference.smaller),
-                _NOTHING if math.isnan(difference.p_holm) else digits(difference.p_holm),
+                _NOTHING if math.isnan(difference.p_holm) else number(difference.p_holm),
                 "yes" if difference.established else "no",
             )
         )

@@ -190,9 +190,7 @@ def resolved_by(step: float, plant: HybridVehicle, parameters: Sequence[FreePara
     least, left = _SHORTEST_LAG * steps, math.exp(-steps)
     by_series = 1 - steps + steps**2 / 2 - steps**3 / 6 + steps**4 / 24
     resolution = abs(by_series - left) / (steps * left)  # change of the logarithm of the lag with the same effect
-    return [
-        p._replace(least=min(least, p.prior), resolution=resolution) if p.name == "lag" else p for p in parameters
-    ]
+    return [p._replace(least=min(least, p.prior), resolution=resolution) if p.name == "lag" else p for p in parameters]
 
 
 def chosen_in(

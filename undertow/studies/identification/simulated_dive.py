@@ -89,7 +89,7 @@ def simulated_log(
     """
     held = np.repeat(inputs[::5], 5, axis=0)[: len(inputs)]
     truth = _motion(vehicle, jnp.asarray(command_delay), jnp.asarray(current), jnp.asarray(held), depth)
-    curves = {name: _Curve(*(np.asarray(values) for values in curve)) for name, curve in truth.items()}
+    curves = {name: _Curve(*map(np.asarray, curve)) for name, curve in truth.items()}
     duration = _FINE * len(inputs)
     time = _FINE * np.arange(len(inputs) + 1)
     signals = {}
@@ -126,7 +126,7 @@ class _Curve(NamedTuple):
 
 @eqx.filter_jit
 def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: float):
-    """True signals."""
+    """True signals at every fine step, with their derivatives at begin and end of each: see `_Curve`."""
     steps = inputs.shape[0]
     start = jnp.zeros(13).at[2].set(depth).at[3].set(1.0)
     nothing = jnp.zeros((steps, 1))
@@ -136,10 +136,10 @@ def _motion(vehicle: IdentifiedVehicle, command_delay, current, inputs, depth: f
     sensing = Sensing(command_delay, current, jnp.zeros(3))
     found = motion(vehicle, sensing, jnp.zeros(12), segment, jnp.asarray(_FINE))
     return {
-        "position": _Curve(*(x.position for x in found)),
-        "attitude": _Curve(*(x.attitude for x in found)),
-        "body_velocity": _Curve(*(x.nu[:, :3] for x in found)),
-        "angular_velocity": _Curve(*(x.nu[:, 3:] for x in found)),
+        "position": tuple(x.position for x in found),
+        "attitude": tuple(x.attitude for x in found),
+        "body_velocity": tuple(x.nu[:, :3] for x in found),
+        "angular_velocity": tuple(x.nu[:, 3:] for x in found),
     }
 
 
