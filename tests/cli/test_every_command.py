@@ -16,7 +16,7 @@ FALSIFIED = (
 PATHS = {
     "init": [("init new --own-vehicle", 0, "cd new"), ("init new", 2, "`PATH` must be a place without these files")],
     "list": [("list", 0, "bluerov2_heavy"), ("list faults", 0, "kinds. `undertow describe faults/NAME`")],
-    "describe": [("describe t200", 0, "t200 thrusters"), ("describe t20", 2, "`NAME` must be a part")],
+    "describe": [("describe t200", 0, "t200 (thrusters)"), ("describe t20", 2, "`NAME` must be a part")],
     "check": [
         ("check bluerov2_heavy", 0, "bluerov2_heavy: 0 errors"),
         ("check bluerov2_heavy --option mas=3", 2, "`mas` must be an option or parameter here"),

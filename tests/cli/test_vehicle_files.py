@@ -125,7 +125,7 @@ def test_scenario_and_its_repetition_without_the_file(rov, undertow, tmp_path, r
 def test_described(rov, undertow):
     rov()
     said = undertow("describe", "my_rov.yaml")
-    assert said.code == 0 and said.out.startswith("my_rov.yaml vehicle file")
+    assert said.code == 0 and said.out.startswith("my_rov.yaml (vehicle file)")
     assert "diag(0.26, 0.23, 0.37)" in said.out and "von Benzon" in said.out
 
 
