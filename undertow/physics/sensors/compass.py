@@ -22,6 +22,8 @@ from undertow.physics.sensors.sensor import AbstractDisturbedSensor
 
 # s; the thrusters that carry the sum of the currents change, and with them where its field points. Chosen.
 _INTERFERENCE_TIME = 60.0
+# s; in which a sum of currents that no speed tells leaves its mean: between a wave and a turn of the vehicle. Chosen.
+_VARIATION_TIME = 10.0
 
 
 class ThrusterCurrents(eqx.Module):
@@ -29,6 +31,11 @@ class ThrusterCurrents(eqx.Module):
 
     coefficient: Float[Param, ""] = param("A s^2/rad^2", "current of a thruster over the square of its speed")
     assumed: Float[Param, ""] = param("A", "sum of the currents where no speed tells it")
+    variation: Float[Param, ""] = param("A", "standard deviation of that sum where no speed tells it")
+
+    def unknown(self, motion: Motion):
+        """Standard deviation of the sum, A: zero where speeds tell it."""
+        return self.variation if motion.actuator is None else jnp.zeros(())
 
     def total(self, motion: Motion):
         """Sum, A."""
@@ -55,6 +62,7 @@ class Compass(AbstractDisturbedSensor):
         pairs = {"noise": jnp.ones(1), "hard iron": first, "soft iron": jnp.stack([jnp.sin(2 * yaw), jnp.cos(2 * yaw)])}
         if self.currents is not None:
             pairs["thrusters"] = self.currents.total(motion) * first
+            pairs["unknown currents"] = self.currents.unknown(motion) * first
         return jnp.concatenate([pairs[name] for name in self.disturbed_by])[None, :]
 
     def check(self, motion: Motion):
@@ -76,6 +84,7 @@ def compass(
     soft_iron: float | None = None,
     interference: float | None = None,
     assumed_current: float = 10.0,
+    current_variation: float | None = None,
     current_coefficient: float = 1.86e-4,
 ) -> Compass:
     """Heading, from a magnetic or fibre-optic compass.
@@ -94,16 +103,21 @@ def compass(
         interference: likewise of an error (F sin yaw + G cos yaw) I with the sum I of the currents of the thrusters,
             rad/A; F and G wander with a correlation time of 60 s, because the thrusters that carry it change.
         assumed_current: sum of the currents with which a filter reckons that has no `propeller_speed`, A.
+        current_variation: standard deviation of that sum with which such a filter reckons, A; it changes within 10 s.
+            None for as much as `assumed_current`.
         current_coefficient: current of a thruster over the square of the speed of its propeller, A s^2/rad^2; that of a
             T200 is its torque coefficient over its motor constant. Currents while a propeller speeds up are neglected.
     """
     checks.not_negative("assumed_current", assumed_current, "A")
+    variation = assumed_current if current_variation is None else current_variation
+    checks.not_negative("current_variation", variation, "A")
     checks.not_negative("current_coefficient", current_coefficient, "A s^2/rad^2")
     simple = correlated_errors(correlated_noise, correlation_time)
     pairs = {
         "hard iron": (hard_iron, np.inf),
         "soft iron": (soft_iron, np.inf),
         "thrusters": (interference, _INTERFERENCE_TIME),
+        "unknown currents": (interference, _VARIATION_TIME),
     }
     disturbed_by = () if simple is None else ("noise",)
     deviations, times = ([], []) if simple is None else ([correlated_noise], [correlation_time])
@@ -114,5 +128,5 @@ def compass(
             times += [time] * 2
     errors = CorrelatedErrors(deviations, times) if disturbed_by else None
     sampling = Sampling(period, noise, bias, resolution, delay, dropout, errors=errors)
-    currents = None if interference is None else ThrusterCurrents(current_coefficient, assumed_current)
+    currents = None if interference is None else ThrusterCurrents(current_coefficient, assumed_current, variation)
     return Compass(sampling, disturbed_by, currents)
