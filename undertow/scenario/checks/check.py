@@ -20,7 +20,7 @@ from undertow.scenario import factory
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.checks.controller_check import check_stability
 from undertow.scenario.checks.finding import Finding
-from undertow.scenario.checks.flow_stability import flow_advice
+from undertow.scenario.checks.flow_stability import flow_advice, given_gains_advice
 from undertow.scenario.checks.part_check import check_contract, of_plant
 from undertow.scenario.checks.plant_check import derived_of_plant
 from undertow.scenario.checks.thruster_check import derived_of_thruster
@@ -143,7 +143,7 @@ def _of_scenario(text: Text) -> list[Report]:
     loop = built.closed_loop
     located_advice = [
         (Finding("advice", "scenario", "", advice.says, advice.hint), advice.where)
-        for advice in (*built.advice(), *flow_advice(built))
+        for advice in (*built.advice(), *(flow_advice(built) or given_gains_advice(built)))
     ]
     reports = [Report(tuple(located_advice), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:

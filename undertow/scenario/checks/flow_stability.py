@@ -5,6 +5,7 @@ or under way, its attitude is unstable by itself, the faster the flow. A slow lo
 """
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from undertow.scenario.build import Built, build_scenario, in_its_precision
 # What a loop turns back by far: growth of the attitude in this flow (m/s) within one sampling time.
 _FLOW, _LITTLE_GROWTH = 1.0, 0.12
 _HARMLESS = 0.4  # growth of errors, 1/s: runs whose errors grow more slowly in a fast flow stay near their reference
+_GROWN = 5.0  # logarithm of the growth over a run in a flow that stays, from which on it is worth a word
 _FASTER = (2, 4, 8)  # times the rate of the scenario
 _LOOKS = 2000  # along the reference
 
@@ -45,6 +47,27 @@ def flow_advice(built: Built) -> tuple[Advice, ...]:
     )
     with error_location(location=built.text.location):
         return (advice("loop.dt", message, _remedy(built)),)
+
+
+def given_gains_advice(built: Built) -> tuple[Advice, ...]:
+    """Advice where a scenario gives the gains of its controller, and the loop is too slow for the flow that stays.
+
+    It takes seconds, and is for checks: the rule for gains is safe at all rates where `flow_advice` says nothing.
+    """
+    settings, given = built.scenario.loop, built.text.data.get("controller")
+    own_gains = isinstance(given, Mapping) and set(given) - {"kind", "preset"}
+    if not own_gains or settings.kind != "sampled" or not isinstance(built.closed_loop.plant, HybridVehicle):
+        return ()
+    flow, growth = _in_fast_flow(built)
+    if not _GROWN / settings.duration < growth < np.inf:
+        return ()
+    message = (
+        f"with these gains the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow by "
+        f"{growth:.2g} 1/s"
+    )
+    hint = "Take higher gains, or leave them out: then they follow from the vehicle and the rate"
+    with error_location(location=built.text.location):
+        return (advice("controller", message, hint),)
 
 
 def munk_rate(body: Body) -> float:
