@@ -89,3 +89,17 @@ def test_a_run_that_failed_is_drawn_up_to_its_end(certified):
 
 def test_an_older_result_has_no_certificate(make_run):
     assert "certificate" not in run_figures(Shown(make_run()))
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_run_that_overflows_has_its_figure(certified):
+    """Up to 1e308: the axes end below what a logarithmic axis can have, and a unit has the power of ten of its axis."""
+    run = certified(bound=np.inf)
+    time = run["time"].values
+    for name in ("lyapunov", "lyapunov_estimation", "lyapunov_rate", "weights_peak"):
+        run[name] = ("time", 10.0 ** np.minimum(308 * time / time[-1], 308))
+    figure = run_figures(Shown(run, certificate=facts_from(run.attrs).certificate))["certificate"]
+    figure.canvas.draw()
+    for panel in figure.axes:
+        assert np.isfinite(panel.get_ylim()).all() and panel.get_ylim()[1] > 1e80
+    assert "10^{99}" in figure.axes[2].get_ylabel() or "10^{96}" in figure.axes[2].get_ylabel()

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from undertow.report.figures import style
-from undertow.report.figures.limits import fit_linear, fit_log
+from undertow.report.figures.limits import drawable, fit_linear, fit_log
 
 # Narrower than the others, so that it is read without scrolling where a page is narrow.
 _WIDTH, _LEFT, _RIGHT, _TOP, _TALL, _GAP, _FOOT = 7.2, 0.66, 0.14, 0.66, 1.5, 0.42, 0.45
@@ -35,7 +35,7 @@ def certificate_figure(run: xr.Dataset, title: str, bound: float) -> Figure:
     """
     valid_run = run.isel(time=run["time"].values <= run.attrs.get("ended", np.inf))
     time = valid_run["time"].values
-    values_of = lambda name: valid_run[name].values
+    values_of = lambda name: np.where(drawable(values := valid_run[name].values), values, np.nan)
     rows = 3 if "weights_peak" in run else 2
     figure = style.blank(_WIDTH, _TOP + rows * _TALL + (rows - 1) * _GAP + _FOOT)
     acting = {"input at a limit": values_of("saturated").max(-1) > 0}
@@ -63,8 +63,8 @@ def certificate_figure(run: xr.Dataset, title: str, bound: float) -> Figure:
         if np.isfinite(bound):
             weights.append(("bound", np.full(len(time), bound), style.TRUTH))
         _plot(panels[2], time, weights)
-        fit_linear(panels[2], [(name, time, values) for name, values, _ in weights], 0.0)
         style.label(panels[2], "time, s", "|$\\theta$|, m/s$^2$", "weights")
+        fit_linear(panels[2], [(name, time, values) for name, values, _ in weights], 0.0)
     for panel in panels:
         for name, now in acting.items():
             _shade(panel, time, now, name)
@@ -105,7 +105,7 @@ def _plot(panel: Axes, time: np.ndarray, curves, key: bool = True) -> None:
 def _fit_rate(panel: Axes, rate: np.ndarray) -> None:
     """Symmetric logarithmic scale, linear about zero."""
     panel.axhline(0.0, color=style.INK, linewidth=0.8)
-    sizes = np.abs(rate[np.isfinite(rate)])
+    sizes = np.abs(rate[drawable(rate)])
     if not sizes.any():
         return
     top = 10.0 ** np.floor(np.log10(sizes.max()))

@@ -10,6 +10,7 @@ from matplotlib.ticker import FixedLocator
 from undertow.core.number_text import plain
 from undertow.report.figures import style
 
+_LARGEST = 1e100
 _SMALL, _LARGE = 1e-2, 1e5  # outside of these tick labels are long
 
 # Powers of ten that have a prefix, and units that take one: the first of a product or quotient, if it is no power.
@@ -99,4 +100,9 @@ def early_size(time: np.ndarray, values: np.ndarray) -> float:
 
 def _finite(parts: Sequence[np.ndarray]) -> np.ndarray:
     values = np.concatenate(parts) if parts else np.zeros(0)
-    return values[np.isfinite(values)]
+    return values[drawable(values)]
+
+
+def drawable(values: np.ndarray) -> np.ndarray:
+    """Which values an axis can have: finite ones, and not the last ones before an overflow."""
+    return np.abs(values) < _LARGEST  # NaN is not
