@@ -1,6 +1,8 @@
 """The estimate: an independent implementation gives the same numbers, and simulated dives give theirs back."""
 
 import dataclasses
+import errno
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,8 @@ from scipy.optimize import least_squares
 from telegraph_dive import AMPLITUDES, telegraph_dive
 
 import undertow as ut
+from undertow.cli import identify as command
+from undertow.cli.options.identify import IdentifyCommand
 from undertow.core.measurement import BODY_AXES
 from undertow.core.runtime import in_precision
 from undertow.logs.log import Log
@@ -18,6 +22,7 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.report.answers.identification_answer import answer_of_identification
+from undertow.scenario.reading import dump
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.studies.identification.dive import dive_of
 from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of
@@ -146,6 +151,22 @@ def test_files_say_what_was_found(identified, tmp_path):
             np.testing.assert_allclose(numbers[name].deviation, interval.deviation, rtol=1e-9)
     text = (tmp_path / "identified.yaml").read_text()
     assert "vehicle.yaml" in text and "adjusted" in text
+
+
+def test_numbers_that_cannot_be_written_are_printed(identified, tmp_path, monkeypatch, capsys):
+    """What took minutes is not lost with a full disk."""
+
+    def full_disk(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.chdir(tmp_path)
+    Path("s.yaml").write_text(dump(SCENARIO))
+    monkeypatch.setattr(command, "read_log", lambda *_: None)
+    monkeypatch.setattr(command, "identify", lambda *_, **__: identified.result)
+    monkeypatch.setattr(command, "write_files", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        command.identify_vehicle(IdentifyCommand(scenario=Path("s.yaml"), logs=[Path("dive.csv")]))
+    assert "added mass, heave" in capsys.readouterr().out and not Path("runs/s-identified").exists()
 
 
 def test_of_sticks_only_the_vehicle_is_written(plant, tmp_path):

@@ -59,9 +59,13 @@ def identify_vehicle(command: IdentifyCommand) -> int:
             )
         )
         data = as_data(result)
-        (draft.path / "identification.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
-        write_files(built, result, log_files, draft.path)
-        draft.publish()  # before the figures, which may fail
+        try:
+            (draft.path / "identification.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
+            write_files(built, result, log_files, draft.path)
+            draft.publish()  # before the figures, which may fail
+        except OSError:
+            console.print(interval_table(data["parameters"], has_prior=True))  # what took minutes is not lost
+            raise
         warn_of(write_identification(scenario.stem, result, data, draft.path, folder, command.pdf))
     if command.details:
         console.print(interval_table(data["parameters"], has_prior=True))
