@@ -58,6 +58,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+class _ByWindow(dict[str, dict[str, Any] | None]):
+    """Metrics of both windows."""
+
+    def __missing__(self, name: str) -> Any:
+        hint = f'Write run.metrics["steady"]["{name}"], or "whole" for the whole run'
+        raise BadInput(f'metrics["{name}"]', "name a window, steady or whole", "none", hint=hint)
+
+
 @dataclasses.dataclass(frozen=True, repr=False)
 class Run:
     """One finished run.
@@ -119,7 +127,7 @@ class Run:
         Numbers by name, per-axis values as lists named `<name>_axes`; see `undertow describe metrics`.
         """
         steady = self.result.steady
-        return {"steady": None if steady is None else dict(steady), "whole": dict(self.result.whole)}
+        return _ByWindow(steady=None if steady is None else dict(steady), whole=dict(self.result.whole))
 
     @property
     def status(self) -> Status:

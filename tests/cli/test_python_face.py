@@ -142,3 +142,11 @@ def test_public_names():
 def test_samples(tmp_path):
     (tmp_path / "d.csv").write_text("t,d1\n0,1\n2,3\n")
     assert ut.read_samples(tmp_path / "d.csv") == [[0.0, 1.0], [2.0, 3.0]]
+
+
+def test_a_metric_without_its_window():
+    run = ut.simulate_scenario({"plant": "double_integrator", "reference": {"kind": "setpoint", "position": [1]}})
+    assert run.metrics["steady"]["position_rms"] == run.metrics.get("steady")["position_rms"]
+    assert run.metrics.get("position_rms") is None
+    with pytest.raises(ut.BadInput, match=r'Write run\.metrics\["steady"\]\["position_rms"\]'):
+        run.metrics["position_rms"]
