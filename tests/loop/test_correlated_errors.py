@@ -172,7 +172,7 @@ def test_a_filter_that_is_told_is_consistent_and_one_that_is_not_says_so():
     assert [one["inconsistent"] for one in accurate["sensors"]] == [0.0] * 5  # propeller_speed is not compared
     by_name = {one["sensor"]: one for one in accurate["sensors"]}
     assert by_name["dvl"]["correlated"] == [0.01] * 3 and by_name["dvl"]["correlation_time"] == [2.0] * 3
-    assert by_name["compass"]["correlation_time"] == [None, None, 60.0, 60.0]
+    assert by_name["compass"]["correlation_time"] == [None, None, 60.0, 60.0, 10.0, 10.0]
     assert wrong["nees"] > 100
     assert {"imu", "dvl", "compass"} <= {one["sensor"] for one in wrong["sensors"] if one["inconsistent"] > 0}
     first, second = wrong["findings"]
