@@ -51,8 +51,7 @@ class Parts(FromCode):
 
 def described(part: Description) -> nodes.section:
     """The section of one part, or of one preset of it."""
-    preset, _, of_part = part.name.partition(", preset of ")
-    title = f"`{of_part}`, preset `{preset}`" if of_part else f"`{part.name}`"
+    title = f"`{part.name}`, preset `{part.preset}`" if part.preset else f"`{part.name}`"
     found = section(title, title, *paragraphs(part.summary))
     if part.options:
         rows = [(option.name, text_of(option.default), option.meaning) for option in part.options]

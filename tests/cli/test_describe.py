@@ -59,7 +59,7 @@ def test_presets_are_found_by_their_names(undertow):
         assert rows[preset]["description"].startswith(f"Preset of `{law}`: ")
         (described,) = describing.describe(preset)
         usual = "required" if law == "rcaf" else "placed"
-        assert (described.name, described.options[0].default) == (f"{preset}, preset of {law}", usual)
+        assert (described.title, described.options[0].default) == (f"{preset}, preset of {law}", usual)
         assert catalogue.spelled_out("controllers", {"kind": preset}) == {"kind": law, "preset": preset}
     assert not set(catalogue.presets("controllers")) & set(catalogue.names("controllers"))
     with pytest.raises(BadInput, match="`preset` must be left out, because `robust` is a preset of `rcaf`"):
@@ -76,7 +76,7 @@ def test_parameters_come_with_unit_symbol_and_source(undertow):
 @pytest.mark.full
 def test_controller_shows_its_options_and_the_defaults_of_its_class():
     rcaf, sound, learning = describing.describe("rcaf")
-    assert [one.name for one in (rcaf, sound, learning)] == [
+    assert [one.title for one in (rcaf, sound, learning)] == [
         f"{p}, preset of rcaf" for p in catalogue.presets_of(catalogue.names("controllers")["rcaf"])
     ]
     assert "bandwidth" in {option.name for option in sound.options}

@@ -67,7 +67,7 @@ def _show_keys(console: Console, title: str, model: type[BaseModel]) -> None:
 
 
 def _show_part(console: Console, part: describing.Description) -> None:
-    console.print(f"{part.name} ({part.kind})" if part.kind else part.name, style="bold", highlight=False)
+    console.print(f"{part.title} ({part.kind})" if part.kind else part.title, style="bold", highlight=False)
     console.print(part.summary, highlight=False)
     if part.options:
         rows = [(option.name, text_of(option.default), option.meaning) for option in part.options]

@@ -36,6 +36,12 @@ class Description(NamedTuple):
     parameters: tuple[Parameter, ...]
     advice: tuple[str, ...]
     signals: dict[str, Signal]  # that it records
+    preset: str = ""  # of the part, where it has several
+
+    @property
+    def title(self) -> str:
+        """Its name, or that of the preset and of its part."""
+        return f"{self.preset}, preset of {self.name}" if self.preset else self.name
 
 
 # Arguments that come from the rest of a scenario, not from the user, by kind.
@@ -105,8 +111,7 @@ def _presets(kind: str, name: str, part: Any, short: str) -> tuple[Description, 
         description = _describe(kind, name, function, {"kind": name, "preset": preset})
         usual = catalogue.usual_preset(part) or "required"
         preset_option = Option("preset", usual, f"one of {', '.join(presets)}; these are the options of {preset}.")
-        title = f"{preset}, preset of {name}"
-        descriptions.append(description._replace(name=title, options=(preset_option, *description.options)))
+        descriptions.append(description._replace(preset=preset, options=(preset_option, *description.options)))
     return tuple(descriptions)
 
 

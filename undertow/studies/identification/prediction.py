@@ -45,8 +45,8 @@ def residuals(
     states, rates_before, rates_after = motion(vehicle, sensing, change, segment, step)
     before = jax.tree.map(lambda leaf: leaf[:-1], states)
     after = jax.tree.map(lambda leaf: leaf[1:], states)
-    early = jax.tree.map(lambda a, b, rate: 2 * (b - a - step * rate), before, after, rates_before)
-    late = jax.tree.map(lambda a, b, rate: 2 * (step * rate - (b - a)), before, after, rates_after)
+    early = jax.tree.map(lambda a, b, rate: early_curve(a, b, step * rate), before, after, rates_before)
+    late = jax.tree.map(lambda a, b, rate: late_curve(a, b, step * rate), before, after, rates_after)
     in_axes = (0, 0, 0, 0, 0, 0, 0, None, None)
     measured = (segment.values, segment.offsets, segment.spreads)
     return jax.vmap(_differences, in_axes)(before, after, early, late, *measured, sensing.rate_bias, step)
@@ -97,6 +97,25 @@ def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[A
     return (1 - part) * earlier(0) + part * earlier(1)
 
 
+def early_curve(begin, end, change):
+    """Second derivative of a cubic at the begin of a step, by the derivative there; both times the step's powers."""
+    return 2 * (end - begin - change)
+
+
+def late_curve(begin, end, change):
+    """The same at the end of the step, by the derivative there."""
+    return 2 * (change - (end - begin))
+
+
+def on_cubic(begin, end, early, late, share, spread=0.0):
+    """Mean of samples in a step, at a mean share of it with a variance, on the cubic with these second derivatives.
+
+    That is exact for one sample, and for a parabola. Arrays of JAX and NumPy go through.
+    """
+    below_chord = 0.5 * (share - share**2 - spread)
+    return (1 - share) * begin + share * end - below_chord * ((1 - share) * early + share * late)
+
+
 def _differences(
     before: MotionState,
     after: MotionState,
@@ -115,12 +134,10 @@ def _differences(
     cubic through both states with both derivatives has the one at the begin, the other at the end, and their mean
     between, weighted with the time.
     """
-    below_chord = 0.5 * (offsets - offsets**2 - spreads)
     curved = lambda sensor, of: (1 - offsets[sensor]) * of(early) + offsets[sensor] * of(late)
 
     def blend(sensor: int, of):
-        share = offsets[sensor]
-        return (1 - share) * of(before) + share * of(after) - below_chord[sensor] * curved(sensor, of)
+        return on_cubic(of(before), of(after), of(early), of(late), offsets[sensor], spreads[sensor])
 
     position = lambda x: x.position
     placed = _place(before, after, offsets[0], step) + 0.5 * spreads[0] * curved(0, position)

@@ -12,7 +12,7 @@ from undertow.core.numerics.rotations import euler_from_rotation, rotation_from_
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
 from undertow.studies.identification.identified_vehicle import IdentifiedVehicle
-from undertow.studies.identification.prediction import Sensing, motion
+from undertow.studies.identification.prediction import Sensing, early_curve, late_curve, motion, on_cubic
 from undertow.studies.identification.segments import Segments
 
 _FINE = 0.01  # s, of the integration
@@ -119,9 +119,9 @@ class _Curve(NamedTuple):
         steps = np.clip((times / _FINE).astype(int), 0, len(self.rates_before) - 1)
         share = (times / _FINE - steps)[:, None]
         begin, end = self.values[steps], self.values[steps + 1]
-        early = end - begin - _FINE * self.rates_before[steps]
-        late = _FINE * self.rates_after[steps] - (end - begin)
-        return begin + share * (end - begin) - share * (1 - share) * ((1 - share) * early + share * late)
+        early = early_curve(begin, end, _FINE * self.rates_before[steps])
+        late = late_curve(begin, end, _FINE * self.rates_after[steps])
+        return on_cubic(begin, end, early, late, share)
 
 
 @eqx.filter_jit
