@@ -1,5 +1,7 @@
 """Advice is true, and the shipped scenarios, which mean what they say, get none of it."""
 
+import re
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,12 +12,14 @@ from test_plausible_mistakes import EXAMPLES, PARTS
 import undertow as ut
 from undertow.control.navigation.drift import drift_advice, drifts
 from undertow.control.navigation.observer import observer
+from undertow.core.contracts import Pose
 from undertow.core.measurement import BODY_OUTPUTS, measurement_of_outputs
 from undertow.paper import ablations
 from undertow.physics.sensors import compass, depth, dvl, imu, position_fix
 from undertow.physics.thrusters import commanded_thrust, t200
+from undertow.scenario.attainable_speed import held_speed, top_speed
 from undertow.scenario.build import build
-from undertow.scenario.plausibility import held_speed, plausibility, top_speed
+from undertow.scenario.plausibility import plausibility
 from undertow.scenario.reading import read
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.studies.campaign.campaign_schema import read_campaign
@@ -86,6 +90,46 @@ def test_a_path_that_begins_more_than_1_m_from_the_vehicle(reference, start, dis
     assert [one.says.startswith(f"`reference` begins {distance} from the vehicle: at ") for one in said] == (
         [True] if distance else []
     )
+
+
+def advice_in(disturbance, navigation=None, reference=None):
+    """What is said of a BlueROV2 Heavy that keeps its place 4 m below the surface, or follows another reference."""
+    plant = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), t200())
+    law = ut.controllers.pid(plant.model(), frequency=1.0)
+    target = reference or ut.references.setpoint([0, 0, 1, 0, 0, 0])
+    loop = ClosedLoop(plant, law, target, disturbance, navigation or ut.navigation.perfect())
+    return [one.says for one in plausibility(loop, 60.0, [0, 0, 1, 0, 0, 0])]
+
+
+@pytest.mark.full
+def test_waves_are_too_high_for_the_share_of_the_time_that_a_sea_moves_faster_than_the_thrusters():
+    assert not advice_in(ut.disturbances.waves(height=2.0, heading=0.4))
+    (sentence,) = advice_in(ut.disturbances.waves(height=3.0, heading=0.4))
+    share, held = map(
+        float, re.fullmatch(r"for (\d+) % .* than the ([\d.]+) m/s .* depth of 4 m: .*", sentence).groups()
+    )
+    sea = ut.disturbances.waves(height=3.0, heading=0.4)
+    pose = Pose(jnp.array([0.0, 0.0, 1.0]), jnp.eye(3), jnp.zeros(3))
+    still = ut.HybridVehicle(ut.vehicles.bluerov2_heavy(), t200()).no_load()
+
+    def speeds(key):
+        realization = sea.realize(key)
+        flow = lambda t: sea.at(realization, t, pose, still).water.velocity
+        return jnp.linalg.norm(jax.lax.map(flow, jnp.linspace(0.0, 100.0, 50)), axis=-1)
+
+    sampled = np.asarray(jax.jit(jax.vmap(speeds))(jax.random.split(jax.random.PRNGKey(0), 200)))
+    assert 100 * (sampled > held).mean() == pytest.approx(share, abs=1.5)
+    at_rest = ut.references.circle(radius=0.1, depth=1.0)  # moves: whether it is carried along depends on its phase
+    assert not any("waves" in one for one in advice_in(ut.disturbances.waves(height=3.0), reference=at_rest))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("delay", "off"), [(0.05, ""), (0.5, "20 cm")])
+def test_a_late_position_is_off_by_speed_times_delay(delay, off):
+    moving = ut.references.circle(radius=1.0, depth=1.0, period=2 * np.pi / 0.4)
+    said = advice_in(ut.disturbances.none(), ut.navigation.degraded(delay=delay, period=0.01), moving)
+    late = [one for one in said if one.startswith(f"positions come {delay:g} s late")]
+    assert [f"by up to {off}:" in one for one in late] == ([True] if off else [])
 
 
 @pytest.mark.full

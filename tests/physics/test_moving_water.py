@@ -164,6 +164,7 @@ def test_variance_of_orbital_velocity(depth):
     expected = np.trapezoid(omega**2 * energy * np.exp(-2 * omega**2 / 9.81 * depth), omega)
     found = np.asarray(velocity).var(axis=(0, 1))
     np.testing.assert_allclose(found[[0, 2]], expected, rtol=0.05)
+    assert float(jax.jit(type(sea).orbital_speed)(sea, np.asarray(depth))) ** 2 == pytest.approx(expected, rel=5e-3)
     assert found[1] < 1e-20  # all run north
 
 

@@ -45,6 +45,7 @@ def frequencies_of_shares(
 
 
 _GRAVITY = 9.81  # m/s^2
+_SHARES = 2000  # of the energy, for the orbital speed
 
 
 class Sea(NamedTuple):
@@ -106,6 +107,17 @@ class Waves(AbstractDisturbance):
         acceleration = jnp.stack([(gain_along * cosine).sum(), (gain_along * sine).sum(), -gain_up.sum()])
         load = with_surface(load, pose, self.depth, (amplitude * jnp.cos(angle)).sum())
         return with_water(load, pose, velocity, acceleration)
+
+    def orbital_speed(self, depth: Float[Array, ""]) -> Float[Array, ""]:
+        """Standard deviation (m/s) of the water's velocity along the heading, which is that of the vertical velocity.
+
+        Args:
+            depth: below the still surface, m; not negative.
+        """
+        share = (jnp.arange(_SHARES, dtype=self.height.dtype) + 0.5) / _SHARES
+        frequency = frequencies_of_shares(share, self.period, self.peakedness)
+        decay = jnp.exp(-2 * frequency**2 / _GRAVITY * depth)
+        return self.height / 4 * jnp.sqrt((frequency**2 * decay).mean())
 
     def jumps(self, duration: float) -> tuple[float, ...]:
         return ()
