@@ -75,6 +75,7 @@ def identify(
     logs: str | Path | Log | Sequence[str | Path | Log],
     mapping: str | Path | None = None,
     *,
+    unseen: Sequence[str | Path | Log] = (),
     free: Sequence[str] = (),
     priors: Mapping[str, str] | None = None,
     per_axis: bool = False,
@@ -90,6 +91,7 @@ def identify(
         scenario: a scenario file or a scenario as data; its vehicle and thrusters are what is known beforehand.
         logs: files, or logs that were read with `ut.read_log`; several dives of one vehicle.
         mapping: which columns of the files are which signal.
+        unseen: further logs, which are only predicted, to judge the result.
         free: names, groups or patterns of parameters; () for the usual ones.
         priors: such as `{"mass": "11.5 +- 0.2"}`.
         per_axis: whether the inputs push along the six axes instead of driving the thrusters.
@@ -103,10 +105,11 @@ def identify(
     several = [logs] if isinstance(logs, str | Path | Log) else list(logs)
     columns = None if mapping is None else Path(mapping)
     built = build(with_reference(from_data(scenario) if isinstance(scenario, Mapping) else read(Path(scenario))))
-    opened = [log if isinstance(log, Log) else read_log(Path(log), columns) for log in several]
+    opened = lambda given: [log if isinstance(log, Log) else read_log(Path(log), columns) for log in given]
     result = identifying.identify(
         built,
-        opened,
+        opened(several),
+        unseen=opened(unseen),
         free=free,
         priors={name: _prior(name, text) for name, text in (priors or {}).items()},
         per_axis=per_axis,

@@ -46,10 +46,12 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         say("reading")
         built = build(with_reference(read(scenario, allow_code=command.allow_code)))
         logs = [read_log(path, command.mapping) for path in log_files]
+        unseen = [read_log(path, command.mapping) for path in command.unseen or ()]
         result = interruptible(
             lambda: identify(
                 built,
                 logs,
+                unseen=unseen,
                 free=command.free or (),
                 priors=priors,
                 per_axis=command.per_axis,

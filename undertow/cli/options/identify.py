@@ -54,6 +54,12 @@ class IdentifyCommand(Command):
         Path | None,
         typer.Option(metavar="FILE.yaml", help="Which columns of the logs are which signal, in which unit and frame."),
     ] = None
+    unseen: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="LOG", help="A further dive, which is only predicted, to judge the result; may be repeated."
+        ),
+    ] = None
     free: Annotated[
         list[str] | None,
         typer.Option(

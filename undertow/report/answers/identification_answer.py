@@ -58,9 +58,13 @@ def _compared(fits: Mapping[str, tuple[float, float]]) -> tuple[bool | None, str
 
 
 def mean_fits(data: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Mean free-run fit of each axis over the dives left out, %: of the identified model, and of the vehicle file."""
+    """Mean free-run fit of each axis, %: of the identified model, and of the vehicle file.
+
+    Over the dives that were not used at all where there are any, otherwise over those left out in turn.
+    """
     collected: dict[str, tuple[list[float], list[float]]] = {}
-    for validation in data["validation"]:
+    unseen = [validation for validation in data["validation"] if validation["is_unseen"]]
+    for validation in unseen or data["validation"]:
         for axis, fit in validation["identified"]["free_run_fit"].items():
             both = collected.setdefault(axis, ([], []))
             both[0].append(fit)

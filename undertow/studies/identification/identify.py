@@ -48,11 +48,13 @@ class Validation(NamedTuple):
         dive: left out.
         identified: errors of the model from the other dives.
         prior: errors of the vehicle file.
+        is_unseen: whether no estimate used it, not even that of the intervals.
     """
 
     dive: Dive
     identified: PredictionErrors
     prior: PredictionErrors
+    is_unseen: bool = False
 
     @property
     def name(self) -> str:
@@ -72,7 +74,7 @@ class Identification(NamedTuple):
         uncertainty: of the unknowns.
         intervals: of the parameters.
         undetermined: combinations that the data do not determine.
-        validation: of each dive from the others.
+        validation: of each dive from the others, and of dives that were not used from all.
         refused_axes: that no dive identifies, such as those without motion.
         findings: sentences of the checks before.
     """
@@ -105,6 +107,7 @@ def identify(
     built: Built,
     logs: Sequence[Log],
     *,
+    unseen: Sequence[Log] = (),
     free: Sequence[str] = (),
     priors: Mapping[str, UncertainNumber] | None = None,
     per_axis: bool = False,
@@ -118,6 +121,7 @@ def identify(
     Args:
         built: scenario, whose vehicle and thrusters have the prior numbers; nothing else of it matters.
         logs: with inputs and motion.
+        unseen: further logs, which are only predicted.
         free: names, groups or patterns of parameters; () for the usual ones.
         priors: value and deviation beforehand, by name; those of the vehicle file unless given.
         per_axis: whether the inputs push along the six axes (sticks behind a mixer, or wrenches) instead of driving the
@@ -143,6 +147,7 @@ def identify(
     asked = chosen_in(built, known, free, priors or {})
     say("checking the logs")
     prepared = [prepared_dive(plant, log, per_axis, step) for log in logs]
+    only_predicted = [prepared_dive(plant, log, per_axis, step) for log in unseen]
     dives = [dive.dive for dive in prepared]
     refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
     parameters = [p for p in resolved_by(step, plant, asked) if p.name.rpartition(".")[2] not in refused]
@@ -158,8 +163,9 @@ def identify(
     parts, validation = None, ()
     if validate:
         parts, validation = _validated(model, parameters, dives, segment, estimate, say)
-    say("judging how sure it is")
     count = len(parameters)
+    validation += tuple(_unseen(model, estimate.z[:count], dive.dive) for dive in only_predicted)
+    say("judging how sure it is")
     uncertainty = uncertainty_of(estimate.information, scores, step, _with_nuisances(parts, estimate.z, count))
     return Identification(
         model=model,
@@ -172,7 +178,7 @@ def identify(
         undetermined=tuple(undetermined(estimate.information, parameters)),
         validation=validation,
         refused_axes=refused,
-        findings=tuple(_findings(prepared)),
+        findings=tuple(_findings([*prepared, *only_predicted])),
     )
 
 
@@ -212,6 +218,12 @@ def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimat
         identified = prediction_errors(model, without, piece)
         validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
     return np.stack(estimates), tuple(validation)
+
+
+def _unseen(model, z: np.ndarray, dive: Dive) -> Validation:
+    """How the estimate from all dives predicts another one."""
+    prior = prediction_errors(model, np.zeros(len(z)), dive)
+    return Validation(dive, prediction_errors(model, z, dive), prior, is_unseen=True)
 
 
 def parts_of(dive: Dive, number: int) -> list[Dive]:

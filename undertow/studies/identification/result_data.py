@@ -72,6 +72,7 @@ def interval_data(interval: ParameterInterval) -> dict[str, Any]:
 def _validation_data(validation: Validation, velocities: Sequence[str]) -> dict[str, Any]:
     return {
         "name": validation.name,
+        "is_unseen": validation.is_unseen,
         "identified": _errors_data(validation.identified, velocities),
         "prior": _errors_data(validation.prior, velocities),
     }
