@@ -2,10 +2,12 @@
 
 The logs are not part of the project. The folder has, each in a folder of its own,
 
-* `heavy_mocap`: a BlueROV2 Heavy in a tank with motion capture, flown by hand (SAABmarine-MEX/saabmarineMEX_learning, 2025),
-  four tables `run_*.csv` with the sticks of the pilot and the velocities of the owners' simulator;
-* `bluerov2016_bags`: a BlueROV of 2016 with designed inputs (Ekelund and Wahlstrom, thesis, Linkoping 2016), bags of ROS 1;
-* `auv_pool`: an AUV under control in a pool (Tartan-AUV/TAUV-Playground, 2022), tables with states and demanded wrenches.
+* `heavy_mocap`: a BlueROV2 Heavy in a tank with motion capture, steered by hand (SAABmarine-MEX/saabmarineMEX_learning,
+  2025), four tables `run_*.csv` with the sticks of the pilot and the velocities of the owners' simulator;
+* `bluerov2016_bags`: a BlueROV of 2016 with designed inputs (Ekelund and Wahlstrom, thesis, Linkoping 2016), bags of
+  ROS 1;
+* `auv_pool`: an AUV under control in a pool (Tartan-AUV/TAUV-Playground, 2022), tables with states and demanded
+  wrenches.
 
 `python benchmarks/real_dives.py FOLDER` prints a table for each; `--only heavy_mocap` for one of them.
 """
@@ -77,7 +79,8 @@ thrusters:
 BLUEROV_SCENARIO = """
 plant:
   vehicle: bluerov.yaml
-  thruster: {kind: first_order, thrust_per_volt: 50, power: 1.4, reverse_share: 0.8, linear_gain: 45, time_constant: 0.1, supply: 1}
+  thruster:
+    {kind: first_order, thrust_per_volt: 50, power: 1.4, reverse_share: 0.8, linear_gain: 45, supply: 1}
 controller: robust
 reference: {kind: setpoint, position: [0, 0, 0, 0, 0, 0]}
 loop: {dt: 0.01, duration: 1}
@@ -135,7 +138,8 @@ def bluerov2016(folder: Path, work: Path) -> None:
     scenario, mapping = _written(work, "rov.yaml", BLUEROV_SCENARIO), _written(work, "columns.yaml", BLUEROV_COLUMNS)
     bag = lambda name: ut.read_log(next(folder.glob(f"{name}_*.bag")), mapping=mapping)
     dives = [bag(name) for name in BLUEROV_DIVES]
-    model = ut.identify(scenario, dives, unseen=[bag("all_2")], priors=BLUEROV_PRIORS)
+    # It tumbles, and its attitude is filtered, so that it does not follow from the rates: short segments.
+    model = ut.identify(scenario, dives, unseen=[bag("all_2")], priors=BLUEROV_PRIORS, segment=2.5)
     for finding in model.result.findings:
         print(finding)
     unseen = np.array([model.result.validation[-1].identified.fit[axis] for axis in AXES])

@@ -57,7 +57,7 @@ def held_speed(plant: HybridVehicle, position: Float[np.ndarray, " 6"], flow: Fl
     relative_velocity = np.concatenate([-rotation.T @ flow, np.zeros(3)])
     matrix = np.asarray(plant.thruster_matrix, dtype=float)
     down = np.broadcast_to(rotation[2], (_SHARES, 3))
-    needed = np.asarray(body_force(plant.body, np.outer(shares, relative_velocity), down)) @ acting_directions(plant).T
+    needed = np.asarray(body_force(plant.body, np.outer(shares, relative_velocity), down)) @ acting_directions(matrix).T
     speed = 0.0
     for share, force in zip(shares, needed, strict=True):
         residual = matrix @ _nearest_thrusts(matrix, force, *thrusts) - force

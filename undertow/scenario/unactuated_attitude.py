@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from undertow.core.kept_programs import briefly_compiled
+from undertow.core.measurement import BODY_AXES
 from undertow.core.runtime import double_outside_runs
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.vehicles.body import Body
@@ -44,7 +45,7 @@ def largest_lean(
         angles: of the target: roll, pitch, yaw, rad.
         relative_velocity: velocities of the target through the water, world axes, m/s.
     """
-    unactuated = np.eye(6) - acting_directions(plant)
+    unactuated = np.eye(6) - acting_directions(plant.thruster_matrix)
     if (np.diagonal(unactuated)[:3] > _UNACTUATED).any():
         return None
     rotation = rotations(angles)
@@ -56,10 +57,20 @@ def largest_lean(
     return max(leans, key=lambda lean: lean.angle, default=None)
 
 
-def acting_directions(plant: HybridVehicle) -> Float[np.ndarray, "6 6"]:
-    """Projection of forces and moments on the directions along which the thrusters act."""
-    matrix = np.asarray(plant.thruster_matrix, dtype=float)
+def acting_directions(thruster_matrix: ArrayLike) -> Float[np.ndarray, "6 6"]:
+    """Projection of forces and moments on the directions along which thrusters act."""
+    matrix = np.asarray(thruster_matrix, dtype=float)
     return matrix @ np.linalg.pinv(matrix, rcond=_WEAK)
+
+
+def unactuated_axes(thruster_matrix: ArrayLike) -> tuple[str, ...]:
+    """Names of the axes, of `BODY_AXES`, along and about which thrusters act hardly or only together with others.
+
+    Args:
+        thruster_matrix: force and moment per thrust, (6, N).
+    """
+    acting = np.diagonal(acting_directions(thruster_matrix))
+    return tuple(axis for axis, share in zip(BODY_AXES, acting, strict=True) if 1 - share > _UNACTUATED)
 
 
 def rotations(angles: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:

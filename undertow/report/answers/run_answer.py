@@ -14,6 +14,8 @@ from undertow.scenario.results.run_result import RunRecord
 
 _LIMITED = "What limits it:"
 _SOME = 0.01  # share of the time at the limits of the inputs that is worth saying
+_ERRORS = ("position_rms", "attitude_rms", "tracking_rms")
+_MOST = 0.6  # share of a squared error from which on its axis is named
 _MEASURED = 0.5  # share of the error that the measurement explains, from which on it is said to limit the run
 
 
@@ -21,7 +23,7 @@ def answer_of_run(run: RunRecord) -> PlainAnswer:
     """The errors and what they are judged by, how far off at most, what it took, and what limits a finished run."""
     facts = run.facts
     good = facts.success.within if facts.success is not None else None if facts.status is Status.OK else False
-    lines = (*_criterion(facts), *_largest(facts), *_effort(facts), *_failures(run), *_limits(run))
+    lines = (*_criterion(run), *_largest(facts), *_effort(facts), *_failures(run), *_limits(run))
     return PlainAnswer(good, _verdict(facts, good), lines)
 
 
@@ -35,14 +37,37 @@ def _verdict(facts: RunFacts, good: bool | None) -> str:
     return f"It {'went' if good else 'did not go'} well{span}."
 
 
-def _criterion(facts: RunFacts) -> Iterator[str]:
-    """The metrics that success is judged by, beside what they must stay below; what exceeds it first."""
+def _criterion(run: RunRecord) -> Iterator[str]:
+    """The metrics that success is judged by, beside what they must stay below; what exceeds it first, and where."""
+    facts = run.facts
     success, steady = facts.success, facts.steady
     if success is None or steady is None:
         return
     keys = sorted(success.criterion, key=lambda key: key not in success.exceeded)
     judged = "; ".join(_judged(facts.meanings[key], steady.get(key), success.criterion[key], key) for key in keys)
     yield f"{judged[:1].upper()}{judged[1:]}."
+    for key in success.exceeded:
+        unit = facts.meanings[key].unit
+        worst = _worst_axis(run, unit) if key in _ERRORS else None
+        if worst is not None:
+            axis, rms = worst
+            uncontrolled = axis in (*facts.unactuated, *facts.lost_axes)
+            why = ", which no thruster controls" if uncontrolled else ""
+            yield f"Most of the {facts.meanings[key].named(key)}, is in {axis}{why}: {quantity(rms, unit)} rms."
+
+
+def _worst_axis(run: RunRecord, unit: str) -> tuple[str, float] | None:
+    """The axis of a unit that has most of the squared error in the steady window, and its rms; None where none has."""
+    series = run.series
+    units = np.array(series["axis"].attrs["unit_of_each"].split(", "))
+    of_unit = np.flatnonzero(units == unit)
+    if len(of_unit) < 2:
+        return None
+    squares = (series["error"].values[np.ix_(_in_window(run), of_unit)] ** 2).mean(axis=0)
+    worst = int(np.argmax(squares))
+    if not squares[worst] > _MOST * squares.sum():
+        return None
+    return str(series["axis"].values[of_unit[worst]]), float(np.sqrt(squares[worst]))
 
 
 def _judged(metric: Metric, value: float | None, most: float, key: str) -> str:
@@ -79,9 +104,11 @@ def _effort(facts: RunFacts) -> Iterator[str]:
 
 
 def _failures(run: RunRecord) -> Iterator[str]:
-    """Thrusters that were found to have failed."""
+    """Thrusters that were found to have failed, and what nothing controls without them."""
     for name, time in lost_thrusters(run.series) or ():
         yield f"{name} was found to have failed and was taken out of use at {quantity(time, 's')}."
+    if run.facts.lost_axes:
+        yield f"Without it no thruster controls {' and '.join(run.facts.lost_axes)}."
 
 
 def _limits(run: RunRecord) -> Iterator[str]:
@@ -95,7 +122,7 @@ def _limits(run: RunRecord) -> Iterator[str]:
     hypotheses = (run.facts.certificate or {}).get("hypotheses", ())
     unmoved = any(one["name"] == "rank" and one["steady"] is not None and one["steady"] < 1 for one in hypotheses)
     if unmoved and run.facts.success is not None and not run.facts.success.within:
-        yield f"{_LIMITED} there are axes along which no input acts."
+        yield f"{_LIMITED} there are axes along which no input acts{_named_axes(run.facts)}."
         return
     error, measured = steady.get("position_rms"), _measurement_error(run)
     if error is None or error < LEAST["m"]:
@@ -105,14 +132,25 @@ def _limits(run: RunRecord) -> Iterator[str]:
         return
     load, left = steady.get("position_uncertainty_rms"), steady.get("position_estimation_rms")
     if load and left is not None and left < load:
-        yield f"{_LIMITED} loads that change too fast; {quantity(left / load, '')} of them is not compensated."
+        yield (
+            f"{_LIMITED} {quantity(left / load, '')} of the loads is not compensated. They change too fast for the gains "
+            "or for the navigation filter, or the loop swings by itself: `undertow analyze` tells."
+        )
+
+
+def _named_axes(facts: RunFacts) -> str:
+    return f": {', '.join(facts.unactuated)}" if facts.unactuated else ""
 
 
 def _measurement_error(run: RunRecord) -> float:
     """What the measured positions are off in the steady window, m, rms per axis."""
-    series, window = run.series, run.facts.window
+    series = run.series
     metres = [unit == "m" for unit in series["axis"].attrs["unit_of_each"].split(", ")]
-    time = series["time"].values
-    inside = np.ones(len(time), bool) if window is None else (time >= window[0]) & (time <= window[1])
-    off = (series["measured_position"] - series["position"]).values[np.ix_(inside, metres)]
+    off = (series["measured_position"] - series["position"]).values[np.ix_(_in_window(run), metres)]
     return float(np.sqrt(np.mean(off**2))) if off.size else 0.0
+
+
+def _in_window(run: RunRecord) -> np.ndarray:
+    """Which records are in the steady window."""
+    time, window = run.series["time"].values, run.facts.window
+    return np.ones(len(time), bool) if window is None else (time >= window[0]) & (time <= window[1])

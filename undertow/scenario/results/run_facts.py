@@ -41,6 +41,8 @@ class RunFacts(NamedTuple):
         navigation: what the navigation filter assumed, see `navigation_consistency`, likewise; None without one that
             says.
         transitions: of the supervisor; None where nothing was supervised.
+        unactuated: axes of the vehicle that no thruster controls; () for other plants.
+        lost_axes: further ones, that none controls any more because thrusters were taken out of use.
         code: hashes of the user's code files, see `code_hashes`.
         left_to_xla: why the SIMD backend could not be used; "" where it was, or was not asked for.
         versions: of the software, and the class of the machine, see `versions`.
@@ -60,6 +62,8 @@ class RunFacts(NamedTuple):
     certificate: Mapping[str, Any] | None = None
     navigation: Mapping[str, Any] | None = None
     transitions: Sequence[SupervisorTransition] | None = None
+    unactuated: Sequence[str] = ()
+    lost_axes: Sequence[str] = ()
     code: str = ""
     left_to_xla: str = ""
     versions: Mapping[str, str] = MappingProxyType({})
@@ -110,6 +114,8 @@ class RunFacts(NamedTuple):
             attributes["requirements"] = to_json(
                 {name: verdict._asdict() for name, verdict in self.requirements.items()}
             )
+        if self.unactuated or self.lost_axes:
+            attributes["uncontrolled_axes"] = to_json({"unactuated": self.unactuated, "lost": self.lost_axes})
         if self.navigation is not None:
             attributes["navigation"] = to_json(self.navigation)
         if self.transitions is not None:
@@ -137,6 +143,7 @@ def facts_from(attributes: Mapping[str, Any]) -> RunFacts:
     read = lambda name: json.loads(attributes[name]) if name in attributes else None
     metrics = read("metrics") or {}
     success = read("success")
+    uncontrolled = read("uncontrolled_axes") or {}
     transitions = read("transitions")
     status, text = _status(attributes["status"]), attributes.get("scenario")
     return RunFacts(
@@ -154,6 +161,8 @@ def facts_from(attributes: Mapping[str, Any]) -> RunFacts:
         certificate=read("certificate"),
         navigation=read("navigation"),
         transitions=None if transitions is None else [_transition(entry) for entry in transitions],
+        unactuated=tuple(uncontrolled.get("unactuated", ())),
+        lost_axes=tuple(uncontrolled.get("lost", ())),
         code=str(attributes.get("code", "")),
         left_to_xla=str(attributes.get("left_to_xla", "")),
         versions={name: str(value) for name, value in attributes.items() if _is_version(name)},

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from undertow.analysis.certify import certify
@@ -27,10 +28,12 @@ from undertow.core.json_text import finite_numbers
 from undertow.core.metric import AbstractMetric, Metric
 from undertow.core.status import Status
 from undertow.physics.faults.of_computation import law_of_computed
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.physics.power.ledger import closure
 from undertow.scenario.build import Built
 from undertow.scenario.provenance import checksum, content_hash, versions
 from undertow.scenario.results.run_facts import RunFacts
+from undertow.scenario.unactuated_attitude import unactuated_axes
 from undertow.simulation.loop.closed_loop import ClosedLoop
 from undertow.simulation.loop.dataset import to_dataset
 from undertow.simulation.loop.outcome import Outcome
@@ -163,6 +166,7 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         series = series.assign(certified.signals)
     lasted_but_unseen = status is Status.OK and steady is None
     supervised = state_in(outcome.final[1])
+    unactuated, lost_axes = _uncontrolled(loop, series)
     metric_names = {*whole, *settings.criterion}  # a run that failed at once lacks metrics that its criterion names
     facts = RunFacts(
         status=status,
@@ -183,11 +187,25 @@ def make_result(loop: ClosedLoop, outcome: Outcome, settings: MetricsSettings, o
         certificate=None if certified is None else finite_numbers(certified.summary),
         navigation=finite_numbers(navigation_consistency(loop, series, steady)),
         transitions=None if supervised is None else transitions(supervised.log),
+        unactuated=unactuated,
+        lost_axes=lost_axes,
         code=origin.code,
         left_to_xla=origin.left_to_xla,
         versions=versions(),
     )
     return RunResult(series, facts, loop, outcome)
+
+
+def _uncontrolled(loop: ClosedLoop, series: xr.Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Axes that no thruster controls, and further ones since thrusters were taken out of use."""
+    if not isinstance(loop.plant, HybridVehicle):
+        return (), ()
+    matrix = np.asarray(loop.plant.thruster_matrix, dtype=float)
+    unactuated = unactuated_axes(matrix)
+    if "lost_thrusters" not in series:
+        return unactuated, ()
+    in_use = ~np.asarray(series["lost_thrusters"].values, dtype=bool).any(axis=0)
+    return unactuated, tuple(axis for axis in unactuated_axes(matrix[:, in_use]) if axis not in unactuated)
 
 
 def _between_records(name: str, metric: Metric, settings: MetricsSettings) -> Metric:
