@@ -115,7 +115,7 @@ def test_a_budget_that_ends_while_compiling_tunes_nothing(refused, tmp_path):
 
 
 def evaluated(name, cost, radius=0.9, **options):
-    parts = Shares(*(np.array([cost]) for _ in range(4)))
+    parts = Shares(*(np.array([cost]) for _ in Shares._fields))
     return Evaluated(name, options or None, parts, parts, cost, cost, Certificate((radius,), ("",)))
 
 

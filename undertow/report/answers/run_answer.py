@@ -133,8 +133,8 @@ def _limits(run: RunRecord) -> Iterator[str]:
     load, left = steady.get("position_uncertainty_rms"), steady.get("position_estimation_rms")
     if load and left is not None and left < load:
         yield (
-            f"{_LIMITED} {quantity(left / load, '')} of the loads is not compensated. They change too fast for the gains "
-            "or for the navigation filter, or the loop swings by itself: `undertow analyze` tells."
+            f"{_LIMITED} {quantity(left / load, '')} of the loads is not compensated. They change too fast for the "
+            "gains or for the navigation filter, or the loop swings by itself: `undertow analyze` tells."
         )
 
 

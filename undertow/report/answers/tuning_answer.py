@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.report.quantities import quantity
 from undertow.scenario.sampled_plants import OF_FILE
 from undertow.studies.tuning.cost import times_other
 from undertow.studies.tuning.tune import Tuned
@@ -22,10 +23,35 @@ def answer_of_tuning(tuning: Tuned, folder: Path) -> PlainAnswer:
     cost = f"on held-out runs their cost is {times_other(tuned.held_out_cost, initial.held_out_cost)}"
     if better:
         verdict = f"The tuned gains are taken: {cost} with the given gains."
+    elif tuning.broken:
+        verdict = (
+            f"The given gains are kept. Others were found, and {cost} with the given ones, but they break a limit."
+        )
     else:
         verdict = f"The given gains are kept. Others were found, but {cost} with the given ones."
-    lines = (*_gains(tuning), *_certificate(tuning), *_vehicles(tuning), _search(tuning), *_next(tuning, folder))
+    lines = (
+        *_errors(tuning),
+        *_gains(tuning),
+        *_certificate(tuning),
+        *_vehicles(tuning),
+        _search(tuning),
+        *_next(tuning, folder),
+    )
     return PlainAnswer(True if better else None, verdict, lines)
+
+
+def _errors(tuning: Tuned) -> Iterator[str]:
+    """Errors on held-out runs with the given and with the tuned gains, beside the limits of the scenario."""
+    initial, *_, tuned = tuning.evaluated
+    built = tuning.problem.built
+    metrics, limits = built.known_metrics(), built.criterion()
+    for key in ("position_rms", "attitude_rms"):
+        if key in metrics and key in limits:
+            unit = metrics[key].unit
+            before, after = (quantity(gains.held_out_error(key), unit) for gains in (initial, tuned))
+            name = metrics[key].named(key)
+            limit = quantity(limits[key], unit)
+            yield f"{name[:1].upper()}{name[1:]} on held-out runs: {before} before, {after} after (limit {limit})."
 
 
 def _gains(tuning: Tuned) -> Iterator[str]:

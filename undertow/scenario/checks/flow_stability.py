@@ -50,13 +50,19 @@ def flow_advice(built: Built) -> tuple[Advice, ...]:
 
 
 def given_gains_advice(built: Built) -> tuple[Advice, ...]:
-    """Advice where a scenario gives the gains of its controller, and the loop is too slow for the flow that stays.
+    """Advice where gains are not those of the rule, and the loop is too slow for the flow that stays.
 
-    It takes seconds, and is for checks: the rule for gains is safe at all rates where `flow_advice` says nothing.
+    These are gains that a scenario gives, and those of a law in a file of the user's. It takes seconds, and is for
+    checks: the rule for gains is safe at all rates where `flow_advice` says nothing.
     """
     settings, given = built.scenario.loop, built.text.data.get("controller")
-    own_gains = isinstance(given, Mapping) and set(given) - {"kind", "preset"}
-    if not own_gains or settings.kind != "sampled" or not isinstance(built.closed_loop.plant, HybridVehicle):
+    gives_gains = isinstance(given, Mapping) and bool(set(given) - {"kind", "preset"})
+    is_own_law = ".py:" in built.resolved["controller"]["kind"]
+    if (
+        not (gives_gains or is_own_law)
+        or settings.kind != "sampled"
+        or not isinstance(built.closed_loop.plant, HybridVehicle)
+    ):
         return ()
     flow, growth = _in_fast_flow(built)
     if not _GROWN / settings.duration < growth < np.inf:
@@ -65,7 +71,9 @@ def given_gains_advice(built: Built) -> tuple[Advice, ...]:
         f"with these gains the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow by "
         f"{growth:.2g} 1/s"
     )
-    hint = "Take higher gains, or leave them out: then they follow from the vehicle and the rate"
+    hint = "Take higher gains" + (
+        "" if is_own_law else ", or leave them out: then they follow from the vehicle and the rate"
+    )
     with error_location(location=built.text.location):
         return (advice("controller", message, hint),)
 

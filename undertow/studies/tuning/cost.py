@@ -1,7 +1,9 @@
 """Cost of a run: smooth, dimensionless and finite."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -22,6 +24,8 @@ class Sums(NamedTuple):
 
     samples: Scalar
     tracking: Scalar
+    position: Scalar
+    attitude: Scalar
     effort: Scalar
     variation: Scalar
     span: Scalar  # s
@@ -29,12 +33,14 @@ class Sums(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Dimensionless parts of the cost."""
+    """Dimensionless parts of the cost, and the errors behind it."""
 
     tracking: Scalar  # rms tracking error, each axis relative to its scale
     effort: Scalar  # rms input, as a share of its limit
     variation: Scalar  # total variation of the input per second, as a share of its limit: chattering and noise
     lost: Scalar  # share of the duration that a failed run lacks
+    position: Scalar  # rms error per axis, m (or the unit of the plant); not a part of the cost
+    attitude: Scalar  # rms error per axis, rad; likewise
 
     def cost(self, weights: Weights) -> Scalar:
         """The weighted sum."""
@@ -49,13 +55,14 @@ class Shares(NamedTuple):
 class CostSums(AbstractAccumulator):
     """Accumulates what `Shares` needs, step by step from `start` on."""
 
+    is_angle: tuple[bool, ...] = eqx.field(static=True)  # of the axes
     start: Float[Param, ""] = param("s", "start of the evaluated window")
-    error_scale: Float[Param, " n"] = param("m, rad", "errors with a cost of one")
+    error_scale: Float[Param, " n"] = param("m, rad", "errors with a cost of one; infinite for axes that do not count")
     input_scale: Float[Param, ""] = param("unit of the input", "input with a cost of one")
 
     def init(self, signals: Signals) -> Sums:
         zero = jnp.zeros(())
-        return Sums(zero, zero, zero, zero, zero, (zero, jnp.zeros_like(signals["input"]), zero))
+        return Sums(zero, zero, zero, zero, zero, zero, zero, (zero, jnp.zeros_like(signals["input"]), zero))
 
     def update(self, state: Sums, t: Scalar, signals: Signals) -> Sums:
         inside = jnp.where(t >= self.start - _HAIR, 1.0, 0.0)
@@ -63,9 +70,12 @@ class CostSums(AbstractAccumulator):
         share = signals["input"] / self.input_scale
         between = inside * last_inside
         step = jnp.sqrt((share - last_share) ** 2 + _SMOOTH**2) - _SMOOTH
+        squares = inside * signals["error"] ** 2
         return Sums(
             samples=state.samples + inside,
             tracking=state.tracking + inside * _bounded(((signals["error"] / self.error_scale) ** 2).mean(), _MOST**2),
+            position=state.position + _bounded(_mean_of(squares, [not angle for angle in self.is_angle]), _MOST**2),
+            attitude=state.attitude + _bounded(_mean_of(squares, self.is_angle), _MOST**2),
             effort=state.effort + inside * _bounded((share**2).mean(), _MOST**2),
             variation=state.variation + between * step.mean(),
             span=state.span + between * (t - last_t),
@@ -83,7 +93,14 @@ def shares(sums: Sums, ended: Scalar, duration: float) -> Shares:
     """
     rms = lambda squares: jnp.sqrt(squares / jnp.maximum(sums.samples, 1.0) + _SMOOTH**2)
     variation = sums.variation / jnp.maximum(sums.span, _SMOOTH)
-    parts = Shares(rms(sums.tracking), rms(sums.effort), _bounded(variation, _MOST), 1 - ended / duration)
+    parts = Shares(
+        tracking=rms(sums.tracking),
+        effort=rms(sums.effort),
+        variation=_bounded(variation, _MOST),
+        lost=1 - ended / duration,
+        position=rms(sums.position),
+        attitude=rms(sums.attitude),
+    )
     return Shares(*(jnp.nan_to_num(part, nan=_MOST, posinf=_MOST) for part in parts))
 
 
@@ -95,6 +112,12 @@ def times_other(cost: float, other: float) -> str:
     if abs(cost - other) < _ALIKE * other:
         return "as large as"
     return f"{other / cost:.3g} times smaller than" if cost < other else f"{cost / other:.3g} times larger than"
+
+
+def _mean_of(values: Float[Array, " n"], counts: Sequence[bool]) -> Scalar:
+    """Mean of the entries that count; zero where none does."""
+    chosen = [value for value, is_chosen in zip(values, counts, strict=True) if is_chosen]
+    return sum(chosen, jnp.zeros(())) / max(1, len(chosen))
 
 
 def _bounded(x, most: float):

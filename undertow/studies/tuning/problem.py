@@ -12,8 +12,11 @@ import numpy as np
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController, AbstractPlant
 from undertow.core.errors import BadInput, did_you_mean, error_location
+from undertow.core.measurement import BODY_AXES
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text
+from undertow.scenario.unactuated_attitude import unactuated_axes
 from undertow.studies.tuning import tunable_parameters as tunable_parameters
 from undertow.studies.tuning.cost import CostSums
 from undertow.studies.tuning.evaluator import TrainingLoop
@@ -99,7 +102,8 @@ def _problem(text: Text, built: Built) -> Problem:
     if not start < duration or round(duration / dt) < 2:
         raise BadInput("tune.start", f"be earlier than the end of a run ({duration:g} s)", f"{start:g} s")
     scales = np.where(angles, tune.angle_scale, tune.position_scale)
-    sums = CostSums(start, scales, _input_scale(loop.plant, loop.controller))
+    scales[list(_uncontrolled(loop.plant))] = np.inf
+    sums = CostSums(tuple(angles), start, scales, _input_scale(loop.plant, loop.controller))
     as_floats = lambda values: None if values is None else np.asarray(values, dtype=float)
     places = as_floats(scenario.initial.position), as_floats(scenario.initial.velocity)
     training_loop = TrainingLoop(loop, scenario.loop, duration, places, sums, tune.weights)
@@ -118,6 +122,14 @@ def _problem(text: Text, built: Built) -> Problem:
         hint = "Compute with jax.numpy, without float() and without `if` on a gain"
         raise BadInput("tune.parameters", must, str(error).partition("\n")[0], hint=hint) from None
     return tuning_problem
+
+
+def _uncontrolled(plant: AbstractPlant) -> tuple[int, ...]:
+    """Angles that no gain of a controller improves: those about axes of a vehicle that no thruster turns it about."""
+    if not isinstance(plant, HybridVehicle):
+        return ()
+    unactuated = unactuated_axes(plant.thruster_matrix)
+    return tuple(i for i, axis in enumerate(BODY_AXES) if i >= 3 and axis in unactuated)
 
 
 def _law_of(built: Built) -> TunableParameters:

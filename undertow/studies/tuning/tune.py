@@ -28,6 +28,9 @@ METHODS = ("gradient", "search", "evolution")
 # Share of the budget for the search; the rest is for the final evaluation.
 _FOR_THE_SEARCH = 0.85
 
+# Metrics of a run, and what a tuning has of them.
+_ERRORS = {"position_rms": "position", "attitude_rms": "attitude"}
+
 INITIAL_DESIGN = 2 * AT_ONCE  # points that are evaluated before the search, including the given gains
 
 
@@ -41,6 +44,10 @@ class Evaluated(NamedTuple):
     train_cost: float
     held_out_cost: float
     certificate: Certificate
+
+    def held_out_error(self, metric: str) -> float:
+        """Rms over the held-out runs of `position_rms` or `attitude_rms`, m or rad."""
+        return float(np.sqrt((np.asarray(getattr(self.held_out, _ERRORS[metric])) ** 2).mean()))
 
 
 class Tuned(NamedTuple):
@@ -58,10 +65,24 @@ class Tuned(NamedTuple):
 
     @property
     def kept(self) -> Evaluated:
-        """The tuned gains where they are better on held-out runs, or the given ones have no certificate; else these."""
+        """The tuned gains where they are better on held-out runs, or the given ones have no certificate; else these.
+
+        They are not better where they break a limit that the given ones keep.
+        """
         initial, *_, tuned = self.evaluated
-        better = tuned.held_out_cost < initial.held_out_cost
+        better = tuned.held_out_cost < initial.held_out_cost and not self.broken
         return tuned if better or not initial.certificate.holds else initial
+
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """Metrics of the scenario's success that the given gains keep on held-out runs, and the tuned ones do not."""
+        initial, *_, tuned = self.evaluated
+        limits = self.problem.built.criterion().items()
+        return tuple(
+            metric
+            for metric, most in limits
+            if metric in _ERRORS and initial.held_out_error(metric) < most <= tuned.held_out_error(metric)
+        )
 
     @property
     def scenario(self) -> dict[str, Any]:
