@@ -9,6 +9,7 @@ import pytest
 from messages import named
 from ruamel.yaml import YAML
 
+from undertow.core.metric import Metric
 from undertow.report.answers.tuning_answer import answer_of_tuning
 from undertow.studies.tuning.cost import Shares
 from undertow.studies.tuning.stability import Certificate
@@ -114,13 +115,15 @@ def test_a_budget_that_ends_while_compiling_tunes_nothing(refused, tmp_path):
     assert "Nothing was tuned" in said and not (tmp_path / "out").exists()
 
 
-def evaluated(name, cost, radius=0.9, **options):
-    parts = Shares(*(np.array([cost]) for _ in Shares._fields))
+def evaluated(name, cost, radius=0.9, position=1.0, **options):
+    parts = Shares(*(np.array([cost]) for _ in Shares._fields))._replace(position=np.array([position]))
     return Evaluated(name, options or None, parts, parts, cost, cost, Certificate((radius,), ("",)))
 
 
-def tuning(given, tuned):
-    problem = SimpleNamespace(train=SimpleNamespace(variants=("",)))  # one vehicle
+def tuning(given, tuned, **limits):
+    metrics = {"position_rms": Metric("m", "", name="position error, rms per axis")}
+    built = SimpleNamespace(criterion=lambda: limits, known_metrics=lambda: metrics)
+    problem = SimpleNamespace(train=SimpleNamespace(variants=("",)), built=built)  # one vehicle
     return Tuned(problem, "search", (given, tuned, tuned), [], 40, 3, 12.0, True, 28)
 
 
@@ -135,6 +138,24 @@ def test_given_gains_are_kept_where_no_others_are_better():
     )
     assert lines[0] == "Best gains found: frequency 2.8627."
     assert "40 evaluations, 3 rejected without a certificate, 12 s; the search has converged." in lines
+
+
+def test_given_gains_are_kept_where_better_ones_break_a_limit():
+    """The cost trades errors of position for others; the limits of the scenario are not for trade."""
+    found = tuning(
+        evaluated("given", 0.2, position=0.007),
+        evaluated("tuned", 0.1, position=0.051, frequency=2.0),
+        position_rms=0.05,
+    )
+    answer = answer_of_tuning(found, Path("out"))
+    assert found.kept.name == "given" and answer.verdict.endswith("but they break a limit.")
+    assert answer.lines[0] == "Position error, rms per axis on held-out runs: 7 mm before, 5.1 cm after (limit 5 cm)."
+    within = tuning(
+        evaluated("given", 0.2, position=0.06),
+        evaluated("tuned", 0.1, position=0.051, frequency=2.0),
+        position_rms=0.05,
+    )
+    assert within.kept.name == "tuned"  # nothing is broken that was kept
 
 
 def test_a_ratio_is_said_in_its_direction():

@@ -100,6 +100,14 @@ def test_delay_that_the_loop_tolerates(name, delay):
     assert continuous(margins.largest_delay, name) == pytest.approx(delay, rel=5e-3)
 
 
+def test_a_delay_of_many_steps_follows_from_the_phase_of_the_open_loop():
+    """Two ways to the same margin: 5.06 ms are a hundred steps here, and fewer in the test above."""
+    step = 5e-5
+    assert margins.largest_delay(at_rest(on_axes(LAWS["rcafc"], axes=1), step, [0.5]), step, 1.0) == pytest.approx(
+        5.055e-3, rel=0.015
+    )
+
+
 def test_a_delay_of_whole_ticks_is_that_many_held_inputs():
     """Two ways to the same poles: a delay in seconds, and one less step with all but nothing of the next."""
     found, dt = at_rest(on_axes(THREE_SETS), 1e-3), 1e-3

@@ -18,6 +18,8 @@ from undertow.simulation.loop.closed_loop import ClosedLoop
 _REACHED_BY, _SHOWN_BY = ("input", "noise"), ("error", "u")
 
 _POINTS, _HALVINGS = 25, 12  # of a search: to a ten-thousandth of the value
+_MANY_STEPS = 50  # of delay, from which on a step is a small share
+_LEAST_TURN, _TURNS = 1e-4, 1000  # rad in a step; frequencies at which the open loop is computed
 _FADING = 1 - 1e-9  # so that what rounding leaves of modes that nothing excites fades away
 _STABLE = 1 + 1e-9  # a spectral radius of one, and rounding
 
@@ -54,9 +56,52 @@ def spectral_radius(loop: LinearLoop) -> float:
     return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
 
 
+def fastest_growing_error(loop: LinearLoop) -> tuple[int, complex]:
+    """The output whose error has most of the mode that grows fastest or decays slowest, and the pole of that, 1/s."""
+    radius = spectral_radius(loop)
+    values, modes = np.linalg.eig(loop.matrix)
+    mode = int(np.argmin(np.abs(np.abs(values) - radius)))
+    errors = np.abs(loop.signals["error"] @ modes[:, mode])
+    return int(np.argmax(errors)), complex(np.log(complex(values[mode])) / loop.dt)
+
+
 def largest_delay(at: Equilibrium, dt: float, most: float) -> float:
-    """Delay, s, from the law to the actuators at which the sampled loop becomes unstable; infinite beyond `most`."""
-    return _largest(lambda delay: close_sampled(at, dt, delay=delay), dt / 50, most)
+    """Delay, s, from the law to the actuators at which the sampled loop becomes unstable; infinite beyond `most`.
+
+    A long one is found by the phase of the open loop, to a fraction of a step, because a loop with a delay of hundreds
+    of steps has thousands of states.
+    """
+    if spectral_radius(close_sampled(at, dt)) > _STABLE:
+        return 0.0
+    by_phase = _delay_by_phase(close_sampled(at, dt, delay=dt), _inputs(at))
+    if by_phase > _MANY_STEPS * dt:
+        return by_phase if by_phase <= most else float("inf")
+    return _largest(lambda delay: close_sampled(at, dt, delay=delay), dt / 50, min(most, 2 * _MANY_STEPS * dt))
+
+
+def _inputs(at: Equilibrium) -> int:
+    return at.local.slopes["plant"]["u"].shape[1]
+
+
+def _delay_by_phase(late: LinearLoop, inputs: int) -> float:
+    """The same in whole and broken numbers of steps, from a loop whose inputs act one step late, s; infinite for none.
+
+    With L from the acting to the commanded input, a delay of k steps leaves a motion with frequency w that neither
+    grows nor decays where an eigenvalue of L(e^(j w dt)) is e^(j w dt k).
+    """
+    count = len(late.matrix) - 2 * inputs  # two slots of inputs that wait, of which the newer one acts
+    state, slot = slice(0, count), slice(count, count + inputs)
+    a, b, c = late.matrix[state, state], late.matrix[state, slot], late.matrix[slot, state]
+    turns = np.geomspace(_LEAST_TURN, np.pi, _TURNS)
+    z = np.exp(1j * turns)[:, None, None]
+    eigenvalues = np.linalg.eigvals(c @ np.linalg.solve(z * np.eye(count) - a, np.broadcast_to(b, (_TURNS, *b.shape))))
+    eigenvalues = np.take_along_axis(eigenvalues, np.argsort(-np.abs(eigenvalues), axis=1), axis=1)
+    size = np.abs(eigenvalues)
+    crosses = (size[1:] >= 1) != (size[:-1] >= 1)
+    steps = np.mod(np.angle(eigenvalues), 2 * np.pi) / turns[:, None]
+    share = ((1 - size[:-1]) / np.where(crosses, size[1:] - size[:-1], 1.0))[crosses]
+    between = (1 - share) * steps[:-1][crosses] + share * steps[1:][crosses]
+    return float(late.dt * between.min(initial=np.inf))
 
 
 def largest_lag(at: Equilibrium, dt: float, most: float) -> float:

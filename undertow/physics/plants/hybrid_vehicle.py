@@ -181,7 +181,9 @@ class HybridVehicle(AbstractPlant):
         return jnp.where(far, int(Status.DIVERGED), code)
 
     def advice(self) -> tuple[str, ...]:
-        return self.thruster.advice() + open_loop_advice("the thruster matrix", self.thruster_matrix, BODY_AXES)
+        return self.thruster.advice() + open_loop_advice(
+            "the thruster matrix", self.thruster_matrix, BODY_AXES, "thruster"
+        )
 
     def rank(self) -> int:
         """Rank of the thruster matrix, which is that of G where J is regular."""

@@ -9,13 +9,17 @@ from jaxtyping import Float
 _ZERO = 1e-9
 
 
-def open_loop_advice(what: str, gain, names: Sequence[str]) -> tuple[str, ...]:
+_ALONE = 0.9  # component of a direction from which on it is that of one output
+
+
+def open_loop_advice(what: str, gain, names: Sequence[str], actuator: str = "input") -> tuple[str, ...]:
     """One sentence when some combinations of the outputs cannot be controlled, none otherwise.
 
     Args:
         what: name of the matrix, which begins the sentence.
         gain: G (n x m), or any matrix with the same range.
         names: of the n outputs.
+        actuator: noun for what acts along the columns.
     """
     lost = lost_directions(np.asarray(gain, dtype=float))
     if not len(lost):
@@ -23,7 +27,10 @@ def open_loop_advice(what: str, gain, names: Sequence[str]) -> tuple[str, ...]:
     shown = ", ".join(_combination(row, names) for row in lost)
     subject, verb = ("directions", "stay") if len(lost) > 1 else ("direction", "stays")
     rank = f"{what} has rank {len(names) - len(lost)} of {len(names)}"
-    return (f"{rank}: {subject} {shown} cannot be controlled and {verb} in open loop",)
+    if np.abs(lost).max(axis=1).min() < _ALONE:
+        return (f"{rank}: {subject} {shown} cannot be controlled and {verb} in open loop",)
+    outputs = " and ".join(names[int(index)] for index in np.abs(lost).argmax(axis=1))
+    return (f"no {actuator} controls {outputs}: {rank}, and {subject} {shown} {verb} in open loop",)
 
 
 def lost_directions(gain: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "k n"]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.quantities import quantity
+from undertow.studies.prediction.linearized_points import nearest_to_instability
 from undertow.studies.prediction.predict import Prediction
 
 _ENOUGH = 0.999  # share of the time in which the actuators give what the loads demand
@@ -18,7 +19,7 @@ def answer_of_prediction(prediction: Prediction) -> PlainAnswer:
     unstable = [point.where for point in prediction.points if point.found and point.radius >= 1]
     held = prediction.authority.held >= _ENOUGH
     # Errors and margins are those of a loop that is stable.
-    parts = (_actuators,) if unstable else (_errors, _margins, _vehicles, _noise, _actuators)
+    parts = (_actuators,) if unstable or lost else (_errors, _margins, _vehicles, _noise, _actuators)
     lines = tuple(line for part in parts for line in part(prediction))
     good = not lost and not unstable and held and all(vehicle.is_stable for vehicle in prediction.vehicles)
     return PlainAnswer(good, _verdict(prediction, lost, unstable, held), lines)
@@ -26,13 +27,24 @@ def answer_of_prediction(prediction: Prediction) -> PlainAnswer:
 
 def _verdict(prediction: Prediction, lost: list[str], unstable: list[str], held: bool) -> str:
     if unstable:
-        return f"The closed loop is unstable: {_listed(unstable)}."
+        return f"The closed loop is unstable: {_listed(unstable)}{_swinging(prediction)}."
     if lost:
-        return f"There is no equilibrium: {_listed(lost)}. The actuators cannot hold the loads there."
+        return (
+            f"There is no equilibrium: {_listed(lost)}. The actuators cannot hold the loads there, or nothing rights "
+            "the vehicle about an axis that they do not control. Margins mean nothing before that is mended."
+        )
     stable = f"The closed loop is stable at all {len(prediction.points)} operating points"
     if not held:
         return f"{stable}, but the actuators cannot give what the loads demand."
     return f"{stable}, and the actuators give what the loads demand."
+
+
+def _swinging(prediction: Prediction) -> str:
+    """Which output grows, and how."""
+    worst = nearest_to_instability(prediction.points)
+    swings = abs(worst.pole.imag) > abs(worst.pole.real)
+    how = f" and swings with a period of {2 * np.pi / abs(worst.pole.imag):.2g} s" if swings else ""
+    return f". An error in {worst.growing} grows by {max(worst.pole.real, 0):.2g} 1/s{how}"
 
 
 def _listed(places: list[str]) -> str:
@@ -107,8 +119,9 @@ def _noise(prediction: Prediction) -> Iterator[str]:
 
 def _actuators(prediction: Prediction) -> Iterator[str]:
     """The share of the inputs that loads take."""
+    lost = any(not point.found for point in prediction.points)
     used = max((point.used for point in prediction.points if point.found), default=0.0)
     if used:
-        yield f"The loads take up to {quantity(used, '')} of an input."
-    if prediction.lost:
-        yield f"No input acts along {', '.join(prediction.lost)}."
+        yield f"{'Elsewhere the' if lost else 'The'} loads take up to {quantity(used, '')} of an input."
+    for sentence in prediction.lost:
+        yield f"{sentence[:1].upper()}{sentence[1:]}."

@@ -24,6 +24,8 @@ class LinearizedPoint(NamedTuple):
     used: float  # largest |u| as a share of its limit; 0 without a limit
     poles: np.ndarray  # 1/s
     radius: float  # spectral radius over one control step; stable below 1
+    growing: str  # output whose error has most of the mode with that radius
+    pole: complex  # of that mode, 1/s
 
     @property
     def found(self) -> bool:
@@ -37,8 +39,8 @@ def linearized_points(op_point: OperatingPoint) -> tuple[LinearizedPoint, ...]:
 
 
 def nearest_to_instability(points: Sequence[LinearizedPoint]) -> LinearizedPoint:
-    """The point with the largest spectral radius."""
-    return max(points, key=lambda point: point.radius)
+    """The point with the largest spectral radius, of those with an equilibrium where there are any."""
+    return max([point for point in points if point.found] or points, key=lambda point: point.radius)
 
 
 def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedPoint:
@@ -48,13 +50,27 @@ def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedP
     low, high = input_limits(op_point.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
+    output, pole = margins.fastest_growing_error(linear)
     return LinearizedPoint(
-        acting.where, speed, at, float(used.max()), margins.poles(linear), margins.spectral_radius(linear)
+        where=acting.where,
+        flow=speed,
+        at=at,
+        used=float(used.max()),
+        poles=margins.poles(linear),
+        radius=margins.spectral_radius(linear),
+        growing=loop.plant.outputs[output],
+        pole=pole,
     )
 
 
-def robustness(at: Equilibrium, dt: float) -> dict[str, float]:
-    """Margins at an equilibrium: sampling time, further delay and lag, s, and factors on the effect of the input."""
+def robustness(point: LinearizedPoint, dt: float) -> dict[str, float]:
+    """Margins at a point: sampling time, further delay and lag, s, and factors on the effect of the input.
+
+    There are none without an equilibrium, where slopes mean nothing.
+    """
+    if not point.found:
+        return {"sampling_time": 0.0, "delay": 0.0, "lag": 0.0, "gain_low": 1.0, "gain_high": 1.0}
+    at = point.at
     low, high = margins.gain_range(at, dt)
     return {
         "sampling_time": margins.largest_sampling_time(at, dt, _LONGEST),

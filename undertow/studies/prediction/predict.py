@@ -74,9 +74,10 @@ def predict(built: Built, progress: Progress = lambda message, share: None, vehi
     loop, settings = op_point.built.closed_loop, built.scenario.loop
     progress("poles at the operating points", 0.3)
     points = linearized_points(op_point)
-    worst = nearest_to_instability(points).at
+    nearest = nearest_to_instability(points)
+    worst = nearest.at
     progress("margins", 0.4)
-    loop_margins = robustness(worst, settings.dt)
+    loop_margins = robustness(nearest, settings.dt)
     progress("noise and disturbances", 0.7)
     frequency = np.geomspace(_SLOWEST, _HIGHEST / settings.dt, 300)
     error, estimation = _responses(op_point.linear, frequency)

@@ -60,5 +60,5 @@ def _margins_with(built: Built, name: str, plant) -> VehicleMargins:
     loop = eqx.tree_at(lambda one: one.plant, built.closed_loop, plant)
     points = linearized_points(operating_point(built._replace(closed_loop=loop)))
     worst = nearest_to_instability(points)
-    margins = robustness(worst.at, built.scenario.loop.dt)
+    margins = robustness(worst, built.scenario.loop.dt)
     return VehicleMargins(name, all(point.found for point in points), worst.radius, margins)

@@ -64,7 +64,7 @@ def arms(facts: Facts) -> Iterator[Finding]:
 
 def rank(facts: Facts) -> Iterator[Finding]:
     """Directions without thrust, and the condition of the others; moments per longest arm."""
-    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, BODY_AXES):
+    for sentence in open_loop_advice("the thruster matrix", facts.thruster_matrix, BODY_AXES, "thruster"):
         yield Finding("advice", "rank", "thrusters", sentence)
         return
     left_vectors, sizes, _ = np.linalg.svd(scaled(facts.thruster_matrix))
