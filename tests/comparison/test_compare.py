@@ -28,7 +28,9 @@ WILD = {"kind": "pid", "frequency": 500.0}
 def own_law(scenario):
     """The controller of docs/how-to/your-own-controller.md in the current folder."""
     page = ROOT / "docs" / "how-to" / "your-own-controller.md"
-    (code,) = [block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"].endswith(".py")]
+    (code,) = [
+        block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"] == "my_controller.py"
+    ]
     Path("mine.py").write_text(code.replace("def my_controller(", "def smc("))
 
 

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.quantities import quantity
+from undertow.studies.comparison.equal_budgets import GAINS_KEPT, JUDGED_AS_IT_IS
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.sentences import metric_name, needed_pairs
-from undertow.studies.comparison.tuning_note import tells_of_search
+from undertow.studies.comparison.tuning_note import takes_own_path, tells_of_search
 
 # Candidates that have a line of their own; the table has all.
 _MOST = 4
@@ -125,6 +126,22 @@ def _established(findings: Findings) -> Iterator[str]:
 
 
 def _fairness(findings: Findings, noun: str) -> Iterator[str]:
-    """Whether gains were searched for: without, a comparison of controllers says little."""
-    if noun == "controller" and not any(map(tells_of_search, findings.tuning.values())):
+    """Whether gains were searched for: without, a comparison of controllers says little. Which laws are at a loss."""
+    if noun != "controller":
+        return
+    searched = [name for name, sentence in findings.tuning.items() if tells_of_search(sentence)]
+    if not searched:
         yield "No gains were searched for: `--tune 60` gives every controller the same budget before it is compared."
+    else:
+        for name, sentence in findings.tuning.items():
+            if name not in searched:
+                yield f"{name} was not tuned: {sentence.removeprefix(JUDGED_AS_IT_IS)}."
+            elif GAINS_KEPT in sentence:
+                yield f"{name} has its gains of before: {GAINS_KEPT}."
+    for name, sentence in findings.tuning.items():
+        if takes_own_path(sentence):
+            yield (
+                f"{name} commands the inputs in a way of its own. The other laws use the curve, the dead zone and the "
+                "limits of the thrusters: derive from AbstractAccelerationLaw for the same "
+                "(docs/how-to/your-own-controller.md)."
+            )

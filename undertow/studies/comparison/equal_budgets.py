@@ -49,6 +49,10 @@ class Runs(NamedTuple):
     runs: int
 
 
+JUDGED_AS_IT_IS = "judged as it is: "
+GAINS_KEPT = "none of the others has a lower cost"
+
+
 class TunedLaw(NamedTuple):
     """What tuning found for one law.
 
@@ -76,9 +80,9 @@ class TunedLaw(NamedTuple):
     def sentence(self) -> str:
         """How the gains came about."""
         if self.untuned or self.train is None or self.held_out is None:
-            return f"judged as it is: {self.untuned}"
+            return f"{JUDGED_AS_IT_IS}{self.untuned}"
         words = ", ".join(f"{name} {_short(value)}" for name, value in self.gains.items() if value is not None)
-        words = words or "the gains before are kept: none of the others has a lower cost"
+        words = words or f"the gains before are kept: {GAINS_KEPT}"
         return (
             f"tuned with {self.evaluations} evaluations of {self.parameters} numbers, cost on training runs "
             f"{self.train[0]:.3g} before and {self.train[1]:.3g} after, on held-out runs {self.held_out[0]:.3g} and "

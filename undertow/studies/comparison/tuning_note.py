@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from undertow.control.controllers.actuation import AbstractAccelerationLaw
 from undertow.core import catalogue
 from undertow.core.contracts import AbstractController
 from undertow.scenario import factory
@@ -14,6 +15,7 @@ from undertow.studies.tuning.cost import times_other
 from undertow.studies.tuning.tunable_parameters import law_of
 
 _RULE = "gains from the rule of `controllers/bandwidths.py`"
+_OWN_PATH = "; it commands the inputs in a way of its own"
 _TABLE_1 = ("rcaf", "paper")
 _NO_GAINS = ("kind", "preset", "sampling_time", "velocity_noise")  # the last two follow from the rest of a scenario
 
@@ -37,9 +39,15 @@ def tuning_note(
         folder: where relative file names of the scenario start.
         source: the scenario file that the gains come from, if any.
     """
-    searched = _searched(part, source)
-    if searched is not None:
-        return searched
+    note = _searched(part, source) or _unsearched(part, law, dt, folder, source)
+    of_user = ".py:" in part["kind"] and not isinstance(law, AbstractAccelerationLaw)
+    return note._replace(sentence=f"{note.sentence}{_OWN_PATH}") if of_user else note
+
+
+def _unsearched(
+    part: Mapping[str, Any], law: AbstractController, dt: float, folder: Path, source: Path | None
+) -> TuningNote:
+    """The note on gains that `undertow tune` did not find."""
     kind, preset, gains, main = _given(part, law, dt, folder)
     short = kind.rpartition("/")[2]
     source_words = f" in {source}" if source else ""
@@ -58,6 +66,11 @@ def tuning_note(
 def tells_of_search(sentence: str) -> bool:
     """Whether a sentence on gains says that they were searched for: by `undertow tune`, or with an equal budget."""
     return sentence.startswith("tuned ")
+
+
+def takes_own_path(sentence: str) -> bool:
+    """Whether a sentence on gains says that a law commands the inputs in a way of its own."""
+    return sentence.endswith(_OWN_PATH)
 
 
 def _given(

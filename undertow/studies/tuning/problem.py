@@ -28,6 +28,10 @@ _DIGITS = 5  # of a tuned gain
 _FAR = 1e9  # an input beyond every limit
 
 
+# Options with one number that are no gains, but what a controller is designed for.
+_NO_GAINS = ("sampling_time", "velocity_noise", "load_rate", "delay", "direction")
+
+
 class Problem(NamedTuple):
     """A tuning problem."""
 
@@ -61,8 +65,9 @@ class Problem(NamedTuple):
 
 def is_tunable(built: Built) -> bool:
     """Whether there are gains to tune: those of the section `tune`, or those that the controller has itself."""
-    scenario = built.scenario
-    return bool(scenario.tune.parameters or _law_of(built.of_the_law()).ranges(scenario.loop.dt))
+    scenario, law = built.scenario, built.of_the_law()
+    function, _ = _controller(law.text, law)
+    return bool(scenario.tune.parameters or _own_ranges(_law_of(law), function, scenario.loop.dt))
 
 
 def gains_in_force(built: Built, option: str) -> np.ndarray | None:
@@ -121,7 +126,19 @@ def _problem(text: Text, built: Built) -> Problem:
         must = "be options that the controller takes as arrays of JAX, one number for each axis"
         hint = "Compute with jax.numpy, without float() and without `if` on a gain"
         raise BadInput("tune.parameters", must, str(error).partition("\n")[0], hint=hint) from None
+    _check_gains_are_arrays(tuning_problem)
     return tuning_problem
+
+
+def _check_gains_are_arrays(tuning_problem: Problem) -> None:
+    """Raise where a gain is a plain number of the given controller, and an array of those that are tried."""
+    tried = tuning_problem.law(tuning_problem.options(tuning_problem.start))
+    is_array = {path: eqx.is_array(leaf) for path, leaf in jax.tree_util.tree_flatten_with_path(tried)[0]}
+    for path, leaf in jax.tree_util.tree_flatten_with_path(tuning_problem.built.closed_loop.controller)[0]:
+        if not eqx.is_array(leaf) and is_array.get(path, False):
+            field = jax.tree_util.keystr(path).lstrip(".")
+            hint = f'Declare it as `{field}: Float[Param, "..."] = param("1/s", "what it is")`'
+            raise BadInput("tune.parameters", "be gains that the controller has as arrays", f"`{field}`", hint=hint)
 
 
 def _uncontrolled(plant: AbstractPlant) -> tuple[int, ...]:
@@ -153,11 +170,13 @@ def _parameters(
     dt: float,
     angles: tuple[bool, ...],
 ) -> list[TunableParameter]:
-    ranges = tune.parameters or tunable.ranges(dt)
-    options = list(inspect.signature(function).parameters)[1:]
+    ranges = tune.parameters or _own_ranges(tunable, function, dt)
+    options = _options_of(function)
     if not ranges:
         raise BadInput(
-            "tune.parameters", "be given: this controller has no ranges of its own", hint=_example(base_options)
+            "tune.parameters",
+            "be given: the options of this controller, or of its preset, have no ranges of their own",
+            hint=_example(base_options),
         )
     for name in ranges:
         if name.partition("[")[0] not in options:
@@ -166,10 +185,28 @@ def _parameters(
     return tunable_parameters.parameters(ranges, _groups(tune.per, angles), SHARED)
 
 
+def _own_ranges(
+    tunable: TunableParameters, function: Callable[..., Any], dt: float
+) -> Mapping[str, tunable_parameters.Range]:
+    """Ranges that a controller has itself, of gains that are options: those of a preset such as `ardusub` are fixed."""
+    options = _options_of(function)
+    return {name: ends for name, ends in tunable.ranges(dt).items() if name.partition("[")[0] in options}
+
+
+def _options_of(function: Callable[..., Any]) -> list[str]:
+    return list(inspect.signature(function).parameters)[1:]
+
+
 def _example(options: Mapping[str, Any]) -> str:
     """How to give ranges: of an option of the controller with one number, around its value."""
-    numbers = {name: value for name, value in options.items() if type(value) in (int, float) and value > 0}
-    name, value = next(iter(numbers.items()), ("OPTION", 1.0))
+    numbers = {
+        name: value
+        for name, value in options.items()
+        if type(value) in (int, float) and value > 0 and name not in _NO_GAINS
+    }
+    if not numbers:
+        return "Those of a preset such as `ardusub` are the autopilot's: tune another preset, or another controller"
+    name, value = next(iter(numbers.items()))
     listing = f"; its options with one number are {', '.join(numbers)}" if len(numbers) > 1 else ""
     return f"For example `tune: {{parameters: {{{name}: [{value / 10:g}, {10 * value:g}]}}}}`{listing}"
 
