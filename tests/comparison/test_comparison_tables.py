@@ -171,7 +171,7 @@ def test_the_answer_ranks_and_says_what_is_established(findings):
 
 
 def test_the_answer_of_two_that_completed(findings):
-    """`b_1` is established before `a`; gains that were tuned need no remark."""
+    """`b_1` is established before `a`; of gains only those that were not tuned need a remark."""
     of_two = findings._replace(
         names=("a", "b_1"),
         differences=tuple(each for each in findings.differences if "c" not in (each.candidate, each.baseline)),
@@ -183,7 +183,10 @@ def test_the_answer_of_two_that_completed(findings):
     )
     good, verdict, lines = answer_of_comparison(of_two, "controller")
     assert good is True and verdict.endswith("of each: all completed within the criterion of success.")
-    assert lines[2:] == ("The position error rms per axis of b_1 is smaller than that of a: established.",)
+    assert lines[2:] == (
+        "The position error rms per axis of b_1 is smaller than that of a: established.",
+        "b_1: gains given (frequency 2), not tuned by `undertow tune`.",
+    )
     few = tuple(each._replace(pairs=3) for each in of_two.differences)
     line = answer_of_comparison(of_two._replace(differences=few), "controller").lines[2]
     assert line.startswith("3 trials that both completed are too few to establish a difference: it takes ")

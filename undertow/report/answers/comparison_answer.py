@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from undertow.report.answers.plain_answer import PlainAnswer
 from undertow.report.quantities import quantity
-from undertow.studies.comparison.equal_budgets import GAINS_KEPT, JUDGED_AS_IT_IS
+from undertow.studies.comparison.equal_budgets import GAINS_KEPT
 from undertow.studies.comparison.findings import Findings
 from undertow.studies.comparison.sentences import metric_name, needed_pairs
 from undertow.studies.comparison.tuning_note import takes_own_path, tells_of_search
@@ -135,7 +135,7 @@ def _fairness(findings: Findings, noun: str) -> Iterator[str]:
     else:
         for name, sentence in findings.tuning.items():
             if name not in searched:
-                yield f"{name} was not tuned: {sentence.removeprefix(JUDGED_AS_IT_IS)}."
+                yield f"{name}: {sentence}."
             elif GAINS_KEPT in sentence:
                 yield f"{name} has its gains of before: {GAINS_KEPT}."
     for name, sentence in findings.tuning.items():

@@ -49,7 +49,6 @@ class Runs(NamedTuple):
     runs: int
 
 
-JUDGED_AS_IT_IS = "judged as it is: "
 GAINS_KEPT = "none of the others has a lower cost"
 
 
@@ -80,7 +79,7 @@ class TunedLaw(NamedTuple):
     def sentence(self) -> str:
         """How the gains came about."""
         if self.untuned or self.train is None or self.held_out is None:
-            return f"{JUDGED_AS_IT_IS}{self.untuned}"
+            return f"judged as it is: {self.untuned}"
         words = ", ".join(f"{name} {_short(value)}" for name, value in self.gains.items() if value is not None)
         words = words or f"the gains before are kept: {GAINS_KEPT}"
         return (
