@@ -21,7 +21,7 @@ from undertow.logs.log_signals import Series
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
-from undertow.report.answers.identification_answer import answer_of_identification
+from undertow.report.answers.identification_answer import answer_of_identification, mean_fits
 from undertow.scenario.reading import dump
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.studies.identification.dive import dive_of
@@ -252,9 +252,24 @@ def test_correlation_of_residuals_is_that_of_a_first_order_process():
     assert whiteness(noise + 0.2 * np.roll(inputs[:, 0], 3), inputs).with_inputs == pytest.approx(0.2, abs=0.02)
 
 
+def test_dives_that_no_estimate_used_are_what_a_model_is_judged_by():
+    fit = lambda is_unseen, own: {
+        "is_unseen": is_unseen,
+        "identified": {"free_run_fit": {"u": own}},
+        "prior": {"free_run_fit": {"u": 40.0}},
+    }
+    assert mean_fits({"validation": [fit(False, 90.0), fit(False, 70.0)]}) == {"u": (80.0, 40.0)}
+    assert mean_fits({"validation": [fit(False, 90.0), fit(True, 20.0), fit(True, 30.0)]}) == {"u": (25.0, 40.0)}
+
+
 def test_a_model_as_good_as_the_file_may_be_used():
     """Fits are compared within one per cent."""
-    fit = lambda own, before: {"identified": {"free_run_fit": {"u": own}}, "prior": {"free_run_fit": {"u": before}}}
+    fit = lambda own, before: {
+        "is_unseen": False,
+        "identified": {"free_run_fit": {"u": own}},
+        "prior": {"free_run_fit": {"u": before}},
+    }
     data = {"dives": [{"duration": 60.0}], "parameters": {}, "refused_axes": [], "undetermined": [], "converged": True}
+    data["findings"] = []
     verdicts = [answer_of_identification(data | {"validation": [fit(90.0, b)]}).verdict for b in (90.4, 50.0, 97.0)]
     assert [" as well as " in verdicts[0], " better than " in verdicts[1], "do not use it" in verdicts[2]] == [True] * 3

@@ -39,9 +39,25 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *_refused(data),
         *_unknown(data),
         *_ratios(data),
-        *([] if folder is None else [f"Next: undertow simulate {folder / 'identified.yaml'}"]),
+        *(_hints(data) if better is False else ()),
+        *_next(better, folder),
     )
     return PlainAnswer(better, verdict, lines)
+
+
+def _hints(data: Mapping[str, Any]) -> Iterator[str]:
+    """What the checks of the logs have found, where the result cannot be used."""
+    for finding in data["findings"][:_SHOWN]:
+        yield f"Seen in the logs: {finding}"
+
+
+def _next(better: bool | None, folder: Path | None) -> Iterator[str]:
+    if folder is None:
+        return
+    if better is False:
+        yield f"Next: see on {folder / 'identification.html'} what the logs lack; identified.yaml is for tests only."
+    else:
+        yield f"Next: undertow simulate {folder / 'identified.yaml'}"
 
 
 def _compared(fits: Mapping[str, tuple[float, float]]) -> tuple[bool | None, str]:

@@ -16,6 +16,7 @@ _LIMITED = "What limits it:"
 _SOME = 0.01  # share of the time at the limits of the inputs that is worth saying
 _ERRORS = ("position_rms", "attitude_rms", "tracking_rms")
 _MOST = 0.6  # share of a squared error from which on its axis is named
+_AT_LIMIT = 0.99  # of the supply, from which on an input is at its limit
 _MEASURED = 0.5  # share of the error that the measurement explains, from which on it is said to limit the run
 
 
@@ -95,7 +96,9 @@ def _effort(facts: RunFacts) -> Iterator[str]:
     if whole.get("input_peak") is None:
         return
     share = whole.get("saturated_fraction") or 0.0
-    limits = "never at the limits" if not share else f"at the limits for {quantity(share, '')} of the time"
+    reached = facts.supply is not None and whole["input_peak"] > _AT_LIMIT * facts.supply
+    seldom = "at the limits for an instant" if reached else "never at the limits"
+    limits = seldom if not share else f"at the limits for {quantity(share, '')} of the time"
     of_supply = "" if facts.supply is None else f" of {quantity(facts.supply, 'V')}"
     peak = quantity(whole["input_peak"], facts.meanings["input_peak"].unit)
     energy = whole.get("energy")

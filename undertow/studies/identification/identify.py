@@ -1,6 +1,6 @@
 """Identification of a vehicle: from its file and logs to numbers with intervals, judged on dives not used."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +13,15 @@ from undertow.logs.log import Log
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.scenario.uncertain_number import UncertainNumber
+from undertow.studies.identification.cross_validation import (
+    Validation,
+    cross_validated,
+    pieces_of,
+    predicted,
+    with_nuisances,
+)
 from undertow.studies.identification.dive import Dive
+from undertow.studies.identification.estimate import Say, Stages, estimate_from, nearest_begin
 from undertow.studies.identification.free_parameters import (
     FreeParameter,
     axis_parameters,
@@ -22,8 +30,8 @@ from undertow.studies.identification.free_parameters import (
     resolved_by,
 )
 from undertow.studies.identification.identified_vehicle import prior_vehicle
-from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
-from undertow.studies.identification.output_error import Fit, fit, scores_of
+from undertow.studies.identification.model import IdentificationModel, model_of
+from undertow.studies.identification.output_error import Fit, scores_of
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
@@ -33,33 +41,8 @@ from undertow.studies.identification.uncertainty import (
     uncertainty_of,
     undetermined,
 )
-from undertow.studies.identification.validation import AXES, PredictionErrors, prediction_errors
+from undertow.studies.identification.validation import AXES
 from undertow.studies.identification.weak_form import first_estimate
-
-Say = Callable[[str], None]
-
-_PARTS = 4  # into which a single dive is divided for the validation
-
-
-class Validation(NamedTuple):
-    """A dive, or a part of one, that was left out and predicted.
-
-    Attributes:
-        dive: left out.
-        identified: errors of the model from the other dives.
-        prior: errors of the vehicle file.
-        is_unseen: whether no estimate used it, not even that of the intervals.
-    """
-
-    dive: Dive
-    identified: PredictionErrors
-    prior: PredictionErrors
-    is_unseen: bool = False
-
-    @property
-    def name(self) -> str:
-        """Of the dive."""
-        return self.dive.name
 
 
 class Identification(NamedTuple):
@@ -155,18 +138,20 @@ def identify(
         raise BadInput("logs", "determine a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
     model = model_of(prior_vehicle(plant, per_axis), parameters)
     say("first estimate")
-    begin = first_estimate(model.prior, parameters, dives).z
-    say("estimating")
-    estimate = _estimate(model, parameters, dives, segment, begin, say)
+    first = first_estimate(model.prior, parameters, dives).z
+    begin = nearest_begin(model, parameters, dives, segment, first)
+    pieces = pieces_of(dives) if validate else []
+    stages = Stages(say, 1 + len(pieces))
+    estimate = estimate_from(model, parameters, dives, segment, begin, stages.next("all dives"))
     segments = segments_of(dives, segment)
     scores = scores_of(model, segments, step, estimate)
     parts, validation = None, ()
     if validate:
-        parts, validation = _validated(model, parameters, dives, segment, estimate, say)
+        parts, validation = cross_validated(model, parameters, pieces, segment, estimate, stages)
     count = len(parameters)
-    validation += tuple(_unseen(model, estimate.z[:count], dive.dive) for dive in only_predicted)
+    validation += tuple(predicted(model, estimate.z[:count], dive.dive) for dive in only_predicted)
     say("judging how sure it is")
-    uncertainty = uncertainty_of(estimate.information, scores, step, _with_nuisances(parts, estimate.z, count))
+    uncertainty = uncertainty_of(estimate.information, scores, step, with_nuisances(parts, estimate.z, count))
     return Identification(
         model=model,
         dives=tuple(dives),
@@ -193,47 +178,3 @@ def _findings(prepared: Sequence[PreparedDive]) -> list[str]:
         where = "all logs" if len(names) == len(prepared) > 1 else ", ".join(names)
         labelled.append(f"{where}: {sentence}")
     return labelled
-
-
-def _estimate(model, parameters, dives: Sequence[Dive], segment: float, begin: np.ndarray, say: Say, noise=None) -> Fit:
-    unknowns = Unknowns(tuple(parameters), len(dives))
-    least = unknowns.least()
-    z = np.zeros(len(least))
-    z[: len(parameters)] = begin
-    watch = lambda iteration, cost: say(f"iteration {iteration}, cost {cost:.6g}")
-    return fit(model, segments_of(dives, segment), dives[0].step, z, least, watch, noise)
-
-
-def _validated(model, parameters, dives: Sequence[Dive], segment: float, estimate: Fit, say: Say):
-    """Estimates without each dive (or part of the only one), and how these predict it."""
-    pieces = list(dives) if len(dives) > 1 else parts_of(dives[0], _PARTS)
-    count = len(parameters)
-    begin = estimate.z[:count]
-    estimates, validation = [], []
-    for number, piece in enumerate(pieces):
-        say(f"validation: {piece.name}")
-        others = [other for i, other in enumerate(pieces) if i != number]
-        without = _estimate(model, parameters, others, segment, begin, say, estimate.noise).z[:count]
-        estimates.append(without)
-        identified = prediction_errors(model, without, piece)
-        validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
-    return np.stack(estimates), tuple(validation)
-
-
-def _unseen(model, z: np.ndarray, dive: Dive) -> Validation:
-    """How the estimate from all dives predicts another one."""
-    prior = prediction_errors(model, np.zeros(len(z)), dive)
-    return Validation(dive, prediction_errors(model, z, dive), prior, is_unseen=True)
-
-
-def parts_of(dive: Dive, number: int) -> list[Dive]:
-    """A dive divided into equal parts."""
-    length = len(dive.inputs) // number
-    return [dive.part(f"{dive.name}, part {i + 1} of {number}", i * length, length) for i in range(number)]
-
-
-def _with_nuisances(parts: np.ndarray | None, z: np.ndarray, count: int) -> np.ndarray | None:
-    """Estimates of the parts, with the nuisances of the whole."""
-    if parts is None:
-        return None
-    return np.hstack([parts, np.broadcast_to(z[count:], (len(parts), len(z) - count))])

@@ -26,6 +26,7 @@ from undertow.studies.identification.segments import Segments
 # lacks moves all of them.
 _OUTLIER = 4.0
 _LARGE = 3.0  # standard deviations of the residual, below which no sample is an outlier
+_SURPRISE = 5.0  # standard deviations, beyond which a residual says no more
 _SMALLEST_NOISE = 1e-4  # m, rad, m/s, rad/s
 _FIRST_NOISE = np.repeat([0.05, 0.03, 0.05, 0.05, 0.05], (3, 3, 3, 3, 1))
 _FASTEST = 2.0  # factor by which the noise may change in an iteration
@@ -119,6 +120,18 @@ def fit(
     information, _, reduction = _reduced(parts, z, starts, 0.0)
     cost = _cost(residuals, weights, z, starts)
     return Fit(z, starts, noise, weights, information, reduction, residuals, cost, iteration, converged)
+
+
+def first_errors(model: IdentificationModel, segments: Segments, step: float, z: np.ndarray) -> float:
+    """Sum of squared residuals over usual noise, each at most `_SURPRISE` squared, from the guessed begins.
+
+    Args:
+        model, segments, step, z: as above.
+    """
+    counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
+    residuals = _residuals(model, segments, step, z, np.zeros((len(segments.dive), 12)))
+    squares = np.where(counts > 0, counts * residuals**2 / _first_noise(counts) ** 2, 0.0)
+    return float(np.minimum(np.nan_to_num(squares, nan=np.inf, posinf=np.inf), _SURPRISE**2).sum())
 
 
 class _Trial(NamedTuple):

@@ -1,0 +1,74 @@
+"""Each dive predicted from the others, and dives that were not used from all."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from undertow.studies.identification.dive import Dive
+from undertow.studies.identification.estimate import Stages, estimate_from
+from undertow.studies.identification.output_error import Fit
+from undertow.studies.identification.validation import PredictionErrors, prediction_errors
+
+_PARTS = 4  # into which a single dive is divided
+
+
+class Validation(NamedTuple):
+    """A dive, or a part of one, that was left out and predicted.
+
+    Attributes:
+        dive: left out.
+        identified: errors of the model from the other dives.
+        prior: errors of the vehicle file.
+        is_unseen: whether no estimate used it, not even that of the intervals.
+    """
+
+    dive: Dive
+    identified: PredictionErrors
+    prior: PredictionErrors
+    is_unseen: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of the dive."""
+        return self.dive.name
+
+
+def pieces_of(dives: Sequence[Dive]) -> list[Dive]:
+    """What is left out in turn: each dive, or a part of the only one."""
+    return list(dives) if len(dives) > 1 else parts_of(dives[0], _PARTS)
+
+
+def cross_validated(model, parameters, pieces: Sequence[Dive], segment: float, estimate: Fit, stages: Stages):
+    """Estimates without each piece, and how these predict it."""
+    count = len(parameters)
+    begin = estimate.z[:count]
+    estimates, validation = [], []
+    for number, piece in enumerate(pieces):
+        others = [other for i, other in enumerate(pieces) if i != number]
+        watch = stages.next(f"without {Path(piece.name).name}")
+        without = estimate_from(model, parameters, others, segment, begin, watch, estimate.noise).z[:count]
+        estimates.append(without)
+        identified = prediction_errors(model, without, piece)
+        validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
+    return np.stack(estimates), tuple(validation)
+
+
+def predicted(model, z: np.ndarray, dive: Dive) -> Validation:
+    """How the estimate from all dives predicts another one."""
+    prior = prediction_errors(model, np.zeros(len(z)), dive)
+    return Validation(dive, prediction_errors(model, z, dive), prior, is_unseen=True)
+
+
+def parts_of(dive: Dive, number: int) -> list[Dive]:
+    """A dive divided into equal parts."""
+    length = len(dive.inputs) // number
+    return [dive.part(f"{dive.name}, part {i + 1} of {number}", i * length, length) for i in range(number)]
+
+
+def with_nuisances(parts: np.ndarray | None, z: np.ndarray, count: int) -> np.ndarray | None:
+    """Estimates of the parts, with the nuisances of the whole."""
+    if parts is None:
+        return None
+    return np.hstack([parts, np.broadcast_to(z[count:], (len(parts), len(z) - count))])
