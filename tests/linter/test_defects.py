@@ -37,7 +37,7 @@ EXPECTED = {
     },
     "blue_six": {
         "PRINTED_MATRIX": "0.109 for `thrusters[4]` in roll, but is -0.218",
-        "rank": "rank 5 of 6: direction pitch",
+        "rank": "no thruster controls pitch: the thruster matrix has rank 5 of 6",
     },
     "blue_six_poses": {
         "arm": "0.218 m from the centre of gravity, of a hull with a width of 0.338 m",

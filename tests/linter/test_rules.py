@@ -107,7 +107,7 @@ SPOILT = {
     "four thrusters": (
         {"positions": SOUND.positions[4:], "directions": SOUND.directions[4:], "printed_matrix": None},
         {"rank"},
-        "rank 3 of 6: directions surge, sway, yaw cannot be controlled",
+        "no thruster controls surge, sway and yaw: the thruster matrix has rank 3 of 6",
     ),
 }
 

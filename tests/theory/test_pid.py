@@ -127,7 +127,7 @@ def test_ball_floats():
     [
         ({"frequency": -1.0}, "frequency"),
         ({"damping": 0.1, "integral_share": 0.5}, "integral"),
-        ({"gains": [1.0, 3.0, 2.0]}, "integral"),
+        ({"gains": [1.0, 3.0, 2.0]}, "gains"),
         ({"gains": [1.0, 2.0]}, "gains"),
         ({"motor": "magic"}, "motor"),
         ({"sampling_time": 0.0}, "sampling_time"),

@@ -28,7 +28,7 @@ from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.results.netcdf import write_metrics
 from undertow.scenario.results.run_result import ScenarioResult
 from undertow.studies.prediction.foregone import reason_without_prediction
-from undertow.studies.prediction.operating_point import operating_point, predicted
+from undertow.studies.prediction.operating_point import instability, operating_point, predicted
 
 # A measured metric that departs from the predicted one by more than this share is reported.
 _DEPARTS = 0.10
@@ -48,6 +48,7 @@ class PredictedMetrics(NamedTuple):
     metrics: dict[str, float] | None
     why_not: str
     foregone: bool = False  # known before anything was linearised
+    instability: str = ""  # a sentence where small errors grow
 
 
 class RequestedPrediction(NamedTuple):
@@ -158,7 +159,8 @@ def predict(result: ScenarioResult) -> PredictedMetrics:
 @in_its_precision
 def _linearised(built: Built) -> PredictedMetrics:
     try:
-        return PredictedMetrics(*predicted(operating_point(built)))
+        op_point = operating_point(built)
+        return PredictedMetrics(*predicted(op_point), instability=instability(op_point))
     except BadInput as error:
         return PredictedMetrics(None, str(error))
     except Exception as error:  # a user's part may run and yet not be differentiable

@@ -1,5 +1,6 @@
 """`undertow simulate`: run one scenario and write its results and figures."""
 
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -58,12 +59,16 @@ def simulate(command: SimulateCommand) -> int:
             plotting.plot(shown_of(result), command.pdf)
             if command.details:
                 _print_tables(result, console)
+            predicting = None if command.prediction is False else thread.submit(predict, result)
+            if predicting is not None and answer_of_run(result).good is False:
+                with stage(console, "looking for the reason"):
+                    instability = predicting.result().instability
+                result = dataclasses.replace(result, facts=result.facts._replace(instability=instability))
             answer = answer_of_run(result)
             _print_answer(answer, result, console)
             write(result, draft.path)
             repetition = compare(scenario, result.dataset) if scenario.suffix == ".nc" else None
             draft.publish()  # the results first: prediction, figures and page take longer, and may fail
-            predicting = None if command.prediction is False else thread.submit(predict, result)
             console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
             code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
             shown = RequestedPrediction(predicting, bool(command.prediction), command.details)

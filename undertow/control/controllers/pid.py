@@ -65,6 +65,15 @@ class PID(AbstractAccelerationLaw):
         return ESTIMATE | ATTAINED_SHARE
 
 
+def _check_routh(proportional, integral, derivative) -> None:
+    """Raise where the loop would be unstable even on axes without lag, by the name of the option that says so."""
+    if not checks.assumed(lambda k_i, most: (k_i < most).all(), integral, proportional * derivative):
+        must = "have k_i below k_p k_d, or no axis is stable (Routh and Hurwitz)"
+        worst = int(np.argmax(np.ravel(integral / (proportional * derivative))))
+        k_p, k_i, k_d = (float(np.ravel(gain)[worst]) for gain in (proportional, integral, derivative))
+        raise BadInput("gains", must, f"k_i = {k_i:g}, with k_p k_d = {k_p * k_d:g}")
+
+
 @flat_options()
 def pid(
     model: Model,
@@ -109,6 +118,7 @@ def pid(
     else:
         checks.per_axis("gains", gains, len(model.coordinates.angles), (3,))
         proportional, integral, derivative = jnp.moveaxis(jnp.asarray(gains, dtype=float), -1, 0)
+        _check_routh(proportional, integral, derivative)
     return PID(
         model=model,
         actuation=actuation_for(conditions.sampling_time, jnp.sqrt(proportional), actuation),

@@ -29,7 +29,8 @@ def open_loop_advice(what: str, gain, names: Sequence[str], actuator: str = "inp
     rank = f"{what} has rank {len(names) - len(lost)} of {len(names)}"
     if np.abs(lost).max(axis=1).min() < _ALONE:
         return (f"{rank}: {subject} {shown} cannot be controlled and {verb} in open loop",)
-    outputs = " and ".join(names[int(index)] for index in np.abs(lost).argmax(axis=1))
+    *others, last = [names[int(index)] for index in np.abs(lost).argmax(axis=1)]
+    outputs = f"{', '.join(others)} and {last}" if others else last
     return (f"no {actuator} controls {outputs}: {rank}, and {subject} {shown} {verb} in open loop",)
 
 

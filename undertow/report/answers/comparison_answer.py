@@ -42,9 +42,15 @@ def _verdict(findings: Findings, failing: list[str], noun: str) -> str:
         return f"{subject}: {', '.join(failing)} did not complete all of them."
     missed = [name for name, (within, judged) in findings.successes.items() if within < judged]
     if missed:
-        return f"{subject}: all completed, but {', '.join(missed)} did not always keep to the criterion of success."
+        counts = ", ".join(f"{name} in {_times(findings, name)}" for name in missed)
+        return f"{subject}: all completed, but not all kept to the criterion of success: {counts}."
     kept = " within the criterion of success" if any(judged for _, judged in findings.successes.values()) else ""
     return f"{subject}: all completed{kept}."
+
+
+def _times(findings: Findings, name: str) -> str:
+    within, judged = findings.successes[name]
+    return f"{within} of {judged}"
 
 
 def _known(findings: Findings) -> Iterator[str]:

@@ -103,7 +103,7 @@ def _effort(facts: RunFacts) -> Iterator[str]:
     peak = quantity(whole["input_peak"], facts.meanings["input_peak"].unit)
     energy = whole.get("energy")
     mean = "" if not energy else f"; {quantity(energy, 'J')}, {quantity(energy / facts.ended, 'W')} on average"
-    yield f"Inputs up to {peak}{of_supply}, {limits}{mean}."
+    yield f"Inputs in the whole run: up to {peak}{of_supply}, {limits}{mean}."
 
 
 def _failures(run: RunRecord) -> Iterator[str]:
@@ -115,12 +115,19 @@ def _failures(run: RunRecord) -> Iterator[str]:
 
 
 def _limits(run: RunRecord) -> Iterator[str]:
-    """What limits the run: the inputs, the measurement, or loads that are not compensated."""
+    """What limits the run: its loop, the inputs, the measurement, or loads that are not compensated."""
     steady = run.facts.steady
+    if run.facts.instability:
+        yield f"{_LIMITED} {run.facts.instability}. Other gains help: `undertow tune` finds some."
+        return
     if steady is None:
         return
     if (steady.get("saturated_fraction") or 0.0) >= _SOME:
-        yield f"{_LIMITED} the inputs, which are at their limits; a slower reference or stronger ones would help."
+        share = quantity(steady["saturated_fraction"], "")
+        yield (
+            f"{_LIMITED} the inputs, which are at their limits for {share} of that time: the reference or the sea "
+            "takes more than they have."
+        )
         return
     hypotheses = (run.facts.certificate or {}).get("hypotheses", ())
     unmoved = any(one["name"] == "rank" and one["steady"] is not None and one["steady"] < 1 for one in hypotheses)

@@ -71,9 +71,9 @@ def given_gains_advice(built: Built) -> tuple[Advice, ...]:
         f"with these gains the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow by "
         f"{growth:.2g} 1/s"
     )
-    hint = "Take higher gains" + (
-        "" if is_own_law else ", or leave them out: then they follow from the vehicle and the rate"
-    )
+    hint = "`undertow tune` finds others"
+    if not is_own_law:
+        hint += "; without any, they follow from the vehicle and the rate"
     with error_location(location=built.text.location):
         return (advice("controller", message, hint),)
 

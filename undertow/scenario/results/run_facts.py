@@ -43,6 +43,7 @@ class RunFacts(NamedTuple):
         transitions: of the supervisor; None where nothing was supervised.
         unactuated: axes of the vehicle that no thruster controls; () for other plants.
         lost_axes: further ones, that none controls any more because thrusters were taken out of use.
+        instability: a sentence where a run that did not go well has an unstable loop; not kept in files.
         code: hashes of the user's code files, see `code_hashes`.
         left_to_xla: why the SIMD backend could not be used; "" where it was, or was not asked for.
         versions: of the software, and the class of the machine, see `versions`.
@@ -64,6 +65,7 @@ class RunFacts(NamedTuple):
     transitions: Sequence[SupervisorTransition] | None = None
     unactuated: Sequence[str] = ()
     lost_axes: Sequence[str] = ()
+    instability: str = ""
     code: str = ""
     left_to_xla: str = ""
     versions: Mapping[str, str] = MappingProxyType({})

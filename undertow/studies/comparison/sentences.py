@@ -9,6 +9,7 @@ from undertow.studies.comparison.findings import COMPLETED, Findings
 from undertow.studies.comparison.paired import FEWEST, LEVEL, Completion, PairedDifference
 from undertow.studies.comparison.pareto import Front
 
+_MANIFOLD = 10.0  # times the baseline, from which on percent say little
 HOW = (
     "A difference counts as established where the two-sided Wilcoxon signed-rank test is below 5 % with Holm's "
     "correction for all tests of this comparison, and the 95 % bootstrap interval of the median difference excludes "
@@ -79,9 +80,12 @@ def digits(value: float) -> str:
 
 
 def relative(difference: PairedDifference, unit: str, number: Callable[[float], str] = digits) -> str:
-    """Median difference in percent of the baseline; in the unit of the metric where the baseline has zeros."""
+    """Median difference in percent of the baseline, beyond 1000 % as a multiple of it; in the unit of the metric where
+    the baseline has zeros."""
     if math.isnan(difference.relative):
         return f"{'+' if difference.median > 0 else ''}{value_with_unit(difference.median, unit)}"
+    if difference.relative > _MANIFOLD:
+        return f"{number(1 + difference.relative)} times"
     sign = "+" if difference.relative > 0 else ""
     return f"{sign}{number(100 * difference.relative)} %"
 

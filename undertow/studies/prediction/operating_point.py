@@ -61,6 +61,15 @@ def _desired(reference: AbstractReference, t: Time) -> Outputs:
     return reference.at(t).position
 
 
+def instability(op_point: OperatingPoint) -> str:
+    """A sentence where small errors grow about the equilibrium under the mean load; otherwise empty."""
+    if not op_point.mean.found or op_point.radius < 1:
+        return ""
+    output, pole = margins.fastest_growing_error(op_point.linear)
+    name = op_point.built.closed_loop.plant.outputs[output]
+    return f"the loop is unstable: a small error in {name} grows by {max(pole.real, 0.0):.2g} 1/s"
+
+
 def predicted(op_point: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     """Metrics of the steady window from the linearised loop; or None, and the reason."""
     if not op_point.mean.found:
@@ -69,8 +78,10 @@ def predicted(op_point: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     if op_point.radius >= 1:
         pole = margins.poles(op_point.linear)[0]
         turning = f"+- {abs(pole.imag):.3g}j " if pole.imag else ""
-        why_not = f"the loop linearised at fixed weights is unstable: rightmost pole {pole.real:+.3g} {turning}1/s"
-        if theory_of(op_point.built.closed_loop.controller).adapts:
+        adapts = theory_of(op_point.built.closed_loop.controller).adapts
+        loop = "loop linearised at fixed weights" if adapts else "linearised loop"
+        why_not = f"the {loop} is unstable: rightmost pole {pole.real:+.3g} {turning}1/s"
+        if adapts:
             why_not += "; adapting weights may change that, which only a run shows"
         return None, why_not
     start, stop = op_point.built.window()
