@@ -125,8 +125,8 @@ def _limits(run: RunRecord) -> Iterator[str]:
     if (steady.get("saturated_fraction") or 0.0) >= _SOME:
         share = quantity(steady["saturated_fraction"], "")
         yield (
-            f"{_LIMITED} the inputs, which are at their limits for {share} of that time: the reference or the sea "
-            "takes more than they have."
+            f"{_LIMITED} the inputs, which are at their limits for {share} of that time: reference and "
+            "disturbances take more than they have."
         )
         return
     hypotheses = (run.facts.certificate or {}).get("hypotheses", ())
