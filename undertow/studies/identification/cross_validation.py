@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.estimate import Stages, estimate_from
+from undertow.studies.identification.estimate import Stages, estimate_from, nearest_begin
 from undertow.studies.identification.output_error import Fit
 from undertow.studies.identification.validation import PredictionErrors, prediction_errors
+from undertow.studies.identification.weak_form import first_estimate
 
 _PARTS = 4  # into which a single dive is divided
+_PART_OF = ", part "  # between the name of a dive and the number of a part
 
 
 class Validation(NamedTuple):
@@ -41,14 +43,22 @@ def pieces_of(dives: Sequence[Dive]) -> list[Dive]:
 
 
 def cross_validated(model, parameters, pieces: Sequence[Dive], segment: float, estimate: Fit, stages: Stages):
-    """Estimates without each piece, and how these predict it."""
+    """Estimates without each piece, and how these predict it.
+
+    Without a dive an estimate begins anew: where there are several minima, that of all dives would lead it to one that
+    the others alone might not find. Parts of one dive are alike, and begin at the estimate from all of it.
+    """
     count = len(parameters)
-    begin = estimate.z[:count]
+    one_dive = len({piece.name.partition(_PART_OF)[0] for piece in pieces}) == 1
+    begin, noise = estimate.z[:count], estimate.noise
     estimates, validation = [], []
     for number, piece in enumerate(pieces):
         others = [other for i, other in enumerate(pieces) if i != number]
         watch = stages.next(f"without {Path(piece.name).name}")
-        without = estimate_from(model, parameters, others, segment, begin, watch, estimate.noise).z[:count]
+        if not one_dive:
+            first = first_estimate(model.prior, parameters, others).z
+            begin, noise = nearest_begin(model, parameters, others, segment, first), None
+        without = estimate_from(model, parameters, others, segment, begin, watch, noise).z[:count]
         estimates.append(without)
         identified = prediction_errors(model, without, piece)
         validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
@@ -64,7 +74,7 @@ def predicted(model, z: np.ndarray, dive: Dive) -> Validation:
 def parts_of(dive: Dive, number: int) -> list[Dive]:
     """A dive divided into equal parts."""
     length = len(dive.inputs) // number
-    return [dive.part(f"{dive.name}, part {i + 1} of {number}", i * length, length) for i in range(number)]
+    return [dive.part(f"{dive.name}{_PART_OF}{i + 1} of {number}", i * length, length) for i in range(number)]
 
 
 def with_nuisances(parts: np.ndarray | None, z: np.ndarray, count: int) -> np.ndarray | None:

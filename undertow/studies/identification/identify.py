@@ -134,8 +134,10 @@ def identify(
     dives = [dive.dive for dive in prepared]
     refused = tuple(axis for axis in BODY_AXES if all(axis in dive.refused_axes for dive in prepared))
     parameters = [p for p in resolved_by(step, plant, asked) if p.name.rpartition(".")[2] not in refused]
-    if not parameters:
-        raise BadInput("logs", "determine a free parameter", "none: " + " ".join(_findings(prepared)[:3]))
+    if not parameters or len(refused) == len(BODY_AXES):
+        raise BadInput(
+            "logs", "determine a parameter of some axis", "of no use for any: " + " ".join(_findings(prepared)[:3])
+        )
     model = model_of(prior_vehicle(plant, per_axis), parameters)
     say("first estimate")
     first = first_estimate(model.prior, parameters, dives).z

@@ -145,4 +145,5 @@ def solved(regression: InputRegression, order: Order, left_out: tuple[int, ...] 
         residuals = columns @ solution - regression.target
     sizes = np.where(regression.usable, np.abs(residuals).reshape(-1, 6), np.nan)
     error = np.array([np.nanmean(column) if np.isfinite(column).any() else np.nan for column in sizes.T])
-    return GainSolution(solution[:count], np.sqrt(_OVERLAP * np.diagonal(np.linalg.inv(information)))[:count], error)
+    variances = np.maximum(np.diagonal(np.linalg.inv(information)), 0.0)  # below zero by rounding, where nothing moves
+    return GainSolution(solution[:count], np.sqrt(_OVERLAP * variances)[:count], error)

@@ -162,6 +162,11 @@ def _matters(regression: InputRegression, order: Order, solution: GainSolution, 
         return bool((solution.error < _BETTER * without).any())
 
 
+# Of inputs along the axes, whose gains are not known: a controller that holds the vehicle against something looks like
+# that, too, so that only the axis is not identified.
+_MAP_OR_MOVE = "Look at the order and the signs of the columns of the input, or move the vehicle more on that axis"
+
+
 def _findings(
     names: Sequence[str],
     solution: GainSolution,
@@ -174,14 +179,21 @@ def _findings(
         pair = f"{names[first]} and {names[second]}"
         sentence = f"{pair} are swapped: the motion follows each of them as the file says of the other"
         remedy = "Swap their columns in the mapping of the input, or the two thrusters in the vehicle file"
-        findings.append(LogFinding("input", pair, "refused", sentence, remedy))
+        if has_known_gains:
+            findings.append(LogFinding("input", pair, "refused", sentence, remedy))
+        else:
+            findings += [LogFinding("axis", names[j], "refused", sentence, _MAP_OR_MOVE) for j in (first, second)]
     for j, name in enumerate(names):
         gain, deviation = float(solution.gains[j]), float(solution.deviations[j])
         is_negative = gain < -max(_SURE * deviation, _NOTHING)
         if is_negative and matters[j]:
             sentence = f"{name} pushes the other way than the file says: {gain:.2f} +- {deviation:.2f} of its thrust"
             remedy = "Write its column with a minus in the mapping of the input, or turn it round in the vehicle file"
-            findings.append(LogFinding("input", name, "refused", sentence, remedy))
+            if has_known_gains:
+                findings.append(LogFinding("input", name, "refused", sentence, remedy))
+            else:
+                sentence = f"The vehicle moves against the input in {name}: gain {gain:.2f} +- {deviation:.2f}"
+                findings.append(LogFinding("axis", name, "refused", sentence, _MAP_OR_MOVE))
         elif is_negative:
             sentence = f"{name} may push the other way than the file says ({gain:.2f} +- {deviation:.2f} of its thrust)"
             sentence += ", but explains little of the motion"

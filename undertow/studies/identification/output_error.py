@@ -171,7 +171,8 @@ def _residuals(model, segments, step, z, starts) -> np.ndarray:
 
 def _cost(residuals: np.ndarray, weights: np.ndarray, z: np.ndarray, starts: np.ndarray) -> float:
     """Half the sum of squares, with what was known beforehand."""
-    squares = np.where(weights > 0, weights * residuals**2, 0.0).sum()
+    with np.errstate(over="ignore"):  # of a step that went much too far, and is not taken
+        squares = np.where(weights > 0, weights * residuals**2, 0.0).sum()
     return float(0.5 * (squares + (z**2).sum() + (starts**2).sum()))
 
 

@@ -24,6 +24,7 @@ _SHARE_OF_GAPS = 0.2
 _UNEVEN = 0.5  # standard deviation of the intervals over their median
 _MISSING = 0.2
 _DEAD, _ABSURD = 1e-12, 1e9
+_DEAD_RATES = 1e-5  # rad/s: the noise of any gyro is larger
 _COVERED = 0.5
 _STUCK = 3.0  # s
 _STUCK_SHARE = 0.1
@@ -64,7 +65,7 @@ def _unusable(sensor: str, stream: Series) -> LogFinding | None:
     if len(finite) < _FEWEST:
         sentence = f"Of {len(values)} samples of the {WORDS[sensor]} {len(finite)} are numbers; {_FEWEST} are needed"
         return LogFinding("sensor", sensor, "left_out", sentence, leave)
-    if (np.abs(finite) < _DEAD).all():
+    if (np.abs(finite) < (_DEAD_RATES if sensor == "rates" else _DEAD)).all():
         sentence = f"The {WORDS[sensor]} is dead: no number in it is larger than {np.abs(finite).max():.0e}"
         return LogFinding("sensor", sensor, "left_out", sentence, leave)
     if np.abs(finite).max() > _ABSURD:
