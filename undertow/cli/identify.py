@@ -1,5 +1,6 @@
 """`undertow identify`: the numbers of a vehicle from its logs, and how sure they are."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,20 +14,24 @@ from undertow.cli.pdf_option import check_pdf
 from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import live_stages
 from undertow.cli.tables import numbers, print_lines, titled, wide_console
+from undertow.cli.unfinished import checkpoint_in, unfinished
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.core.number_text import plain
 from undertow.report.answers.identification_answer import answer_of_identification, in_words
 from undertow.report.identification_page import write_identification
-from undertow.scenario.build import build
+from undertow.scenario.build import Built, build
 from undertow.scenario.log_file import read_log
-from undertow.scenario.reading import read
+from undertow.scenario.provenance import recording_hash, text_hash
+from undertow.scenario.reading import dump, read
 from undertow.scenario.scenario_vehicle import with_reference
 from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
+from undertow.simulation.checkpoint import Checkpoint
 from undertow.studies.identification.identified_files import write_files
 from undertow.studies.identification.identify import identify
 from undertow.studies.identification.result_data import as_data
 
+_CHECKPOINT = "identification.jsonl"
 _WRITTEN = ("identification.html", "identification.json", "identified.yaml", "vehicle.yaml", "figures")
 
 
@@ -34,19 +39,23 @@ def identify_vehicle(command: IdentifyCommand) -> int:
     """Identify the vehicle of a scenario and write the results to `out`, or to a free folder under runs/."""
     if command.scenario is None or not command.logs:
         raise BadInput("", "", "identify needs a SCENARIO and the LOGs of its dives, or --thruster with a bench record")
-    scenario, log_files = command.scenario, command.logs
+    scenario, log_files, resume = command.scenario, command.logs, command.resume
     check_pdf(command.pdf)
     console = wide_console()
     priors = priors_of(command.prior or ())
+    first = Path("runs") / f"{scenario.stem}-identified"
+    out = unfinished(first, _CHECKPOINT) if resume and command.out is None else command.out
     with (
-        output_folder(command.out, Path("runs") / f"{scenario.stem}-identified") as folder,
+        output_folder(out, first) as folder,
         results_folder(folder, _WRITTEN, "identification.json", command.overwrite) as draft,
+        checkpoint_in(folder, _CHECKPOINT, "identify") as kept,
         live_stages(console) as say,
     ):
         say("reading")
         built = build(with_reference(read(scenario, allow_code=command.allow_code)))
         logs = [read_log(path, command.mapping) for path in log_files]
         unseen = [read_log(path, command.mapping) for path in command.unseen or ()]
+        checkpoint = Checkpoint(kept, _fingerprint(command, log_files, built), math.inf, resume, what="identification")
         result = interruptible(
             lambda: identify(
                 built,
@@ -57,6 +66,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
                 per_axis=command.per_axis,
                 step=command.step,
                 segment=command.segment,
+                checkpoint=checkpoint,
                 say=say,
             )
         )
@@ -65,6 +75,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
             (draft.path / "identification.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
             write_files(built, result, log_files, draft.path)
             draft.publish()  # before the figures, which may fail
+            kept.unlink()
         except OSError:
             console.print(interval_table(data["parameters"], has_prior=True))  # what took minutes is not lost
             raise
@@ -73,6 +84,14 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         console.print(interval_table(data["parameters"], has_prior=True))
     print_lines(console, [*answer_of_identification(data, folder).text, f"Results: {folder}"])
     return DONE
+
+
+def _fingerprint(command: IdentifyCommand, logs: Sequence[Path], built: Built) -> str:
+    """Of what an identification depends on: the vehicle, the contents of the logs, and the options."""
+    files = [*logs, *(command.unseen or ()), *([command.mapping] if command.mapping else [])]
+    options = (command.free, command.prior, command.per_axis, command.step, command.segment)
+    hashes = [recording_hash(path) for path in files]
+    return text_hash(dump({"plant": built.resolved["plant"], "files": hashes, "options": repr(options)}))
 
 
 def priors_of(words: Sequence[str]) -> dict[str, UncertainNumber]:

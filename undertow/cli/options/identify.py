@@ -83,6 +83,10 @@ class IdentifyCommand(Command):
     ] = 10.0
     out: Annotated[Path | None, results("runs/NAME-identified")] = None
     overwrite: Overwrite = False
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Continue an identification that was interrupted; finished estimates are kept."),
+    ] = False
     allow_code: AllowCode = False
     pdf: Pdf = None
     details: Details = False

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.estimate import Stages, estimate_from, nearest_begin
+from undertow.studies.identification.estimates import Estimates
+from undertow.studies.identification.model import IdentificationModel
 from undertow.studies.identification.output_error import Fit
 from undertow.studies.identification.validation import PredictionErrors, prediction_errors
-from undertow.studies.identification.weak_form import first_estimate
 
 _PARTS = 4  # into which a single dive is divided
 _PART_OF = ", part "  # between the name of a dive and the number of a part
@@ -42,27 +42,26 @@ def pieces_of(dives: Sequence[Dive]) -> list[Dive]:
     return list(dives) if len(dives) > 1 else parts_of(dives[0], _PARTS)
 
 
-def cross_validated(model, parameters, pieces: Sequence[Dive], segment: float, estimate: Fit, stages: Stages):
+def cross_validated(
+    model: IdentificationModel, pieces: Sequence[Dive], estimate: Fit, count: int, estimates: Estimates
+):
     """Estimates without each piece, and how these predict it.
 
     Without a dive an estimate begins anew: where there are several minima, that of all dives would lead it to one that
     the others alone might not find. Parts of one dive are alike, and begin at the estimate from all of it.
     """
-    count = len(parameters)
     one_dive = len({piece.name.partition(_PART_OF)[0] for piece in pieces}) == 1
     begin, noise = estimate.z[:count], estimate.noise
-    estimates, validation = [], []
+    left_out, validation = [], []
     for number, piece in enumerate(pieces):
         others = [other for i, other in enumerate(pieces) if i != number]
-        watch = stages.next(f"without {Path(piece.name).name}")
         if not one_dive:
-            first = first_estimate(model.prior, parameters, others).z
-            begin, noise = nearest_begin(model, parameters, others, segment, first), None
-        without = estimate_from(model, parameters, others, segment, begin, watch, noise).z[:count]
-        estimates.append(without)
+            begin, noise = estimates.nearest_begin(others), None
+        without = estimates.of(f"without {Path(piece.name).name}", others, begin, noise).z[:count]
+        left_out.append(without)
         identified = prediction_errors(model, without, piece)
         validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))
-    return np.stack(estimates), tuple(validation)
+    return np.stack(left_out), tuple(validation)
 
 
 def predicted(model, z: np.ndarray, dive: Dive) -> Validation:

@@ -13,6 +13,7 @@ from undertow.logs.log import Log
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.scenario.uncertain_number import UncertainNumber
+from undertow.simulation.checkpoint import Checkpoint
 from undertow.studies.identification.cross_validation import (
     Validation,
     cross_validated,
@@ -21,7 +22,7 @@ from undertow.studies.identification.cross_validation import (
     with_nuisances,
 )
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.estimate import Say, Stages, estimate_from, nearest_begin
+from undertow.studies.identification.estimates import Estimates, Say
 from undertow.studies.identification.free_parameters import (
     FreeParameter,
     axis_parameters,
@@ -42,7 +43,6 @@ from undertow.studies.identification.uncertainty import (
     undetermined,
 )
 from undertow.studies.identification.validation import AXES
-from undertow.studies.identification.weak_form import first_estimate
 
 
 class Identification(NamedTuple):
@@ -97,6 +97,7 @@ def identify(
     step: float = 0.05,
     segment: float = 10.0,
     validate: bool = True,
+    checkpoint: Checkpoint | None = None,
     say: Say = lambda stage: None,
 ) -> Identification:
     """Identify a vehicle.
@@ -112,6 +113,7 @@ def identify(
         step: of the integration, s.
         segment: length of the segments, s.
         validate: whether to predict each dive from the others.
+        checkpoint: keeps finished estimates; None to keep none.
         say: called with the current stage.
 
     Raises:
@@ -139,18 +141,16 @@ def identify(
             "logs", "determine a parameter of some axis", "of no use for any: " + " ".join(_findings(prepared)[:3])
         )
     model = model_of(prior_vehicle(plant, per_axis), parameters)
-    say("first estimate")
-    first = first_estimate(model.prior, parameters, dives).z
-    begin = nearest_begin(model, parameters, dives, segment, first)
+    count = len(parameters)
     pieces = pieces_of(dives) if validate else []
-    stages = Stages(say, 1 + len(pieces))
-    estimate = estimate_from(model, parameters, dives, segment, begin, stages.next("all dives"))
-    segments = segments_of(dives, segment)
-    scores = scores_of(model, segments, step, estimate)
+    estimates = Estimates(model, parameters, segment, 1 + len(pieces), say, checkpoint)
+    say("first estimate")
+    begin = estimates.nearest_begin(dives)
+    estimate = estimates.of("all dives", dives, begin)
+    scores = scores_of(model, segments_of(dives, segment), step, estimate)
     parts, validation = None, ()
     if validate:
-        parts, validation = cross_validated(model, parameters, pieces, segment, estimate, stages)
-    count = len(parameters)
+        parts, validation = cross_validated(model, pieces, estimate, count, estimates)
     validation += tuple(predicted(model, estimate.z[:count], dive.dive) for dive in only_predicted)
     say("judging how sure it is")
     uncertainty = uncertainty_of(estimate.information, scores, step, with_nuisances(parts, estimate.z, count))

@@ -39,19 +39,14 @@ _RELATIVE = 5e-5  # the same as a share of the cost, where residuals are not whi
 _NOISE_CONVERGED = 0.02  # largest relative change of a noise
 
 
-class Fit(NamedTuple):
-    """An estimate.
+class Solution(NamedTuple):
+    """Where the solver came to rest; everything else of a `Fit` follows.
 
     Attributes:
         z: unknowns.
         starts: of the segments, (S, 12).
         noise: standard deviation of each kind of residual, (13,); infinite without samples.
-        weights: of the residuals, (S, length, 13).
-        information: second derivative of half the sum of squares by the unknowns, the begins eliminated, prior
-            included, (P, P).
-        reduction: bb^-1 ab' of each segment.
-        residuals: (S, length, 13).
-        cost: half the sum of squares, priors included.
+        shares: by which residuals count, less than 1 for outliers, (S, length, 13).
         iterations: of the solver.
         converged: whether it came to rest.
     """
@@ -59,13 +54,56 @@ class Fit(NamedTuple):
     z: np.ndarray
     starts: np.ndarray
     noise: np.ndarray
+    shares: np.ndarray
+    iterations: int
+    converged: bool
+
+
+class Fit(NamedTuple):
+    """An estimate.
+
+    Attributes:
+        solution: see there.
+        z, starts, noise, iterations, converged: those of the solution.
+        weights: of the residuals, (S, length, 13).
+        information: second derivative of half the sum of squares by the unknowns, the begins eliminated, prior
+            included, (P, P).
+        reduction: bb^-1 ab' of each segment.
+        residuals: (S, length, 13).
+        cost: half the sum of squares, priors included.
+    """
+
+    solution: Solution
     weights: np.ndarray
     information: np.ndarray
     reduction: np.ndarray
     residuals: np.ndarray
     cost: float
-    iterations: int
-    converged: bool
+
+    @property
+    def z(self) -> np.ndarray:
+        """Unknowns."""
+        return self.solution.z
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Of the segments."""
+        return self.solution.starts
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Standard deviation of each kind of residual."""
+        return self.solution.noise
+
+    @property
+    def iterations(self) -> int:
+        """Of the solver."""
+        return self.solution.iterations
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solver came to rest."""
+        return self.solution.converged
 
 
 def fit(
@@ -115,11 +153,21 @@ def fit(
         if steady and small:
             converged = True
             break
-    weights = shares * counts / noise**2
-    parts = _evaluated(model, segments, weights, step, z, starts)
-    information, _, reduction = _reduced(parts, z, starts, 0.0)
-    cost = _cost(residuals, weights, z, starts)
-    return Fit(z, starts, noise, weights, information, reduction, residuals, cost, iteration, converged)
+    return completed(model, segments, step, Solution(z, starts, noise, shares, iteration, converged))
+
+
+def completed(model: IdentificationModel, segments: Segments, step: float, solution: Solution) -> Fit:
+    """The estimate that belongs to a solution.
+
+    Args:
+        model, segments, step: with which it was found.
+        solution: see there.
+    """
+    z, starts = solution.z, solution.starts
+    weights = solution.shares * segments.counts[:, :, SENSOR_OF_RESIDUAL] / solution.noise**2
+    residuals = _residuals(model, segments, step, z, starts)
+    information, _, reduction = _reduced(_evaluated(model, segments, weights, step, z, starts), z, starts, 0.0)
+    return Fit(solution, weights, information, reduction, residuals, _cost(residuals, weights, z, starts))
 
 
 def first_errors(model: IdentificationModel, segments: Segments, step: float, z: np.ndarray) -> float:
