@@ -45,8 +45,9 @@ def sentences(long: Long, metric: str, unit: str) -> tuple[str, dict[str, Any]]:
     noisy = {law: _steady(long[_noisy(law)], metric) for law in _LAWS}
     volts = ", ".join(f"{limit:g}" for limit in LIMITS)
     text = (
-        f"This is so with unlimited voltages and exact velocities. With limits of {volts} V (1 kHz) RCAFC tracks "
-        f"to {_listed(tracking['rcafc'])} m and rad, RAFC with gamma raised to {_listed(tracking['rafc'])}, because "
+        f"This is so with unlimited voltages and exact velocities. With limits of {volts} V (1 kHz) "
+        f"the tracking error of RCAFC is {_listed(tracking['rcafc'])} m and rad, that of RAFC with gamma raised "
+        f"{_listed(tracking['rafc'])}, because "
         f"its weights wind up (with weights within {BOUND:g}: {_listed(tracking['rafc_bounded'])}). With 1 cm/s of "
         f"velocity noise: RCAFC {noisy['rcafc']:.3g} {unit}, RAFC with gamma raised {noisy['rafc']:.3g}."
     )
@@ -82,7 +83,7 @@ def _steady(run: BatchedRun, metric: str) -> float | None:
 
 def _shown(run: BatchedRun) -> str:
     error = _steady(run, "tracking_rms")
-    return f"an early end at {run.ended:.1f} s" if error is None else f"{error:.2g}"
+    return f"none (it ends after {run.ended:.1f} s)" if error is None else f"{error:.2g}"
 
 
 def _listed(words: list[str]) -> str:
@@ -122,7 +123,7 @@ def compared(runs: Runs, long: Long, metric: str, what: str, unit: str) -> Claim
         return ClaimVerdict("holds", text, "ideal_rcafc", simulated, numbers)
     conditions = []
     if lost_by_limits(long):
-        conditions.append(f"voltages are limited to {max(LIMITS):g} V or less and weights are not")
+        conditions.append(f"voltages are limited to {max(LIMITS):g} V or less while the weights are unlimited")
     if worse_by_noise(long, metric):
         conditions.append("velocities are noisy (1 cm/s)")
     else_where = (
