@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from undertow.analysis.theory import theory_of
 from undertow.core.number_text import display_units
 from undertow.report.answers.analysis_answer import answer_of_prediction
 from undertow.report.answers.plain_answer import answer_block
@@ -14,6 +15,7 @@ from undertow.report.figures.writing import save_all
 from undertow.report.formats import prose
 from undertow.report.page import bullets, document, figure, section, table, tag
 from undertow.simulation.loop.dataset import input_names
+from undertow.studies.prediction.linearized_points import nearest_to_instability
 from undertow.studies.prediction.predict import Prediction
 
 
@@ -99,14 +101,23 @@ def _points(prediction: Prediction) -> PredictionTable:
         "Controllable closed-loop poles over the operating range",
         ("operating point", "flow, m/s", "input used", "rightmost pole, 1/s", "spectral radius", "verdict"),
         rows,
-        "The whole loop, linearised at its equilibrium under loads along the reference, with constant fuzzy weights. "
+        f"The whole loop, linearised at rest under loads along the reference{_at_fixed_weights(prediction)}. "
         "Flow is the speed of the water past the vehicle; its drag and moments change as the vehicle turns and moves.",
     )
+
+
+def _at_fixed_weights(prediction: Prediction) -> str:
+    law = prediction.operating_point.built.closed_loop.controller
+    return ", with constant fuzzy weights" if theory_of(law).adapts else ""
 
 
 def _margins(prediction: Prediction) -> PredictionTable:
     margins = prediction.margins
     dt = prediction.operating_point.linear.dt
+    nearest = nearest_to_instability(prediction.points)
+    if not nearest.found or nearest.radius >= 1:
+        why = f"the loop is unstable: {nearest.growing}" if nearest.found else "the loop has no equilibrium"
+        return PredictionTable("Robustness margins", ("margin", "remark"), [("none", why)], "")
     rows = [
         ("sampling limit at these gains", _time(margins["sampling_time"]), f"sampling time {_time(dt)}"),
         ("delay margin, controller to actuators", _time(margins["delay"]), "beyond the nominal model"),

@@ -9,6 +9,8 @@ from undertow.core.errors import BadInput, nearest
 from undertow.scenario.reading import key_path
 from undertow.scenario.schema import Scenario
 
+_SCALED = ("linear_damping", "quadratic_damping")  # of a vehicle, which one seldom varies entry by entry
+
 
 def put_value(data: dict[str, Any], key: str, put: Any) -> None:
     """Set the value at a key path; a part given by its name alone becomes a mapping.
@@ -25,6 +27,8 @@ def put_value(data: dict[str, Any], key: str, put: Any) -> None:
         elif inner is None and isinstance(following, int):
             elsewhere = _elsewhere(str(step), data) if node is data else ""
             hint = nearest(str(step), node) or elsewhere or f"Give `{step}` there, with all its entries"
+            if step in _SCALED:
+                hint += ", or vary all of it by one factor with the disturbance `parameter_error`"
             raise BadInput(key, f"name an entry of a list of the scenario, which has no `{step}` there", hint=hint)
         elif inner is None:
             inner = {}
