@@ -30,7 +30,9 @@ AXIS = {
 def own_law(tmp_path, monkeypatch):
     """The file of the page in the current folder."""
     page = ROOT / "docs" / "how-to" / "your-own-controller.md"
-    (code,) = [block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"].endswith(".py")]
+    (code,) = [
+        block.code for block in blocks(page) if (at := FILE.match(block.code)) and at["name"] == "my_controller.py"
+    ]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_controller.py").write_text(code)
 
