@@ -1,7 +1,6 @@
 """Run a scenario."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -63,17 +62,11 @@ def finished(built: Built, outcome: Outcome, left_to_xla: str, gathered: Gathere
         record_period(loop),
         loop.duration,
     )
-    title = scenario.description or _named(built) or "a closed loop run by undertow"
+    title = scenario.description or "a closed loop run by undertow"
     why = step_failure(built.closed_loop, loop, outcome)
     origin = Origin(title, scenario.seed, built.resolved, built.code, left_to_xla, why or "")
     result = make_result(built.closed_loop, outcome, settings, origin)
     return ScenarioResult(result.series, result.facts, result.loop, result.outcome, built)
-
-
-def _named(built: Built) -> str:
-    """Name of the scenario file without its ending; empty for an earlier result and for data."""
-    file = Path(built.text.name)
-    return file.stem if file.suffix in (".yaml", ".yml") else ""
 
 
 def run_loop(
