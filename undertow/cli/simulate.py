@@ -72,6 +72,8 @@ def simulate(command: SimulateCommand) -> int:
             console.print(f"Results: {folder}", highlight=False, soft_wrap=True)
             code = max(_ending_code(result), _repetition_code(repetition, console) if repetition else DONE)
             shown = RequestedPrediction(predicting, bool(command.prediction), command.details)
+            if not built.scenario.description:  # a page needs a name; results repeat whatever their file is called
+                result = dataclasses.replace(result, facts=result.facts._replace(title=scenario.stem))
             replay = write_outputs(result, plotting, shown, draft, folder, console)
             more = "" if command.details else "; --details prints all numbers"
             hint = f"Next: undertow analyze {scenario} shows the margins of the gains{more}."
