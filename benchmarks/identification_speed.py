@@ -25,7 +25,8 @@ from undertow.studies.identification.weak_form import first_estimate
 
 AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 FREE = (
-    "added_mass", "linear_damping", "quadratic_damping", "net_buoyancy", "r_b", "reverse_gain", "lag", "mass", "inertia",
+    "added_mass", "linear_damping", "quadratic_damping", "net_buoyancy", "r_b",
+    "reverse_gain", "lag", "mass", "inertia",
 )  # fmt: skip
 STEP, SEGMENT = 0.05, 10.0  # s
 
