@@ -7,7 +7,6 @@ the checks do not refuse is identified; its verdict is shown, and the largest er
 
 from collections.abc import Callable
 
-import jax.numpy as jnp
 import numpy as np
 
 import undertow as ut
@@ -19,10 +18,8 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.report.answers.identification_answer import answer_of_identification
-from undertow.studies.identification.identified_vehicle import prior_vehicle
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.simulated_dive import telegraph_dive
 
-AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 TRUTH = {"quadratic_damping.surge": 110.0, "quadratic_damping.sway": 170.0, "quadratic_damping.heave": 240.0}
 HEAVIER = TRUTH | {"added_mass.surge": 150.0, "added_mass.sway": 170.0, "added_mass.heave": 250.0}
 SCENARIO = {
@@ -37,14 +34,7 @@ DURATION = 60.0  # s
 def dive(truth: dict[str, float]) -> Log:
     """The log of a dive in which the thrusters jump at random."""
     with in_precision("float64"):
-        plant = hybrid_vehicle(bluerov2_heavy(), t200())
-        generator = np.random.default_rng(0)
-        thrust = (
-            telegraph_wrenches(generator, DURATION, AMPLITUDES) @ np.linalg.pinv(np.asarray(plant.thruster_matrix)).T
-        )
-        volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-        vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
-        return simulated_log(vehicle, volts, generator)
+        return telegraph_dive(hybrid_vehicle(bluerov2_heavy(), t200()), truth, 0, DURATION)
 
 
 def values(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Log], Log]:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.core.runtime import in_precision
@@ -20,10 +19,9 @@ from undertow.studies.identification.estimates import Estimates
 from undertow.studies.identification.free_parameters import chosen, parameters_of, resolved_by
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import NUISANCES, model_of
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.simulated_dive import telegraph_dive
 from undertow.studies.identification.weak_form import first_estimate
 
-AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m
 FREE = (
     "added_mass", "linear_damping", "quadratic_damping", "net_buoyancy", "r_b",
     "reverse_gain", "lag", "mass", "inertia",
@@ -44,13 +42,10 @@ def run(duration: float) -> None:
     plant = hybrid_vehicle(bluerov2_heavy(), t200())
     gains = tuple(f"thruster_gain.T{j + 1}" for j in range(plant.inputs()))
     parameters = resolved_by(STEP, plant, chosen(parameters_of(plant), (*FREE, *gains)))
-    generator = np.random.default_rng(0)
     model = model_of(prior_vehicle(plant), parameters)
-    truth = 0.3 * generator.standard_normal(len(parameters))
-    vehicle = model.candidate(jnp.asarray(np.concatenate([truth, np.zeros(len(NUISANCES))]))).vehicle
-    thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ np.linalg.pinv(np.asarray(plant.thruster_matrix)).T
-    volts = np.clip(2.3 * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-    log = simulated_log(vehicle, volts, generator)
+    away = 0.3 * np.random.default_rng(1).standard_normal(len(parameters))
+    truth = {parameter.name: float(parameter.value(z)) for parameter, z in zip(parameters, away, strict=True)}
+    log = telegraph_dive(plant, truth, 0, duration)
     dive = dive_of(log, log["input"], STEP)
     unit = _import_time()
     print(f"{duration:g} s, {len(parameters)} parameters and {len(NUISANCES)} nuisances; import jax {unit:.2f} s")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from telegraph_dive import telegraph_dive
 
 from undertow.core.runtime import in_precision
 from undertow.logs import frames
@@ -12,6 +11,7 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.studies.identification.log_check import check_dive
+from undertow.studies.identification.simulated_dive import telegraph_dive
 
 DURATION = 40.0  # s
 NOISE = {"position": 0.01, "attitude": 0.005, "body_velocity": 0.01, "angular_velocity": 0.005}

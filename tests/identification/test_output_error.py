@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
-from telegraph_dive import AMPLITUDES, telegraph_dive
 
 import undertow as ut
 from undertow.cli import identify as command
@@ -30,7 +29,7 @@ from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.segments import segments_of
-from undertow.studies.identification.simulated_dive import simulated_log, telegraph_wrenches
+from undertow.studies.identification.simulated_dive import AMPLITUDES, simulated_log, telegraph_dive, telegraph_wrenches
 from undertow.studies.identification.validation import whiteness
 
 pytestmark = pytest.mark.full

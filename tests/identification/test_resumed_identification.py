@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from telegraph_dive import telegraph_dive
 
 import undertow as ut
 from undertow.core.runtime import in_precision
@@ -16,6 +15,7 @@ from undertow.scenario.reading import from_data
 from undertow.simulation.checkpoint import Checkpoint
 from undertow.studies.identification.identify import identify
 from undertow.studies.identification.result_data import as_data
+from undertow.studies.identification.simulated_dive import telegraph_dive
 
 pytestmark = pytest.mark.full
 

@@ -3,7 +3,6 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from telegraph_dive import telegraph_dive
 
 from undertow.core.runtime import in_precision
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
@@ -14,7 +13,7 @@ from undertow.studies.identification.free_parameters import axis_parameters, cho
 from undertow.studies.identification.gap_filling import filled
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.input_signs import input_gains
-from undertow.studies.identification.simulated_dive import simulated_log
+from undertow.studies.identification.simulated_dive import simulated_log, telegraph_dive
 from undertow.studies.identification.weak_form import first_estimate
 from undertow.studies.identification.weak_problem import weak_problem
 

@@ -4,7 +4,6 @@ Only what holds whatever the controller does is said: speeds are compared with o
 current with the one that the thrusters can balance.
 """
 
-import jax.numpy as jnp
 import numpy as np
 
 from undertow.analysis.thrust_reserve import reference_reserve
@@ -167,7 +166,7 @@ def _late_position(loop: ClosedLoop, desired: ReferenceSamples):
     """A delay after which the vehicle is elsewhere: it is ahead of its measured position by speed times delay."""
     if not isinstance(loop.navigation, Degraded):
         return
-    delay = float(jnp.max(loop.navigation.position.delay))
+    delay = float(np.max(np.asarray(loop.navigation.position.delay)))
     speed = _largest_speed(desired)
     if speed * delay > _LATE:
         message = (

@@ -56,9 +56,13 @@ def spectral_radius(loop: LinearLoop) -> float:
     return float(np.abs(multipliers(loop, _REACHED_BY, _SHOWN_BY)).max(initial=0.0))
 
 
-def fastest_growing_error(loop: LinearLoop) -> tuple[int, complex]:
-    """The output whose error has most of the mode that grows fastest or decays slowest, and the pole of that, 1/s."""
-    radius = spectral_radius(loop)
+def fastest_growing_error(loop: LinearLoop, radius: float) -> tuple[int, complex]:
+    """The output whose error has most of the mode that grows fastest or decays slowest, and the pole of that, 1/s.
+
+    Args:
+        loop: see there.
+        radius: its spectral radius.
+    """
     values, modes = np.linalg.eig(loop.matrix)
     mode = int(np.argmin(np.abs(np.abs(values) - radius)))
     errors = np.abs(loop.signals["error"] @ modes[:, mode])

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import typer
 
 from undertow.cli.options.command import Command
-from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Priors, results
+from undertow.cli.options.shared import AllowCode, Details, Overwrite, Pdf, Priors, Resume, results
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,10 +83,7 @@ class IdentifyCommand(Command):
     ] = 10.0
     out: Annotated[Path | None, results("runs/NAME-identified")] = None
     overwrite: Overwrite = False
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Continue an identification that was interrupted; finished estimates are kept."),
-    ] = False
+    resume: Resume = False
     allow_code: AllowCode = False
     pdf: Pdf = None
     details: Details = False

@@ -74,7 +74,7 @@ class Estimates:
 
         def compute() -> dict[str, Any]:
             new.append(fit(self._model, segments, step, z, least, watch, noise))
-            return _packed(new[0].solution)
+            return _packed(new[0])
 
         answer = compute() if self._checkpoint is None else self._checkpoint.ask("estimate", z, compute)
         self._done += 1
@@ -97,8 +97,8 @@ class Estimates:
         return unknowns, least
 
 
-def _packed(solution: Solution) -> dict[str, Any]:
-    """A solution as JSON can hold it: of the shares those that are not 1."""
+def _packed(solution: Fit) -> dict[str, Any]:
+    """The solution of an estimate as JSON can hold it: of the shares those that are not 1."""
     outliers = np.flatnonzero(solution.shares != 1.0)
     return {
         "z": solution.z.tolist(),

@@ -60,11 +60,10 @@ class Solution(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """An estimate.
+    """An estimate: a solution, and what follows from it.
 
     Attributes:
-        solution: see there.
-        z, starts, noise, iterations, converged: those of the solution.
+        z, starts, noise, shares, iterations, converged: of the solution.
         weights: of the residuals, (S, length, 13).
         information: second derivative of half the sum of squares by the unknowns, the begins eliminated, prior
             included, (P, P).
@@ -73,37 +72,17 @@ class Fit(NamedTuple):
         cost: half the sum of squares, priors included.
     """
 
-    solution: Solution
+    z: np.ndarray
+    starts: np.ndarray
+    noise: np.ndarray
+    shares: np.ndarray
+    iterations: int
+    converged: bool
     weights: np.ndarray
     information: np.ndarray
     reduction: np.ndarray
     residuals: np.ndarray
     cost: float
-
-    @property
-    def z(self) -> np.ndarray:
-        """Unknowns."""
-        return self.solution.z
-
-    @property
-    def starts(self) -> np.ndarray:
-        """Of the segments."""
-        return self.solution.starts
-
-    @property
-    def noise(self) -> np.ndarray:
-        """Standard deviation of each kind of residual."""
-        return self.solution.noise
-
-    @property
-    def iterations(self) -> int:
-        """Of the solver."""
-        return self.solution.iterations
-
-    @property
-    def converged(self) -> bool:
-        """Whether the solver came to rest."""
-        return self.solution.converged
 
 
 def fit(
@@ -167,7 +146,7 @@ def completed(model: IdentificationModel, segments: Segments, step: float, solut
     weights = solution.shares * segments.counts[:, :, SENSOR_OF_RESIDUAL] / solution.noise**2
     residuals = _residuals(model, segments, step, z, starts)
     information, _, reduction = _reduced(_evaluated(model, segments, weights, step, z, starts), z, starts, 0.0)
-    return Fit(solution, weights, information, reduction, residuals, _cost(residuals, weights, z, starts))
+    return Fit(*solution, weights, information, reduction, residuals, _cost(residuals, weights, z, starts))
 
 
 def first_errors(model: IdentificationModel, segments: Segments, step: float, z: np.ndarray) -> float:

@@ -1,7 +1,7 @@
 """Logs of simulated dives, of a vehicle whose numbers are known: what an identification is tested with."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,10 +11,12 @@ import numpy as np
 from undertow.core.numerics.rotations import euler_from_rotation, rotation_from_quaternion
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
-from undertow.studies.identification.identified_vehicle import IdentifiedVehicle
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.studies.identification.identified_vehicle import IdentifiedVehicle, prior_vehicle
 from undertow.studies.identification.prediction import Sensing, early_curve, late_curve, motion, on_cubic
 from undertow.studies.identification.segments import Segments
 
+_VOLTS = 2.3  # of a T200 at 1 N, about; thrust grows with the square
 _FINE = 0.01  # s, of the integration
 _BEFORE = 200  # steps of run-in
 _JITTER = 0.2  # of the interval between two samples, at most
@@ -40,6 +42,29 @@ _COLUMNS = {
     "body_velocity": (("surge", "sway", "heave"), "m/s"),
     "angular_velocity": (("p", "q", "r"), "rad/s"),
 }
+
+
+AMPLITUDES = np.array([25.0, 25.0, 25.0, 3.0, 3.0, 5.0])  # N, N m, of a BlueROV2 Heavy that moves lively
+
+
+def telegraph_dive(
+    plant: HybridVehicle, truth: Mapping[str, float], seed: int, duration: float = 60.0, **options: Any
+) -> Log:
+    """The log of a dive whose T200 thrusters jump at random.
+
+    Args:
+        plant: vehicle as its file has it.
+        truth: parameters that differ from those of the plant, by name.
+        seed: of everything random.
+        duration: s.
+        options: see `simulated_log`.
+    """
+    generator = np.random.default_rng(seed)
+    inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
+    thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
+    volts = np.clip(_VOLTS * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
+    vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
+    return simulated_log(vehicle, volts, generator, **options)
 
 
 def telegraph_wrenches(

@@ -50,14 +50,15 @@ def _point(op_point: OperatingPoint, acting: OperatingConditions) -> LinearizedP
     low, high = input_limits(op_point.built, at)
     used = np.abs(at.at["u"]) / np.where(at.at["u"] < 0, -low, high)
     speed = None if acting.flow is None else float(np.linalg.norm(acting.flow))
-    output, pole = margins.fastest_growing_error(linear)
+    radius = margins.spectral_radius(linear)
+    output, pole = margins.fastest_growing_error(linear, radius)
     return LinearizedPoint(
         where=acting.where,
         flow=speed,
         at=at,
         used=float(used.max()),
         poles=margins.poles(linear),
-        radius=margins.spectral_radius(linear),
+        radius=radius,
         growing=loop.plant.outputs[output],
         pole=pole,
     )

@@ -65,7 +65,7 @@ def instability(op_point: OperatingPoint) -> str:
     """A sentence where small errors grow about the equilibrium under the mean load; otherwise empty."""
     if not op_point.mean.found or op_point.radius < 1:
         return ""
-    output, pole = margins.fastest_growing_error(op_point.linear)
+    output, pole = margins.fastest_growing_error(op_point.linear, op_point.radius)
     name = op_point.built.closed_loop.plant.outputs[output]
     return f"the loop is unstable: a small error in {name} grows by {max(pole.real, 0.0):.2g} 1/s"
 
