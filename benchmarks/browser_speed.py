@@ -57,7 +57,8 @@ def main() -> None:
     settings = parser.parse_args()
     ut.prepare()
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        export_page(build(read(settings.scenario))).write(Path(folder), option="--wasm")
+        built_by_law = {"controller of the scenario": build(read(settings.scenario))}
+        export_page(built_by_law).write(Path(folder), option="--wasm")
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=OPTIONS)
         for width, height in SIZES:
             page = browser.new_page(viewport={"width": width, "height": height})

@@ -29,6 +29,7 @@ extensions = [
     "layers",
     "reference",
     "api",
+    "live_page",
 ]
 # The gallery also writes its examples as notebooks to download; its pages are the .rst files.
 exclude_patterns = ["_build", ".jupyter_cache", "gallery/GALLERY_HEADER.rst", "gallery/*.ipynb"]

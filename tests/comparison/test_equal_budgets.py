@@ -13,7 +13,7 @@ from undertow.scenario.reading import from_data, read
 from undertow.studies.campaign.campaign_schema import Campaign
 from undertow.studies.campaign.trials import trials
 from undertow.studies.comparison import equal_budgets as budgets
-from undertow.studies.comparison.candidates import controllers
+from undertow.studies.comparison.candidates import controllers, scenario_with
 from undertow.studies.comparison.equal_budgets import EqualBudgets, Runs, TunedLaw, check_budget, equal_budgets
 from undertow.studies.comparison.held_out import SET, held_out
 from undertow.studies.tuning.evaluator import Evaluation
@@ -136,7 +136,7 @@ def test_parameters_hold_for_the_scenarios_own_controller(scenario, capsys):
     own = {"controller": {"kind": "mine.py:law", "frequency": 2.0}, "tune": {"parameters": {"frequency": [0.5, 8.0]}}}
     path = Path(scenario(**own))
     found = controllers(["scenario", "pid"], read(path), path)
-    asked = [budgets._scenario_with(one, read(path)).data["tune"] for one in found]
+    asked = [scenario_with(one, read(path)).data["tune"] for one in found]
     assert asked == [{"parameters": {"frequency": [0.5, 8.0]}}, {}]
     Path("mine.py").write_text("from undertow.control.controllers import pid\n\n" + OPTIONAL.format("float(frequency)"))
     assert run(["compare", str(path), "--controllers", "scenario,pid", "--tune", "20", "--out", "out"]) == 2

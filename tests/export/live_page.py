@@ -17,7 +17,7 @@ from undertow.scenario.build import build
 _RUNS = """
 const fs = require("fs");
 const [, , dataFile, runsFile, answersFile] = process.argv;
-const data = JSON.parse(fs.readFileSync(dataFile)), runs = JSON.parse(fs.readFileSync(runsFile));
+const data = JSON.parse(fs.readFileSync(dataFile)).laws[0], runs = JSON.parse(fs.readFileSync(runsFile));
 startEngine(data).then((engine) => {
   const answers = runs.map(({ steps, changes }) => {
     for (const { member } of data.loop.switches) engine.putTime(member, data.loop.never);
@@ -46,7 +46,7 @@ startEngine(data).then((engine) => {
 @functools.cache
 def page():
     """Text of the page of `NAVIGATED`."""
-    return export_page(build(NAVIGATED)).files["index.html"]
+    return export_page({"robust": build(NAVIGATED)}).files["index.html"]
 
 
 @functools.cache

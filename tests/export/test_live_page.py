@@ -21,7 +21,7 @@ COMPARED = ("position", "reference", "error", "acting_input", "uncertainty", "es
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """As it is; with a thruster that is killed; in lower waves from the start; with a payload that is picked up."""
-    wave = next(slider for slider in page_data()["loop"]["sliders"] if slider["label"] == "wave height")
+    wave = next(slider for slider in page_data()["laws"][0]["loop"]["sliders"] if slider["label"] == "wave height")
     changes = [
         [],
         [{"at": KILLED, "label": "thruster 3", "time": 0.01 * KILLED}],
@@ -63,10 +63,10 @@ def test_nothing_is_loaded():
     text = page().split("</style>")[1]
     outside = text.split("<script>")[0] + text.rpartition("<script>")[2]
     assert "http" not in outside and "src=" not in outside and "import(" not in outside
-    assert len(page_data()["loop"]["switches"]) == 9
+    assert len(page_data()["laws"][0]["loop"]["switches"]) == 9
 
 
 def test_without_the_compiler_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr(wasm.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ut.BadInput, match=r"ziglang is not installed.*\n?.*\[wasm\]"):
-        export_page(build(NAVIGATED))
+        export_page({"robust": build(NAVIGATED)})

@@ -7,8 +7,8 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from undertow.outside.browser.browser_page import export_page
-from undertow.scenario.build import build
 from undertow.scenario.reading import read
+from undertow.studies.comparison.candidates import built_with_each
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +19,8 @@ PATIENCE = 300_000  # ms, on a machine that does other things
 @pytest.fixture(scope="module")
 def address(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    export_page(build(read(request.config.rootpath / "examples" / "browser.yaml"))).write(folder, option="--wasm")
+    scenario = read(request.config.rootpath / "examples" / "browser.yaml")
+    export_page(built_with_each(["robust", "pid"], scenario, None)).write(folder, option="--wasm")
     return (folder / "index.html").as_uri()
 
 
@@ -70,3 +71,29 @@ def test_a_killed_thruster_is_found_and_the_vehicle_held(address, browser, width
     assert "Everything works" in happening.inner_text()
     page.close()
     assert complaints == []
+
+
+def test_another_controller_begins_again_in_the_same_sea(address, browser):
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    complaints = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.goto(address)
+    until(page, "time > 0")
+    waves = page.get_by_label("wave height")
+    waves.fill("0")
+    page.select_option("select[aria-label=speed]", "most")
+    until(page, "time > 20")
+    assert page.get_by_label("bandwidth of the controller").is_visible()
+    page.select_option("select[aria-label=speed]", "1")
+    page.select_option("select[aria-label=controller]", "1")
+    until(page, "time < 15")
+    assert waves.input_value() == "0"
+    assert "The controller is pid" in page.locator(".happening").inner_text()
+    assert page.get_by_label("frequency of the controller").is_visible()
+    page.select_option("select[aria-label=speed]", "most")
+    _, calm = until(page, "time > 30")
+    waves.fill("8")
+    until(page, "time > 45")
+    page.close()
+    assert complaints == []
+    assert calm < 0.05

@@ -14,7 +14,7 @@ from undertow.core import runtime
 from undertow.core.contracts import AbstractController
 from undertow.physics.vehicles import bluerov2_heavy
 from undertow.scenario.build import build
-from undertow.scenario.checks.flow_stability import flow_advice, given_gains_advice, munk_rate
+from undertow.scenario.checks.flow_stability import checked_flow_advice, flow_advice, munk_rate
 from undertow.scenario.reading import from_data
 from undertow.scenario.results.run_scenario import run_scenario
 
@@ -89,11 +89,11 @@ def test_gains_that_turn_the_vehicle_are_named():
     """A PID of 1 rad/s turns the vehicle in 0.28 m/s, within a minute by tens of degrees; one of 2 rad/s holds it."""
     task = {"plant": "vonbenzon2022", "model": "vonbenzon2022", "rate": 50, "current": (0.28, 0, 0)}
     turns = build(from_data(scenario(**task) | {"controller": {"kind": "pid", "frequency": 1}}))
-    (advised,) = given_gains_advice(turns)
+    (advised,) = checked_flow_advice(turns)
     assert "with these gains the loop is unstable while the water passes the vehicle at 0.28 m/s" in advised.says
     holds = build(from_data(scenario(**task) | {"controller": {"kind": "pid", "frequency": 2}}))
-    assert given_gains_advice(holds) == ()
-    assert given_gains_advice(build(from_data(scenario(**task)))) == (), "of the rule's gains nothing is said"
+    assert checked_flow_advice(holds) == ()
+    assert checked_flow_advice(build(from_data(scenario(**task)))) == (), "of the rule's gains nothing is said"
     lost, held = (run_scenario(built).steady["attitude_rms"] for built in (turns, holds))
     assert lost > 0.2 > 0.01 > held
 

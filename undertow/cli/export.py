@@ -17,6 +17,7 @@ from undertow.outside.export.navigation import export_navigation
 from undertow.outside.export.vehicle import export_vehicle
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import read
+from undertow.studies.comparison.candidates import built_with_each, label
 
 _PARTS = ("controller", "navigation", "vehicle")
 
@@ -33,6 +34,8 @@ def export(command: ExportCommand) -> int:
         hint = "Or --fmu for units of co-simulation, or --wasm for a page"
         raise BadInput("--c99", "be given: the folder for the files", hint=hint)
     checks.choice("--part", part, _PARTS)
+    if command.wasm is None and command.controllers is not None:
+        raise BadInput("--controllers", "stand beside --wasm", "without it")
     if c99 is None and (part != "controller" or name):
         raise BadInput("--name" if name else "--part", "stand beside --c99", "without it")
     if part != "controller" and output != "input":
@@ -59,10 +62,18 @@ def export(command: ExportCommand) -> int:
             say(f"They hold their sources only, because {units.without_library}. Compile these where they are used.")
     if command.wasm is not None:
         with stage(console, "C99 and WebAssembly"):
-            page = export_page(built)
+            page = export_page(_built_by_law(built, command))
         page.write(command.wasm, command.overwrite, "--wasm")
         say(f"{_kilobytes(page)}: {command.wasm / 'index.html'}")
     return DONE
+
+
+def _built_by_law(built: Built, command: ExportCommand) -> dict[str, Built]:
+    """Name -> the scenario with it, for each controller of the page."""
+    if command.controllers is None:
+        return {label(built.resolved["controller"]): built}
+    entries = [word for word in map(str.strip, command.controllers.split(",")) if word]
+    return built_with_each(entries, built.text, command.scenario)
 
 
 def _in_c(built: Built, part: str, name: str, output: str, formats: dict[str, Any]) -> Exported:

@@ -238,6 +238,11 @@ def _entry_points(group: str) -> tuple[importlib.metadata.EntryPoint, ...]:
     return tuple(_all_entry_points().select(group=group))
 
 
+def is_user_code(name: str) -> bool:
+    """Whether a part is named as a function in a file of the user's, `./file.py:function`."""
+    return ".py:" in name
+
+
 def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -> Part:
     """Part called `name`, or the callable named by `path.py:callable` (relative to `folder`).
 
@@ -250,7 +255,7 @@ def find(kind: str, name: str, folder: Path | None = None, what: str = "name") -
     Raises:
         BadInput: no such part, file or callable.
     """
-    if ".py:" in name:
+    if is_user_code(name):
         return _from_file(name, folder or Path(), what)
     if name.endswith(".py"):
         hint = maker_in((folder or Path()) / name, name)

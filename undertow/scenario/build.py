@@ -19,7 +19,7 @@ from undertow.control.supervision.supervised_controller import unsupervised
 from undertow.core import checks, runtime
 from undertow.core.arrays import as_array, in_present_precision
 from undertow.core.authority import authority_of
-from undertow.core.catalogue import KIND_OF
+from undertow.core.catalogue import KIND_OF, is_user_code
 from undertow.core.contracts import (
     AbstractController,
     AbstractDisturbance,
@@ -180,7 +180,7 @@ def build_scenario(scenario: Scenario, text: Text, part_cache: PartCache | None 
 def own_parts(scenario: Scenario, folder: Path) -> dict[str, str]:
     """Parts that the user wrote: key -> ./file.py:function as `undertow check` takes it in the current folder."""
     parts = {key: getattr(scenario, key) for key in KIND_OF}
-    kinds = {key: part.kind for key, part in parts.items() if isinstance(part, Part) and ".py:" in part.kind}
+    kinds = {key: part.kind for key, part in parts.items() if isinstance(part, Part) and is_user_code(part.kind)}
     return {key: os.path.relpath(folder / kind) for key, kind in kinds.items()}
 
 

@@ -61,7 +61,7 @@ def describe(name: str) -> tuple[Description, ...]:
         vehicle_file = read_vehicle(Path(name), what="")
         described = tuple(parameters(vehicle_file.vehicle()))
         return (Description("vehicle file", name, vehicle_file.data.name, (), described, (), {}),)
-    if ".py:" in name:
+    if catalogue.is_user_code(name):
         part = catalogue.find("", name, what="NAME")
         return (_describe("controllers" if factory.takes_model(part) else "", name, part),)
     prefix, _, short = name.rpartition("/")

@@ -402,12 +402,12 @@ def listed(value: Any) -> Any:
 
 def portable_name(name: str, folder: Path) -> str:
     """A part by a name that is the same in every folder: one of a file gets its whole path."""
-    if ".py:" not in name:
+    if not catalogue.is_user_code(name):
         return name
     return whole_name(name, folder)
 
 
 def whole_name(name: str, folder: Path) -> str:
     """The name of a file, or of a function in one, with its whole path."""
-    path, mark, attribute = name.rpartition(":") if ".py:" in name else (name, "", "")
+    path, mark, attribute = name.rpartition(":") if catalogue.is_user_code(name) else (name, "", "")
     return f"{(folder / path).resolve()}{mark}{attribute}"

@@ -46,6 +46,14 @@ class ExportCommand(Command):
             help="Write index.html into this folder: a page in which a visitor drives the vehicle, by WebAssembly.",
         ),
     ] = None
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Controllers among which the page of --wasm lets a visitor choose, separated by commas, as of "
+            "`undertow compare`. Default: that of the scenario.",
+        ),
+    ] = None
     name: Annotated[
         str | None,
         typer.Option(

@@ -106,7 +106,7 @@ def policy(model: Model, function: Annotated[str, catalogue.FILE], action: str =
 def _found(name: str) -> Network | Function:
     if Path(name).suffix == ".npz":
         return _network(Path(name))
-    if ".py:" not in name:
+    if not catalogue.is_user_code(name):
         raise BadInput("function", "be ./file.py:function, or an .npz file of a network", name)
     return Function(catalogue.find("controllers", name, what="function"))
 

@@ -1,6 +1,7 @@
-"""The page of a scenario that a visitor drives: module, numbers and scripts in one file, nothing is loaded."""
+"""The page of a scenario that a visitor drives: modules, numbers and scripts in one file, nothing is loaded."""
 
 import base64
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -31,9 +32,12 @@ _KEYS = (
 )
 
 
-@in_its_precision
-def export_page(built: Built) -> Exported:
-    """`index.html`, in which a visitor drives the vehicle of a scenario.
+def export_page(built_by_law: Mapping[str, Built]) -> Exported:
+    """`index.html`, in which a visitor drives the vehicle of a scenario by one or several controllers.
+
+    Args:
+        built_by_law: name of the controller -> the scenario with it; they differ in their controllers only. The page
+            begins with the first.
 
     Raises:
         BadInput: there is no compiler, three.js is missing, or the scenario has no page, see `live_loop`.
@@ -44,9 +48,9 @@ def export_page(built: Built) -> Exported:
     if three is None:
         raise BadInput("--wasm", "have three.js", "without it", hint=MISSING_THREE_JS)
     with runtime.on_processor():
-        live = live_loop(built)
-        program = CProgram(live.system)
-    data = _page_data(live, program, compiled_to_wasm(program))
+        laws = [_law_data(built, name) for name, built in built_by_law.items()]
+    built = next(iter(built_by_law.values()))
+    data = _scene_data(built) | {"laws": laws}
     title = built.scenario.description or "A vehicle in current and waves"
     page = document(
         title,
@@ -61,9 +65,11 @@ def export_page(built: Built) -> Exported:
     return Exported({"index.html": page})
 
 
-def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, Any]:
-    """All that the script needs, as plain data; see `engine.js` and `live.js`."""
-    built = live.numbers.built
+@in_its_precision
+def _law_data(built: Built, name: str) -> dict[str, Any]:
+    """The closed loop with one controller for `engine.js`: module, layouts of its memory, sliders and switches."""
+    live = live_loop(built)
+    program = CProgram(live.system)
     layouts = {struct: layout_of(program.fields[struct]) for struct in ("state", "input", "output")}
     leaves = live.numbers.leaves()
     member = lambda leaf: f"numbers_{leaves.index(leaf)}"
@@ -76,7 +82,7 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
         {"label": switch.label, "member": member(switch.leaf), "thruster": switch.thruster}
         for switch in live.numbers.switches
     ]
-    loop = {
+    loop_data = {
         "period": live.system.period,
         "never": NEVER,
         "layouts": {struct: layout._asdict() for struct, layout in layouts.items()},
@@ -84,6 +90,13 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
         "sliders": sliders,
         "switches": switches,
     }
+    module = base64.b64encode(compiled_to_wasm(program)).decode()
+    return {"name": name, "loop": loop_data, "module": module}
+
+
+@in_its_precision
+def _scene_data(built: Built) -> dict[str, Any]:
+    """Vehicle, start and words for `live.js`."""
     plant = built.closed_loop.plant
     initial = built.scenario.initial
     position, _ = built.closed_loop.outputs_at_start(initial.position, initial.velocity)
@@ -95,8 +108,6 @@ def _page_data(live: LiveLoop, program: CProgram, module: bytes) -> dict[str, An
         "bound": success.get("position_rms", _BOUND) if isinstance(success, dict) else _BOUND,
         "states": [{"name": state.name, "meaning": state.meaning} for state in State],
         "statuses": [status.sentence for status in Status],
-        "loop": loop,
-        "module": base64.b64encode(module).decode(),
     }
 
 

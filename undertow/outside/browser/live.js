@@ -3,7 +3,7 @@
 const RATES = [1, 2, 5, 10, 20];
 const CAPACITY = 3000; // points of the path
 
-function buildLivePage(box, data, run, steering) {
+function buildLivePage(box, laws, steering) {
   const canvas = element("canvas", { class: "scene", "aria-label": "three-dimensional view of the vehicle" });
   const overlay = element("canvas", { class: "overlay" });
   const happening = element("ol", { class: "happening", "aria-live": "polite" });
@@ -12,12 +12,14 @@ function buildLivePage(box, data, run, steering) {
   const reset = element("button", { type: "button" }, "Reset");
   const time = element("output", { class: "time" });
   const speed = choice("speed", [...RATES.map((one) => [one, `${one} times real time`]), ["most", "as fast as it goes"]], 1);
+  const law = choice("controller", laws.map(({ name }, i) => [i, name]), 0);
   const camera = choice("camera", [["follow", "follow"], ["whole", "wide"], ["top", "from above"]], "follow");
   const labels = switchOf("names"), forces = switchOf("disturbance");
   const options = element(
     "div", { class: "options" }, element("label", {}, "speed ", speed), element("label", {}, "camera ", camera),
     labels.label, forces.label,
   );
+  if (laws.length > 1) options.prepend(element("label", {}, "controller ", law));
   const controls = element("div", { class: "controls" }, play, reset, time);
   const faults = element("div", { class: "faults", role: "group", "aria-label": "faults" });
   const sliders = element("div", { class: "sliders" });
@@ -26,16 +28,15 @@ function buildLivePage(box, data, run, steering) {
   const left = [view, happening, drive, faults, sliders];
   box.replaceChildren(element("div", { class: "left" }, ...left), panels);
   return {
-    box, view, canvas, overlay, happening, play, reset, time, speed, camera, faults, sliders, panels,
+    box, view, canvas, overlay, happening, play, reset, time, law, speed, camera, faults, sliders, panels,
     labels: labels.input, forces: forces.input, which: { value: 0 }, places: new Map(),
   };
 }
 
 // The vehicle as a run of one instant, for the scene and the panels; the largest loads so far set its scales.
-function liveRun(vehicle, output, start) {
+function liveRun(vehicle, start) {
   const frames = { width: 3, values: Array.from({ length: 3 * CAPACITY }, (_, i) => start[i % 3]), frames: CAPACITY };
   const series = { position: frames, desired_position: frames, uncertainty: true, water: true };
-  if (output.estimate) series.estimate = true;
   const names = vehicle.thrusters.map((thruster) => thruster.name);
   return {
     ...vehicle, names, series, longest: Math.max(...vehicle.size), rules: 0,
@@ -87,9 +88,9 @@ function makeTrail({ path, reference }) {
 }
 
 // Buttons that kill thrusters, and one that picks a payload up and puts it down.
-function buildFaults(page, data, act) {
-  page.faults.append(element("span", {}, "Kill a thruster:"));
-  const buttons = data.loop.switches.map(({ label, member, thruster }) => {
+function buildFaults(page, data, switches, act) {
+  page.faults.replaceChildren(element("span", {}, "Kill a thruster:"));
+  const buttons = switches.map(({ label, member, thruster }) => {
     const isPayload = thruster === null;
     const button = element("button", { type: "button", "data-fault": label }, isPayload ? "Pick up the payload" : `${thruster + 1}`);
     if (!isPayload) button.title = data.vehicle.thrusters[thruster].name;
@@ -103,9 +104,10 @@ function buildFaults(page, data, act) {
   });
 }
 
-function buildSliders(page, data, turn) {
-  for (const slider of data.loop.sliders) {
-    const handle = element("input", { type: "range", min: 0, max: slider.shown.length - 1, step: 1, value: slider.base, "aria-label": slider.label });
+function buildSliders(page, sliders, positionOf, turn) {
+  page.sliders.replaceChildren();
+  for (const slider of sliders) {
+    const handle = element("input", { type: "range", min: 0, max: slider.shown.length - 1, step: 1, value: positionOf(slider), "aria-label": slider.label });
     const shown = element("output");
     const say = () => { shown.textContent = `${Number(slider.shown[handle.value].toPrecision(2))} ${slider.unit}`; };
     handle.addEventListener("input", () => { say(); turn(slider, Number(handle.value)); });
@@ -114,29 +116,35 @@ function buildSliders(page, data, turn) {
   }
 }
 
-async function startLive(box) {
-  const data = JSON.parse(document.getElementById(box.dataset.source).textContent);
-  const engine = await startEngine(data), { output } = engine, { loop } = data;
-  const steering = makeSteering();
-  const run = liveRun(data.vehicle, output, data.start);
-  const page = buildLivePage(box, data, run, steering);
-  const reach = 10 * run.longest, corner = screenPoint(data.start);
-  const extent = { box: new THREE.Box3(corner.clone(), corner.clone()).expandByScalar(reach), longest: run.longest };
-  extent.box.min.y = corner.y - 4 * run.longest;
-  extent.box.max.y = corner.y + 4 * run.longest;
-  const scene = buildScene(page, [run], extent), [vehicle] = scene.vehicles, trail = makeTrail(vehicle);
+// What the panels plot of a law: those without an estimate have no bars of it.
+function buildPanels(page, data, run) {
+  page.panels.replaceChildren();
   const strips = {
     error: makeStrip(page.panels, "Position error, cm", ["position"], false),
     attitude: makeStrip(page.panels, "Attitude error, degrees", ["roll", "pitch", "yaw"], true),
     input: makeStrip(page.panels, `Thruster inputs, ${data.input_unit}`, run.names.map((_, i) => `${i + 1}`), true),
   };
+  const estimate = run.series.estimate ? " and estimate (red)" : "";
   const bars = [
     makePanel(page, "Thrust", () => run.thrusters.length, 18, paintThrust),
-    makePanel(page, `Uncertainty (black)${output.estimate ? " and estimate (red)" : ""}, m/s\u00b2, rad/s\u00b2`, () => run.axes.length, 20, paintUncertainty),
+    makePanel(page, `Uncertainty (black)${estimate}, m/s\u00b2, rad/s\u00b2`, () => run.axes.length, 20, paintUncertainty),
   ];
   page.panels.append(legend([run], "set-point: transparent hull"));
+  return { strips, bars };
+}
+
+async function startLive(box) {
+  const data = JSON.parse(document.getElementById(box.dataset.source).textContent);
+  const steering = makeSteering();
+  const run = liveRun(data.vehicle, data.start);
+  const page = buildLivePage(box, data.laws, steering);
+  const reach = 10 * run.longest, corner = screenPoint(data.start);
+  const extent = { box: new THREE.Box3(corner.clone(), corner.clone()).expandByScalar(reach), longest: run.longest };
+  extent.box.min.y = corner.y - 4 * run.longest;
+  extent.box.max.y = corner.y + 4 * run.longest;
+  const scene = buildScene(page, [run], extent), [vehicle] = scene.vehicles, trail = makeTrail(vehicle);
   const story = makeStory(page.happening, { ...data, thrusters: run.thrusters.length });
-  const every = Math.max(1, Math.round(EVERY / loop.period));
+  let engine, loop, output, restore, panels; // of the controller
   let marks = [], steps = 0, playing = true, ended = false, last = performance.now(), owed = 0;
   const spent = { wall: 0, steps: 0 }, shown = { since: last, steps: 0, frames: 0 };
 
@@ -152,8 +160,8 @@ async function startLive(box) {
     steering.advance(engine.steered, output.reference[5], loop.period);
     engine.advance();
     steps += 1;
-    if ((steps - 1) % every) return;
-    const time = now() - loop.period, { error } = output, degrees = (angle) => (angle * 180) / Math.PI;
+    if ((steps - 1) % Math.max(1, Math.round(EVERY / loop.period))) return;
+    const time = now() - loop.period, { error } = output, { strips } = panels, degrees = (angle) => (angle * 180) / Math.PI;
     const metres = Math.hypot(error[0], error[1], error[2]);
     strips.error.push(time, [100 * metres]);
     strips.attitude.push(time, Array.from(error.slice(3), degrees));
@@ -185,8 +193,8 @@ async function startLive(box) {
     moveVehicle(vehicle, at, page.forces.checked);
     scene.renderer.render(scene.scene, scene.camera);
     paintNames(page, scene, [run], at);
-    Object.values(strips).forEach((strip) => strip.paint(marks));
-    bars.forEach((panel) => panel(run, at));
+    Object.values(panels.strips).forEach((strip) => strip.paint(marks));
+    panels.bars.forEach((panel) => panel(run, at));
   }
 
   function followVehicleOrStay() {
@@ -228,7 +236,7 @@ async function startLive(box) {
     for (const line of [vehicle.path, vehicle.reference]) line.material.resolution.set(width, height);
   }
 
-  const restore = buildFaults(page, data, {
+  const faults = {
     kill(member, thruster, button) {
       engine.putTime(member, now());
       engine.renew();
@@ -247,12 +255,38 @@ async function startLive(box) {
       story.say(now(), picksUp ? "The vehicle has picked up the payload." : "The vehicle has dropped the payload.");
       story.watchError(now(), picksUp ? "the payload was picked up" : "the payload was dropped");
     },
-  });
-  buildSliders(page, data, (slider, position) => {
+  };
+
+  // Where the sliders of water and payload stand stays when the controller changes.
+  const positions = new Map();
+  const positionOf = (slider) => (slider.of_law ? null : positions.get(slider.label)) ?? slider.base;
+
+  function putPosition(slider, position) {
+    positions.set(slider.label, position);
     for (const [member, arrays] of Object.entries(slider.tables)) engine.put(member, arrays[position]);
+  }
+
+  function turn(slider, position) {
+    putPosition(slider, position);
     engine.renew();
     story.say(now(), `${slider.label}: ${Number(slider.shown[position].toPrecision(2))} ${slider.unit} from now on.`);
-  });
+  }
+
+  // Give the vehicle another controller, and begin again.
+  async function takeLaw(law) {
+    page.law.disabled = true;
+    engine = await startEngine(law);
+    ({ loop } = law);
+    ({ output } = engine);
+    run.series.estimate = Boolean(output.estimate);
+    panels = buildPanels(page, data, run);
+    restore = buildFaults(page, data, loop.switches, faults);
+    buildSliders(page, loop.sliders, positionOf, turn);
+    for (const slider of loop.sliders) putPosition(slider, positionOf(slider));
+    page.law.disabled = false;
+    reset();
+    if (data.laws.length > 1) story.say(now(), `The controller is ${law.name}.`);
+  }
 
   // From the start again, without faults; sliders stay.
   function reset() {
@@ -266,7 +300,7 @@ async function startLive(box) {
     marks = [];
     ended = false;
     trail.clear();
-    Object.values(strips).forEach((strip) => strip.clear());
+    Object.values(panels.strips).forEach((strip) => strip.clear());
     restore();
     page.faults.querySelectorAll("button").forEach((button) => { button.dataset.held = ""; });
     story.clear();
@@ -277,6 +311,7 @@ async function startLive(box) {
 
   page.play.addEventListener("click", () => setPlaying(!playing));
   page.reset.addEventListener("click", reset);
+  page.law.addEventListener("change", () => takeLaw(data.laws[page.law.value]));
   page.camera.addEventListener("change", () => placeCamera(scene, page.camera.value, at("position")));
   window.addEventListener("keydown", (event) => {
     if (event.key !== " " || ["BUTTON", "SELECT", "INPUT"].includes(event.target.tagName)) return;
@@ -285,7 +320,7 @@ async function startLive(box) {
   });
   new ResizeObserver(resize).observe(page.view);
   resize();
-  reset();
+  await takeLaw(data.laws[0]);
   requestAnimationFrame(advance);
 }
 

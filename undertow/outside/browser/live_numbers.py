@@ -32,6 +32,7 @@ class Slider(NamedTuple):
         unit: of the values.
         shown: value of each position, as the page writes it.
         base: position of the scenario as it is.
+        of_law: whether it is a gain of the controller; others are of water and payload.
         tables: number of an array of the loop -> the array at each position.
     """
 
@@ -39,6 +40,7 @@ class Slider(NamedTuple):
     unit: str
     shown: list[float]
     base: int
+    of_law: bool
     tables: dict[int, list[np.ndarray]]
 
 
@@ -65,6 +67,7 @@ class _Change(NamedTuple):
     values: list[Any]
     shown: list[float]
     base: int
+    of_law: bool = False
 
 
 class LiveNumbers(NamedTuple):
@@ -102,7 +105,7 @@ def live_numbers(text: Text, thrusters: int) -> LiveNumbers:
     for change in _changes(text, built):
         tables = _tables(text, change, base)
         if tables is not None and not taken & set(tables):
-            sliders.append(Slider(change.label, change.unit, change.shown, change.base, tables))
+            sliders.append(Slider(change.label, change.unit, change.shown, change.base, change.of_law, tables))
             taken |= set(tables)
     return LiveNumbers(built, base, sliders, switches)
 
@@ -178,7 +181,8 @@ def _changes(text: Text, built: Built) -> list[_Change]:
         if bandwidth is not None:
             values = _multiples(bandwidth, _OF_GAIN)
             shown = [float(np.max(value)) for value in values]
-            changes.append(_Change(f"{key} of the controller", "rad/s", f"controller.{key}", values, shown, 5))
+            label = f"{key} of the controller"
+            changes.append(_Change(label, "rad/s", f"controller.{key}", values, shown, 5, of_law=True))
     return changes
 
 

@@ -20,7 +20,7 @@ from undertow.scenario import factory
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.checks.controller_check import check_stability
 from undertow.scenario.checks.finding import Finding
-from undertow.scenario.checks.flow_stability import flow_advice, given_gains_advice
+from undertow.scenario.checks.flow_stability import checked_flow_advice
 from undertow.scenario.checks.part_check import check_contract, of_plant
 from undertow.scenario.checks.plant_check import derived_of_plant
 from undertow.scenario.checks.thruster_check import derived_of_thruster
@@ -143,7 +143,7 @@ def _of_scenario(text: Text) -> list[Report]:
     loop = built.closed_loop
     located_advice = [
         (Finding("advice", "scenario", "", advice.says, advice.hint), advice.where)
-        for advice in (*built.advice(), *(flow_advice(built) or given_gains_advice(built)))
+        for advice in (*built.advice(), *checked_flow_advice(built))
     ]
     reports = [Report(tuple(located_advice), ())]
     if (facts := vehicle_facts(loop.plant, built.resolved["plant"])) is not None:
@@ -168,7 +168,7 @@ def _of_scenario(text: Text) -> list[Report]:
 def _of_own_law(built: Built) -> Report:
     """Slopes of a controller in a file of the user's: those of the catalogue have some. Its gains are for its plant."""
     law = built.resolved["controller"]
-    if ".py:" not in law["kind"]:
+    if not catalogue.is_user_code(law["kind"]):
         return _report(())
     axes = len(built.closed_loop.plant.outputs)
     report = _of_feedback(
@@ -179,7 +179,7 @@ def _of_own_law(built: Built) -> Report:
 
 def _named(thing: str, options: Mapping[str, Any]) -> tuple[str, Any, Callable[..., Any]]:
     """Name and instance of a part, and a function that makes another one, for a given model."""
-    if ".py:" in thing or thing.endswith(".py"):
+    if catalogue.is_user_code(thing) or thing.endswith(".py"):
         function = catalogue.find("", thing, what=thing)
         make = lambda *leading_arguments: factory.call(function, options, leading_arguments, Path())[0]
         _check_model_comes_first(function, options)

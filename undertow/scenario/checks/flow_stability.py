@@ -13,6 +13,7 @@ from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
 from undertow.control.navigation.perfect import perfect
+from undertow.core import catalogue
 from undertow.core.arrays import as_array
 from undertow.core.errors import Advice, BadInput, advice, error_location
 from undertow.core.numerics.random_keys import key_of_seed
@@ -33,39 +34,52 @@ def flow_advice(built: Built) -> tuple[Advice, ...]:
 
     Loops that are fast enough for any usual flow are not looked at: that would take seconds.
     """
-    loop, plant = built.scenario.loop, built.closed_loop.plant
-    if loop.kind != "sampled" or not isinstance(plant, HybridVehicle):
-        return ()
-    if munk_rate(plant.body) * _FLOW * loop.dt < _LITTLE_GROWTH:
-        return ()
+    return _slow_loop_advice(built, *_in_fast_flow(built)) if _is_slow(built) else ()
+
+
+def checked_flow_advice(built: Built) -> tuple[Advice, ...]:
+    """Like `flow_advice`, and advice where gains are not those of the rule and the loop is too slow for them.
+
+    These are gains that a scenario gives, and those of a law in a file of the user's. It takes seconds, and is for
+    checks: the rule for gains is safe at all rates where `flow_advice` says nothing.
+    """
+    given = built.text.data.get("controller")
+    gives_gains = isinstance(given, Mapping) and bool(set(given) - {"kind", "preset"})
+    is_own_law = catalogue.is_user_code(built.resolved["controller"]["kind"])
+    if not (gives_gains or is_own_law) or _sampled_vehicle(built) is None:
+        return flow_advice(built)
     flow, growth = _in_fast_flow(built)
+    rate_advice = _slow_loop_advice(built, flow, growth) if _is_slow(built) else ()
+    return rate_advice or _given_gains_advice(built, flow, growth, is_own_law)
+
+
+def _is_slow(built: Built) -> bool:
+    """Whether the attitude of a vehicle can grow by much in a fast flow within one sampling time."""
+    vehicle = _sampled_vehicle(built)
+    return vehicle is not None and munk_rate(vehicle.body) * _FLOW * built.scenario.loop.dt >= _LITTLE_GROWTH
+
+
+def _sampled_vehicle(built: Built) -> HybridVehicle | None:
+    """The vehicle of a sampled loop; None where there is none."""
+    plant = built.closed_loop.plant
+    return plant if built.scenario.loop.kind == "sampled" and isinstance(plant, HybridVehicle) else None
+
+
+def _slow_loop_advice(built: Built, flow: float, growth: float) -> tuple[Advice, ...]:
+    """Advice on the rate, for errors that grow by `growth` (1/s) in a flow of `flow` (m/s)."""
     if not _HARMLESS < growth < np.inf:
         return ()
     message = (
-        f"at {1 / loop.dt:g} Hz the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow "
-        f"by {growth:.2g} 1/s"
+        f"at {1 / built.scenario.loop.dt:g} Hz the loop is unstable while the water passes the vehicle at "
+        f"{flow:.2g} m/s: errors grow by {growth:.2g} 1/s"
     )
     with error_location(location=built.text.location):
         return (advice("loop.dt", message, _remedy(built)),)
 
 
-def given_gains_advice(built: Built) -> tuple[Advice, ...]:
-    """Advice where gains are not those of the rule, and the loop is too slow for the flow that stays.
-
-    These are gains that a scenario gives, and those of a law in a file of the user's. It takes seconds, and is for
-    checks: the rule for gains is safe at all rates where `flow_advice` says nothing.
-    """
-    settings, given = built.scenario.loop, built.text.data.get("controller")
-    gives_gains = isinstance(given, Mapping) and bool(set(given) - {"kind", "preset"})
-    is_own_law = ".py:" in built.resolved["controller"]["kind"]
-    if (
-        not (gives_gains or is_own_law)
-        or settings.kind != "sampled"
-        or not isinstance(built.closed_loop.plant, HybridVehicle)
-    ):
-        return ()
-    flow, growth = _in_fast_flow(built)
-    if not _GROWN / settings.duration < growth < np.inf:
+def _given_gains_advice(built: Built, flow: float, growth: float, is_own_law: bool) -> tuple[Advice, ...]:
+    """Advice on gains, for errors that grow by `growth` (1/s) in a flow of `flow` (m/s)."""
+    if not _GROWN / built.scenario.loop.duration < growth < np.inf:
         return ()
     message = (
         f"with these gains the loop is unstable while the water passes the vehicle at {flow:.2g} m/s: errors grow by "

@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 from undertow.core import catalogue
 from undertow.core.errors import BadInput, did_you_mean
 from undertow.scenario import factory
-from undertow.scenario.build import build
+from undertow.scenario.build import Built, build
 from undertow.scenario.reading import Text, from_data, read
 from undertow.scenario.schema import Part, named_law
 from undertow.scenario.validation import validate
 from undertow.studies.campaign.labels import words
 
 OWN = "scenario"  # stands for the controller of the scenario itself
-_CODE = ".py:"
 _FILES = (".yaml", ".yml", ".nc")
 
 # Keys of a scenario in which candidates do not differ: each trial has its own seed, and the rest is not simulated.
@@ -155,9 +154,32 @@ def part_of(controller: Part, folder: Path) -> dict[str, Any]:
     return data | {"kind": factory.portable_name(data["kind"], folder)}
 
 
+def scenario_with(candidate: Candidate, scenario: Text) -> Text:
+    """A scenario with the controller of a candidate, and without ranges for tuning that are those of another law."""
+    data = dict(scenario.data)
+    part = candidate.changes["controller"]
+    tune_section = data.get("tune")
+    if isinstance(tune_section, dict) and "parameters" in tune_section:
+        scenario_controller = part_of(validate(scenario).controller, scenario.folder)
+        if any(scenario_controller.get(key) != part.get(key) for key in ("kind", "preset")):
+            data["tune"] = {key: value for key, value in tune_section.items() if key != "parameters"}
+    return scenario._replace(data=data | candidate.changes)
+
+
+def built_with_each(entries: Sequence[str], scenario: Text, path: Path | None) -> dict[str, Built]:
+    """Name -> the scenario built with that controller, for entries as of `controllers`.
+
+    Raises:
+        BadInput: fewer than two, or the scenario cannot be built with one of them.
+    """
+    return {
+        candidate.name: build(scenario_with(candidate, scenario)) for candidate in controllers(entries, scenario, path)
+    }
+
+
 def _named(entry: str) -> dict[str, Any]:
     """A controller by the name of a preset, by its own name, or by a file of Python code and a function."""
-    if _CODE in entry:
+    if catalogue.is_user_code(entry):
         catalogue.find("controllers", entry, Path(), "--controllers")
         return {"kind": factory.portable_name(entry, Path())}
     presets, parts = catalogue.presets("controllers"), catalogue.names("controllers")

@@ -18,8 +18,7 @@ from undertow.core.json_text import to_json
 from undertow.scenario.build import build
 from undertow.scenario.provenance import text_hash, versions
 from undertow.scenario.reading import Text, dump
-from undertow.scenario.validation import validate
-from undertow.studies.comparison.candidates import Candidate, file_stem, part_of
+from undertow.studies.comparison.candidates import Candidate, file_stem, scenario_with
 from undertow.studies.tuning.problem import is_tunable
 from undertow.studies.tuning.stability import NoCertificate
 from undertow.studies.tuning.training_runs import PlantVariants
@@ -149,7 +148,7 @@ def equal_budgets(
     sets: dict[str, Any] = {}
     for number, candidate in enumerate(candidates):
         file = folder / file_stem(number, candidate.name)
-        entry = _tuned(candidate, _scenario_with(candidate, scenario), budget, file, say)
+        entry = _tuned(candidate, scenario_with(candidate, scenario), budget, file, say)
         sets = entry.pop("sets") or sets
         costs: Any = {name: tuple(entry[name]) for name in ("train", "held_out") if entry[name] is not None}
         tuned_laws.append(TunedLaw(**{**entry, **costs}))
@@ -163,18 +162,6 @@ def equal_budgets(
 
 def _with_gains(candidate: Candidate, law: TunedLaw) -> dict[str, Any]:
     return candidate.changes | {"controller": candidate.changes["controller"] | law.gains}
-
-
-def _scenario_with(candidate: Candidate, scenario: Text) -> Text:
-    """The scenario with the controller of a candidate."""
-    data = dict(scenario.data)
-    part = candidate.changes["controller"]
-    tune_section = data.get("tune")
-    if isinstance(tune_section, dict) and "parameters" in tune_section:
-        scenario_controller = part_of(validate(scenario).controller, scenario.folder)
-        if any(scenario_controller.get(key) != part.get(key) for key in ("kind", "preset")):
-            data["tune"] = {key: value for key, value in tune_section.items() if key != "parameters"}
-    return scenario._replace(data=data | candidate.changes)
 
 
 def _tuned(candidate: Candidate, text: Text, budget: int, file: Path, say: Say) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def tuning_note(
         source: the scenario file that the gains come from, if any.
     """
     note = _searched(part, source) or _unsearched(part, law, dt, folder, source)
-    of_user = ".py:" in part["kind"] and not isinstance(law, AbstractAccelerationLaw)
+    of_user = catalogue.is_user_code(part["kind"]) and not isinstance(law, AbstractAccelerationLaw)
     return note._replace(sentence=f"{note.sentence}{_OWN_PATH}") if of_user else note
 
 
