@@ -30,6 +30,7 @@ extensions = [
     "reference",
     "api",
     "live_page",
+    "pictures",
 ]
 # The gallery also writes its examples as notebooks to download; its pages are the .rst files.
 exclude_patterns = ["_build", ".jupyter_cache", "gallery/GALLERY_HEADER.rst", "gallery/*.ipynb"]

@@ -110,6 +110,20 @@ def test_a_part_is_described_with_its_values_units_and_sources(monkeypatch):
     assert said[said.index("fidelity") + 1] == "electromechanical"
 
 
+def test_a_picture_runs_what_its_command_reads(monkeypatch):
+    pictures = extension("pictures", monkeypatch)
+    page = (
+        "```yaml\n# dive.yaml\nloop: {}\n```\n```bash\nundertow init --own-vehicle\nundertow list\n"
+        "undertow simulate dive.yaml --out runs/dive\nundertow identify my.yaml runs/dive/run.mcap --out runs/rov\n"
+        "undertow tune runs/rov/identified.yaml --out runs/rov-tuned\n```\n"
+    )
+    files, commands = pictures._blocks(page)
+    assert files == {"dive.yaml": "# dive.yaml\nloop: {}\n"}
+    ran = [words[1] for words in pictures._needed(commands, "runs/rov-tuned/figures/tuning.png")]
+    assert ran == ["init", "simulate", "identify", "tune"]
+    assert pictures._needed(commands, "runs/other/figures/summary.png") == []
+
+
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
     command = [
@@ -131,6 +145,7 @@ def test_the_site_builds_without_a_warning_and_needs_no_network(tmp_path):
     assert "--no-prediction" in text("reference/commands")
     assert "weights_at_bound" in text("reference/parts/controllers")
     assert "held_out.seeds" in text("reference/scenario")
+    assert (tmp_path / "site" / "drive" / "index.html").stat().st_size > 1e6
     for page in (tmp_path / "site").rglob("*.html"):
         loaded = re.findall(
             r'<(?:script|link|img|iframe)[^>]*(?:src|href)="(?:https?:)?//[^"]*"', page.read_text("utf-8")

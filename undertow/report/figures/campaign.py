@@ -57,17 +57,24 @@ def key_height(key: Mapping[str, style.Look]) -> float:
     return 0.2 * -(-len(key) // beside(key))
 
 
+def _differs(by_combination: Mapping[str, np.ndarray]) -> bool:
+    """Whether a metric has more than one value over all trials."""
+    return len(np.unique(np.concatenate(list(by_combination.values())))) > 1
+
+
 def distributions_figure(
     values: Mapping[str, Mapping[str, np.ndarray]], counts: Mapping[str, int], units: Mapping[str, str]
 ) -> Figure:
     """Empirical cumulative distribution functions of the metrics; failed trials count as infinite values.
 
     Args:
-        values: metric -> name of the combination -> finite values, in any order; the first eight are plotted.
+        values: metric -> name of the combination -> finite values, in any order; of those that differ, the first eight
+            are plotted.
         counts: name of the combination -> number of its trials, including failed ones.
         units: metric -> unit.
     """
     metrics = [name for name in SHOWN if name in values]
+    metrics = [name for name in metrics if _differs(values[name])] or metrics
     rows = -(-len(metrics) // _COLUMNS)
     names = list(dict.fromkeys(name for by_combination in values.values() for name in by_combination))
     looks = dict(zip(names, LOOKS, strict=False))

@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 
 from undertow.report.figures import style
 
+_WIDE = 10.0  # ratio of costs from which on their axis is logarithmic
+
 
 def tuning_figure(results: Mapping[str, Any]) -> Figure:
     """Best training cost against the number of evaluations, and the costs of the given and tuned gains on both sets.
@@ -20,7 +22,8 @@ def tuning_figure(results: Mapping[str, Any]) -> Figure:
     steps, end = results["history"], results["evaluations"]
     tried = [step["evaluations"] for step in steps] + [end]
     costs = [step["cost"] for step in steps] + [steps[-1]["cost"]]
-    panel.set_yscale("log")
+    if max(costs) > _WIDE * min(costs):  # else numbers between powers of ten would run into the label
+        panel.set_yscale("log")
     panel.step(tried, costs, where="post", color=style.SOLID.colour, linewidth=style.SOLID.width)
     for name, look in (("train_cost", style.SOLID), ("held_out_cost", style.DASHED)):
         for evaluations, gains_name in ((0, "given"), (end, "tuned")):
