@@ -17,6 +17,9 @@ class Status(enum.IntEnum):
     OUT_OF_RANGE = 5
     COMMAND_NOT_FINITE = 6
 
+    def __str__(self) -> str:
+        return self.word
+
     @property
     def word(self) -> str:
         """How a run ended, as written in result files."""

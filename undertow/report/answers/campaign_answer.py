@@ -10,7 +10,11 @@ from undertow.studies.campaign.store_results import Results
 
 _STRONG = 0.3  # rank correlation from which on an input is worth naming
 _MOST = 3  # inputs, and combinations, that are named
-_VERDICTS = {"holds": "holds", "fails": "is violated", "open": "is open (increase `trials` and use `--resume`)"}
+_VERDICTS = {
+    "holds": "holds",
+    "fails": "is violated",
+    "open": "is not decided by these trials (increase `trials` and use `--resume`)",
+}
 
 
 def answer_of_campaign(results: Results, summary: Mapping[str, Any]) -> PlainAnswer:
@@ -84,6 +88,8 @@ def _requirements(results: Results, summary: Mapping[str, Any]) -> Iterator[str]
             f"{quantity(requirement['kept'], '')} of the trials keep it, "
             f"95 % interval {100 * low:.1f} to {100 * high:.1f} %; {quantity(requirement['share'], '')} are required."
         )
+    if (more := len(verdicts) - _MOST) > 0:
+        yield f"{more} further verdicts are in the table of `--details` and on the page; these are the worst."
 
 
 def _errors(results: Results, summary: Mapping[str, Any]) -> Iterator[str]:
@@ -117,7 +123,9 @@ def _causes(summary: Mapping[str, Any]) -> Iterator[str]:
         if size >= _STRONG and key not in named and len(named) < _MOST:
             named[key] = f"`{key}` ({'more' if correlation > 0 else 'less'} {titled_name(metric)}, {correlation:+.2f})"
     if named:
-        yield f"What matters most, by rank correlation: {', '.join(named.values())}."
+        count = len(summary["combinations"])
+        mean = f" (mean over the {count} combinations)" if count > 1 else ""
+        yield f"What matters most, by rank correlation{mean}: {', '.join(named.values())}."
 
 
 def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:
