@@ -18,9 +18,10 @@ from undertow.scenario.uncertain_number import UncertainNumber
 from undertow.studies.identification.design import STEP, design
 from undertow.studies.identification.design_result import DesignRequest
 from undertow.studies.identification.excitation_blocks import BLOCK
+from undertow.studies.identification.fit import scores_of
 from undertow.studies.identification.free_parameters import USUALLY_FREE, chosen, parameters_of
 from undertow.studies.identification.model import Unknowns
-from undertow.studies.identification.output_error import fit, scores_of
+from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.rehearsal import rehearse, with_vehicle
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import uncertainty_of
@@ -72,7 +73,7 @@ def run(seeds: int, first: int) -> None:
         rehearsal = rehearse(placed, scenario["reference"]["position"], STEP)
         segments = segments_of([rehearsal.dive.dive], BLOCK)
         estimate = fit(designed.model, segments, STEP, np.zeros(len(least)), least)
-        uncertainty = uncertainty_of(estimate.information, scores_of(designed.model, segments, STEP, estimate), STEP)
+        uncertainty = uncertainty_of(estimate.information, scores_of(designed.model, STEP, estimate), STEP)
         shares[number] = [interval.share for interval in uncertainty.intervals(parameters, estimate.z)]
         errors[number] = (estimate.z - truth)[:count]
         use[number] = rehearsal.use_of(designed.limits).max()

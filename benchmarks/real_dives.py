@@ -21,6 +21,7 @@ import numpy as np
 
 import undertow as ut
 from undertow.core.errors import BadInput
+from undertow.studies.identification.estimates import METHODS
 
 AXES = ("u", "v", "w", "p", "q", "r")
 
@@ -116,20 +117,21 @@ def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("folder", type=Path)
     options.add_argument("--only", choices=tuple(STUDIES))
+    options.add_argument("--method", choices=METHODS, default=METHODS[0])
     arguments = options.parse_args()
     for name, study in STUDIES.items():
         if arguments.only in (None, name):
             print(f"\n{name}", flush=True)
             with tempfile.TemporaryDirectory() as work:
-                study(arguments.folder / name, Path(work))
+                study(arguments.folder / name, Path(work), arguments.method)
 
 
-def heavy_mocap(folder: Path, work: Path) -> None:
+def heavy_mocap(folder: Path, work: Path, method: str) -> None:
     """Each run from the others, free run from its first sample, beside the owners' simulator."""
     scenario, mapping = _written(work, "heavy.yaml", HEAVY), _written(work, "sticks.yaml", STICKS)
     files = sorted(folder.glob("*.csv"))
     logs = [ut.read_log(file, mapping=mapping) for file in files]
-    model = ut.identify(scenario, logs, per_axis=True, step=0.1)
+    model = ut.identify(scenario, logs, per_axis=True, method=method, step=0.1)
     rows = [np.array([validation.identified.fit[axis] for axis in AXES]) for validation in model.result.validation]
     _print_fits([*(file.stem for file in files), "mean"], [*rows, np.mean(rows, axis=0)])
     theirs = [_simulator_fit(file) for file in files]
@@ -137,14 +139,14 @@ def heavy_mocap(folder: Path, work: Path) -> None:
     _print_fits(["at least"], [np.array(BARS)])
 
 
-def bluerov2016(folder: Path, work: Path) -> None:
+def bluerov2016(folder: Path, work: Path, method: str) -> None:
     """Fitted on five dives, free run on a sixth; the numbers beside the thesis."""
     _written(work, "bluerov.yaml", BLUEROV)
     scenario, mapping = _written(work, "rov.yaml", BLUEROV_SCENARIO), _written(work, "columns.yaml", BLUEROV_COLUMNS)
     bag = lambda name: ut.read_log(next(folder.glob(f"{name}_*.bag")), mapping=mapping)
     dives = [bag(name) for name in BLUEROV_DIVES]
     # It tumbles, and its attitude is filtered, so that it does not follow from the rates: short segments.
-    options = {"free": BLUEROV_FREE, "priors": BLUEROV_PRIORS, "segment": 5.0}
+    options = {"free": BLUEROV_FREE, "priors": BLUEROV_PRIORS, "segment": 5.0, "method": method}
     model = ut.identify(scenario, dives, unseen=[bag("all_2")], **options)
     for finding in model.result.findings:
         print(finding)
@@ -163,13 +165,13 @@ def bluerov2016(folder: Path, work: Path) -> None:
         print(f"{name:28}{value:10.3g}{low:10.3g}{high:10.3g}   {theirs[0]:g}, {theirs[1]:g}: {place}")
 
 
-def auv_pool(folder: Path, work: Path) -> None:
+def auv_pool(folder: Path, work: Path, method: str) -> None:
     """Which axes are refused, and why."""
     scenario, mapping = _written(work, "auv.yaml", HEAVY), _written(work, "wrenches.yaml", WRENCHES)
     for states in sorted(folder.glob("navigation_state_*.csv")):
         file = _joined(states, folder / states.name.replace("navigation_state", "wrench"), work)
         try:
-            model = ut.identify(scenario, file, mapping, per_axis=True, step=0.1)
+            model = ut.identify(scenario, file, mapping, per_axis=True, method=method, step=0.1)
         except BadInput as error:
             print(f"{file.name}: {error}")
             continue

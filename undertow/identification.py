@@ -79,6 +79,7 @@ def identify(
     free: Sequence[str] = (),
     priors: Mapping[str, str] | None = None,
     per_axis: bool = False,
+    method: str = "output_error",
     step: float = 0.05,
     segment: float = 10.0,
     watch: Callable[[str], None] = lambda stage: None,
@@ -95,6 +96,8 @@ def identify(
         free: names, groups or patterns of parameters; () for the usual ones.
         priors: such as `{"mass": "11.5 +- 0.2"}`.
         per_axis: whether the inputs push along the six axes instead of driving the thrusters.
+        method: `output_error`, or `prediction_error` for dives in waves, among eddies or on a tether: a Kalman filter
+            follows the motion, and estimates what pushes the vehicle besides its thrusters.
         step: of the integration, s.
         segment: length of the segments whose begin is estimated, too, s.
         watch: called with the current stage.
@@ -113,6 +116,7 @@ def identify(
         free=free,
         priors={name: _prior(name, text) for name, text in (priors or {}).items()},
         per_axis=per_axis,
+        method=method,
         step=step,
         segment=segment,
         say=watch,

@@ -12,8 +12,8 @@ from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.studies.identification.dive import Dive, dive_of
 from undertow.studies.identification.free_parameters import chosen, parameters_of, resolved_by
 from undertow.studies.identification.identified_vehicle import MotionState, prior_vehicle
-from undertow.studies.identification.output_error import _shares
 from undertow.studies.identification.prediction import _differences
+from undertow.studies.identification.residual_noise import outlier_shares
 from undertow.studies.identification.simulated_dive import simulated_log
 from undertow.studies.identification.uncertainty import Uncertainty
 
@@ -100,7 +100,7 @@ def test_a_smooth_misfit_has_no_outliers_and_a_spike_is_one():
     residuals = np.zeros((1, 400, 13))
     residuals[0, :, 11] = smooth
     counts = np.ones((1, 400, 13))
-    assert np.all(_shares(residuals, counts) == 1.0)
+    assert np.all(outlier_shares(residuals, counts) == 1.0)
     residuals[0, 100, 11] = 50.0
-    shares = _shares(residuals, counts)
+    shares = outlier_shares(residuals, counts)
     assert shares[0, 100, 11] < 0.1 and np.sum(shares < 1) == 1

@@ -15,6 +15,7 @@ from undertow.cli.results_folder import output_folder, results_folder
 from undertow.cli.stages import live_stages
 from undertow.cli.tables import numbers, print_lines, titled, wide_console
 from undertow.cli.unfinished import checkpoint_in, unfinished
+from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.core.number_text import plain
@@ -27,6 +28,7 @@ from undertow.scenario.reading import dump, read
 from undertow.scenario.scenario_vehicle import with_reference
 from undertow.scenario.uncertain_number import UncertainNumber, uncertain_number
 from undertow.simulation.checkpoint import Checkpoint
+from undertow.studies.identification.estimates import METHODS
 from undertow.studies.identification.identified_files import write_files
 from undertow.studies.identification.identify import identify
 from undertow.studies.identification.result_data import as_data
@@ -41,6 +43,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
         raise BadInput("", "", "identify needs a SCENARIO and the LOGs of its dives, or --thruster with a bench record")
     scenario, log_files, resume = command.scenario, command.logs, command.resume
     check_pdf(command.pdf)
+    checks.choice("--method", command.method, METHODS)
     console = wide_console()
     priors = priors_of(command.prior or ())
     first = Path("runs") / f"{scenario.stem}-identified"
@@ -64,6 +67,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
                 free=command.free or (),
                 priors=priors,
                 per_axis=command.per_axis,
+                method=command.method,
                 step=command.step,
                 segment=command.segment,
                 checkpoint=checkpoint,
@@ -89,7 +93,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
 def _fingerprint(command: IdentifyCommand, logs: Sequence[Path], built: Built) -> str:
     """Of what an identification depends on: the vehicle, the contents of the logs, and the options."""
     files = [*logs, *(command.unseen or ()), *([command.mapping] if command.mapping else [])]
-    options = (command.free, command.prior, command.per_axis, command.step, command.segment)
+    options = (command.free, command.prior, command.per_axis, command.method, command.step, command.segment)
     hashes = [recording_hash(path) for path in files]
     return text_hash(dump({"plant": built.resolved["plant"], "files": hashes, "options": repr(options)}))
 

@@ -130,6 +130,10 @@ def _white(data: Mapping[str, Any]) -> Html:
         "the inputs. The intervals allow for its duration. Its cause is a disturbance, or something that the model "
         "lacks."
     )
+    if data["method"] == "output_error":
+        sentence += (
+            " If it is a disturbance (waves, eddies, a tether), `--method prediction_error` makes the numbers surer."
+        )
     return tag("p", prose(sentence))
 
 

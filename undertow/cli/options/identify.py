@@ -77,6 +77,14 @@ class IdentifyCommand(Command):
             "driving the thrusters.",
         ),
     ] = False
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="output_error, or prediction_error for dives in waves, among eddies or on a tether: a Kalman filter "
+            "follows the motion, and estimates what pushes the vehicle besides its thrusters.",
+        ),
+    ] = "output_error"
     step: Annotated[float, typer.Option(metavar="SECONDS", help="Step of the integration.")] = 0.05
     segment: Annotated[
         float, typer.Option(metavar="SECONDS", help="Length of the segments whose begin is estimated, too.")

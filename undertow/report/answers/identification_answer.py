@@ -8,6 +8,7 @@ import numpy as np
 
 from undertow.core.number_text import plain
 from undertow.report.answers.plain_answer import PlainAnswer
+from undertow.report.quantities import quantity
 
 _SHOWN = 4  # parameters named in a line
 _ALIKE = 1.0  # difference of mean fits, %, that is none
@@ -34,6 +35,7 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *_far_line(far),
         f"{len(data['parameters'])} numbers were estimated from {dives}, {seconds:.0f} s together.",
         *_fit_line(fits),
+        *_pushes(data),
         *_convergence(data),
         *_best_known(data),
         *_refused(data),
@@ -111,6 +113,18 @@ def _convergence(data: Mapping[str, Any]) -> Iterator[str]:
     if not data["converged"]:
         iterations = data["iterations"]
         yield f"The estimate had not come to rest after {iterations} iterations: do not trust its intervals."
+
+
+def _pushes(data: Mapping[str, Any]) -> Iterator[str]:
+    """What pushed the vehicle besides its thrusters, and for how long."""
+    if disturbance := data["disturbance"]:
+        sizes = [(axis, size) for axis, size in disturbance["deviations"].items() if axis not in data["refused_axes"]]
+        units = {axis: "rad/s^2" if axis in ("roll", "pitch", "yaw") else "m/s^2" for axis, _ in sizes}
+        words = ", ".join(f"{axis} {quantity(size, units[axis])}" for axis, size in sizes)
+        yield (
+            f"Besides its thrusters something pushed it that lasts {quantity(disturbance['correlation_time'], 's')} "
+            f"(rms of the acceleration): {words}."
+        )
 
 
 def _best_known(data: Mapping[str, Any]) -> Iterator[str]:

@@ -8,8 +8,8 @@ import numpy as np
 
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.estimates import Estimates
+from undertow.studies.identification.fit import Fit
 from undertow.studies.identification.model import IdentificationModel
-from undertow.studies.identification.output_error import Fit
 from undertow.studies.identification.validation import PredictionErrors, prediction_errors
 
 _PARTS = 4  # into which a single dive is divided
@@ -51,13 +51,13 @@ def cross_validated(
     the others alone might not find. Parts of one dive are alike, and begin at the estimate from all of it.
     """
     one_dive = len({piece.name.partition(_PART_OF)[0] for piece in pieces}) == 1
-    begin, noise = estimate.z[:count], estimate.noise
+    begin, near = estimate.z[:count], estimate
     left_out, validation = [], []
     for number, piece in enumerate(pieces):
         others = [other for i, other in enumerate(pieces) if i != number]
         if not one_dive:
-            begin, noise = estimates.nearest_begin(others), None
-        without = estimates.of(f"without {Path(piece.name).name}", others, begin, noise).z[:count]
+            begin, near = estimates.nearest_begin(others), None
+        without = estimates.of(f"without {Path(piece.name).name}", others, begin, near).z[:count]
         left_out.append(without)
         identified = prediction_errors(model, without, piece)
         validation.append(Validation(piece, identified, prediction_errors(model, np.zeros(count), piece)))

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
@@ -115,7 +116,7 @@ def _information(
 ) -> np.ndarray:
     """Information of some segments, with the program for `_AT_ONCE` of them."""
     padded = np.concatenate([numbers, np.repeat(numbers[-1:], _AT_ONCE - len(numbers))])
-    segments = Segments(*(column[padded] for column in segments))
+    segments = jax.tree.map(lambda column: column[padded], segments)
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     with np.errstate(divide="ignore"):
         weights = np.where(counts > 0, counts / noise**2, 0.0)

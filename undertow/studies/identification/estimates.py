@@ -8,15 +8,21 @@ import numpy as np
 
 from undertow.simulation.checkpoint import Checkpoint
 from undertow.studies.identification.dive import Dive
+from undertow.studies.identification.fit import Fit, Solution, completed
 from undertow.studies.identification.free_parameters import FreeParameter
+from undertow.studies.identification.kalman_gains import Disturbance
 from undertow.studies.identification.model import IdentificationModel, Unknowns
-from undertow.studies.identification.output_error import Fit, Solution, completed, first_errors, fit
-from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.output_error import first_errors, fit
+from undertow.studies.identification.prediction_error import filter_fit
+from undertow.studies.identification.segments import Segments, segments_of
 from undertow.studies.identification.weak_form import first_estimate
 
 _SHARES_OF_FIRST = (1.0, 0.5, 0.0)  # of a first estimate, at which an estimate may begin
 
+METHODS = ("output_error", "prediction_error")
+
 Say = Callable[[str], None]
+Watch = Callable[[int, float], None]  # called with the iteration and the cost
 
 
 class Estimates:
@@ -26,6 +32,7 @@ class Estimates:
         model: see there.
         parameters: that are free.
         segment: length of the segments, s.
+        method: one of `METHODS`.
         count: of the estimates.
         say: called with the estimate that is under way, and how long the others may take.
         checkpoint: keeps finished estimates; None to keep none.
@@ -36,11 +43,13 @@ class Estimates:
         model: IdentificationModel,
         parameters: Sequence[FreeParameter],
         segment: float,
+        method: str,
         count: int,
         say: Say,
         checkpoint: Checkpoint | None = None,
     ):
         self._model, self._parameters, self._segment = model, parameters, segment
+        self._method = method
         self._count, self._say, self._checkpoint = count, say, checkpoint
         self._done, self._started = 0, time.perf_counter()
 
@@ -58,14 +67,14 @@ class Estimates:
         ]
         return _SHARES_OF_FIRST[int(np.argmin(errors))] * found
 
-    def of(self, name: str, dives: Sequence[Dive], begin: np.ndarray, noise: np.ndarray | None = None) -> Fit:
+    def of(self, name: str, dives: Sequence[Dive], begin: np.ndarray, near: Fit | None = None) -> Fit:
         """The estimate from some dives.
 
         Args:
             name: of the estimate, for people.
             dives: see there.
             begin: where the parameters begin.
-            noise: see `fit`.
+            near: an estimate from nearly the same, at which this one begins.
         """
         segments, step = segments_of(dives, self._segment), dives[0].step
         z, least = self._unknowns(dives, begin)
@@ -73,14 +82,23 @@ class Estimates:
         new: list[Fit] = []
 
         def compute() -> dict[str, Any]:
-            new.append(fit(self._model, segments, step, z, least, watch, noise))
+            new.append(self._found(segments, step, z, least, near, watch))
             return _packed(new[0])
 
         answer = compute() if self._checkpoint is None else self._checkpoint.ask("estimate", z, compute)
         self._done += 1
         return new[0] if new else completed(self._model, segments, step, _unpacked(answer))
 
-    def _watch(self, name: str) -> Callable[[int, float], None]:
+    def _found(self, segments: Segments, step: float, z, least, near: Fit | None, watch: Watch) -> Fit:
+        """By the method: a filter begins at an estimate by output error."""
+        if self._method == "output_error":
+            return fit(self._model, segments, step, z, least, watch, None if near is None else near.noise)
+        if near is None or near.disturbance is None:
+            first = fit(self._model, segments, step, z, least, watch)
+            return filter_fit(self._model, segments, step, first.z, least, first.noise, watch=watch)
+        return filter_fit(self._model, segments, step, z, least, near.noise, near.disturbance, watch)
+
+    def _watch(self, name: str) -> Watch:
         """What is called with the iteration and the cost of the next estimate."""
         left = ""
         if self._done:
@@ -109,10 +127,16 @@ def _packed(solution: Fit) -> dict[str, Any]:
         "shares": solution.shares.ravel()[outliers].tolist(),
         "iterations": solution.iterations,
         "converged": solution.converged,
+        "disturbance": None if solution.disturbance is None else _plain(solution.disturbance),
     }
 
 
+def _plain(disturbance: Disturbance) -> list[Any]:
+    return [disturbance.deviations.tolist(), disturbance.correlation_time]
+
+
 def _unpacked(answer: Mapping[str, Any]) -> Solution:
+    disturbance = answer["disturbance"]
     shares = np.ones(answer["shape"])
     shares.ravel()[np.array(answer["outliers"], dtype=int)] = answer["shares"]
     return Solution(
@@ -122,4 +146,5 @@ def _unpacked(answer: Mapping[str, Any]) -> Solution:
         shares=shares,
         iterations=answer["iterations"],
         converged=answer["converged"],
+        disturbance=None if disturbance is None else Disturbance(np.array(disturbance[0]), disturbance[1]),
     )

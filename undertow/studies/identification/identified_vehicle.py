@@ -20,6 +20,7 @@ from undertow.physics.thrusters.inflow import advance_speed, with_inflow
 from undertow.physics.vehicles.body import Body, rigid_body_mass, seen_from_water
 
 Values = Mapping[str, Any]  # of parameters, by name
+Push = Float[Array, "6"] | float  # a further acceleration of the body, m/s^2 and rad/s^2
 
 _SMALLEST_INPUT = 1e-6  # below which a power has no slope
 _MATRICES = ("added_mass", "linear_damping", "quadratic_damping")
@@ -140,13 +141,15 @@ class IdentifiedVehicle(eqx.Module):
     body: Body
     actuation: AbstractActuation
 
-    def advance(self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"], step) -> MotionState:
-        """State after a step (s) with a held input."""
+    def advance(
+        self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"], step, push: Push = 0.0
+    ) -> MotionState:
+        """State after a step (s) with a held input, and with a push."""
         solved = self.actuation.solved(x.actuators, u, step)
         if solved is None:
-            return rk4(lambda t, state: self.dynamics(state, u, current), 0.0, x, step)
+            return rk4(lambda t, state: self.dynamics(state, u, current, push), 0.0, x, step)
         still = jax.tree.map(jnp.zeros_like, x.actuators)
-        driven = lambda t, state: self.dynamics(state, u, current)._replace(actuators=still)
+        driven = lambda t, state: self.dynamics(state, u, current, push)._replace(actuators=still)
         after = rk4(driven, 0.0, x._replace(actuators=solved.mean), step)
         return after._replace(actuators=solved.end)
 
@@ -157,12 +160,14 @@ class IdentifiedVehicle(eqx.Module):
             return rk4(lambda t, s: self.actuation.dynamics(s, u), 0.0, state, step)
         return solved.end
 
-    def dynamics(self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"]) -> MotionState:
+    def dynamics(
+        self, x: MotionState, u: Float[Array, " N"], current: Float[Array, "3"], push: Push = 0.0
+    ) -> MotionState:
         """d(state)/dt in water that moves evenly, with the velocity `current` in the world, m/s."""
         rotation = rotation_from_quaternion(x.attitude)
         seen = seen_from_water(Water(current, jnp.zeros(3)), rotation, x.nu, self.body.gravity)
         wrench = self.actuation.wrench(x.actuators, u, seen.nu)
-        acceleration = self.body.free_acceleration(seen.nu, seen.down) + seen.rate + self.body.accelerate(wrench)
+        acceleration = self.body.free_acceleration(seen.nu, seen.down) + seen.rate + self.body.accelerate(wrench) + push
         return MotionState(
             position=matvec(rotation, x.nu[:3]),
             attitude=quaternion_rate(x.attitude, x.nu[3:]),

@@ -22,7 +22,8 @@ from undertow.studies.identification.cross_validation import (
     with_nuisances,
 )
 from undertow.studies.identification.dive import Dive
-from undertow.studies.identification.estimates import Estimates, Say
+from undertow.studies.identification.estimates import METHODS, Estimates, Say
+from undertow.studies.identification.fit import Fit, scores_of
 from undertow.studies.identification.free_parameters import (
     FreeParameter,
     axis_parameters,
@@ -32,9 +33,7 @@ from undertow.studies.identification.free_parameters import (
 )
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, model_of
-from undertow.studies.identification.output_error import Fit, scores_of
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
-from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.uncertainty import (
     Combination,
     ParameterInterval,
@@ -94,6 +93,7 @@ def identify(
     free: Sequence[str] = (),
     priors: Mapping[str, UncertainNumber] | None = None,
     per_axis: bool = False,
+    method: str = "output_error",
     step: float = 0.05,
     segment: float = 10.0,
     validate: bool = True,
@@ -110,6 +110,8 @@ def identify(
         priors: value and deviation beforehand, by name; those of the vehicle file unless given.
         per_axis: whether the inputs push along the six axes (sticks behind a mixer, or wrenches) instead of driving the
             thrusters.
+        method: `output_error`, free runs over segments, or `prediction_error`, a Kalman filter that follows the motion:
+            for dives in waves, in a changing current or on a tether.
         step: of the integration, s.
         segment: length of the segments, s.
         validate: whether to predict each dive from the others.
@@ -120,6 +122,7 @@ def identify(
         BadInput: the plant is no vehicle, a log lacks something, or inputs are of another number than thrusters or
             axes.
     """
+    checks.choice("method", method, METHODS)
     checks.positive("step", step, "s")
     checks.positive("segment", segment, "s")
     if not logs:
@@ -143,11 +146,11 @@ def identify(
     model = model_of(prior_vehicle(plant, per_axis), parameters)
     count = len(parameters)
     pieces = pieces_of(dives) if validate else []
-    estimates = Estimates(model, parameters, segment, 1 + len(pieces), say, checkpoint)
+    estimates = Estimates(model, parameters, segment, method, 1 + len(pieces), say, checkpoint)
     say("first estimate")
     begin = estimates.nearest_begin(dives)
     estimate = estimates.of("all dives", dives, begin)
-    scores = scores_of(model, segments_of(dives, segment), step, estimate)
+    scores = scores_of(model, step, estimate)
     parts, validation = None, ()
     if validate:
         parts, validation = cross_validated(model, pieces, estimate, count, estimates)

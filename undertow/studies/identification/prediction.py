@@ -13,7 +13,7 @@ from undertow.core.numerics.rotations import (
     quaternion_product,
     rotation_from_quaternion,
 )
-from undertow.studies.identification.identified_vehicle import IdentifiedVehicle, MotionState
+from undertow.studies.identification.identified_vehicle import IdentifiedVehicle, MotionState, Push
 
 
 class Sensing(NamedTuple):
@@ -35,6 +35,8 @@ def residuals(
 ) -> Float[Array, "length 13"]:
     """Predicted less measured, at the times of the samples; m, rad, m/s, rad/s, m. Without a sample: any number.
 
+    Where a filter follows the motion: its white innovations, which begin at the guess.
+
     Args:
         vehicle: with the numbers of the estimate.
         sensing: what lies between it and the log.
@@ -42,6 +44,8 @@ def residuals(
         segment: one of `Segments`.
         step: s.
     """
+    if segment.gains is not None:
+        return innovations(vehicle, sensing, segment, step)
     states, rates_before, rates_after = motion(vehicle, sensing, change, segment, step)
     before = jax.tree.map(lambda leaf: leaf[:-1], states)
     after = jax.tree.map(lambda leaf: leaf[1:], states)
@@ -60,32 +64,95 @@ def motion(
     Inputs jump from step to step, so that the derivative at the end of one is not that at the begin of the next.
     Actuators are left out.
     """
+    guess, inputs = begin(vehicle, sensing, segment, step)
+    start = moved(guess, change)
+
+    def advance(x: MotionState, u):
+        after, rate_before, rate_after = one_step(vehicle, sensing, x, u, step)
+        return after, tuple(one._replace(actuators=()) for one in (after, rate_before, rate_after))
+
+    _, (after, rates_before, rates_after) = jax.lax.scan(advance, start, inputs)
+    first = start._replace(actuators=())
+    states = jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after)
+    return states, rates_before, rates_after
+
+
+def innovations(vehicle: IdentifiedVehicle, sensing: Sensing, segment: Any, step) -> Float[Array, "length 13"]:
+    """What each measurement says that a filter with given gains did not expect, whitened; see `Segments`."""
+    start, inputs = begin(vehicle, sensing, segment, step)
+
+    def advance(x: DisturbedMotion, row):
+        u, measured, gain, whitening = row
+        after, difference = step_and_difference(vehicle, sensing, x, u, measured, segment.push_kept, step)
+        return disturbed(after, -matvec(gain, difference)), matvec(whitening, difference)
+
+    measured = (segment.values, segment.offsets, segment.spreads)
+    first = DisturbedMotion(start, jnp.zeros(6))
+    _, white = jax.lax.scan(advance, first, (inputs, measured, segment.gains, segment.whitening))
+    return white
+
+
+class DisturbedMotion(NamedTuple):
+    """A motion, and what pushes the vehicle besides its thrusters: a further acceleration, m/s^2 and rad/s^2, (6,)."""
+
+    motion: MotionState
+    push: Float[Array, "6"]
+
+
+def step_and_difference(
+    vehicle: IdentifiedVehicle, sensing: Sensing, x: DisturbedMotion, u, measured, push_kept, step
+) -> tuple[DisturbedMotion, Float[Array, "13"]]:
+    """The state after a step, of whose push a share is kept, and predicted less measured in the step."""
+    after, rate_before, rate_after = one_step(vehicle, sensing, x.motion, u, step, x.push)
+    plain, plain_after = x.motion._replace(actuators=()), after._replace(actuators=())
+    curve = lambda rule, rate: jax.tree.map(
+        lambda a, b, slope: rule(a, b, step * slope), plain, plain_after, rate._replace(actuators=())
+    )
+    early, late = curve(early_curve, rate_before), curve(late_curve, rate_after)
+    values, offsets, spreads = measured
+    difference = _differences(plain, plain_after, early, late, values, offsets, spreads, sensing.rate_bias, step)
+    return DisturbedMotion(after, push_kept * x.push), difference
+
+
+def begin(vehicle: IdentifiedVehicle, sensing: Sensing, segment: Any, step) -> tuple[MotionState, Any]:
+    """The guessed motion at the begin of a segment, with actuators that have run in, and the inputs from then on."""
     inputs = delayed(segment.inputs, sensing.command_delay / step)
-    length = segment.values.shape[0]
-    before = segment.inputs.shape[0] - length
+    before = segment.inputs.shape[0] - segment.values.shape[0]
 
     def run_in(state, u):
         return vehicle.actuators_after(state, u, step), None
 
     actuators, _ = jax.lax.scan(run_in, vehicle.actuation.initial_state(), inputs[:before])
-
-    def advance(x: MotionState, u):
-        rate_before = vehicle.dynamics(x, u, sensing.current)
-        x = vehicle.advance(x, u, sensing.current, step)
-        rate_after = vehicle.dynamics(x, u, sensing.current)
-        return x, tuple(one._replace(actuators=()) for one in (x, rate_before, rate_after))
-
     guess = segment.start
-    start = MotionState(
-        position=guess[:3] + change[:3],
-        attitude=quaternion_product(guess[3:7], quaternion_of_turn(change[3:6])),
-        nu=guess[7:] + change[6:],
-        actuators=actuators,
+    return MotionState(guess[:3], guess[3:7], guess[7:], actuators), inputs[before:]
+
+
+def one_step(vehicle: IdentifiedVehicle, sensing: Sensing, x: MotionState, u, step, push: Push = 0.0):
+    """The state after a step, and the derivatives at its begin and at its end."""
+    rate_before = vehicle.dynamics(x, u, sensing.current, push)
+    after = vehicle.advance(x, u, sensing.current, step, push)
+    return after, rate_before, vehicle.dynamics(after, u, sensing.current, push)
+
+
+def moved(x: MotionState, change: Float[Array, "12"]) -> MotionState:
+    """A motion with a change: m, rad (a turn in body axes), m/s, rad/s."""
+    return x._replace(
+        position=x.position + change[:3],
+        attitude=quaternion_product(x.attitude, quaternion_of_turn(change[3:6])),
+        nu=x.nu + change[6:],
     )
-    _, (after, rates_before, rates_after) = jax.lax.scan(advance, start, inputs[before:])
-    first = start._replace(actuators=())
-    states = jax.tree.map(lambda one, others: jnp.concatenate([one[None], others]), first, after)
-    return states, rates_before, rates_after
+
+
+def disturbed(x: DisturbedMotion, change: Float[Array, "18"]) -> DisturbedMotion:
+    """The same with a change of the motion, and of the push."""
+    return DisturbedMotion(moved(x.motion, change[:12]), x.push + change[12:])
+
+
+def between(x: DisturbedMotion, other: DisturbedMotion) -> Float[Array, "18"]:
+    """The small change that leads from one to another: the inverse of `disturbed`."""
+    turn = attitude_error(other.motion.attitude, x.motion.attitude)
+    moves = (other.motion.position - x.motion.position, turn, other.motion.nu - x.motion.nu)
+    return jnp.concatenate([*moves, other.push - x.push])
 
 
 def delayed(inputs: Float[Array, "steps N"], steps: Float[Array, ""]) -> Float[Array, "steps N"]:

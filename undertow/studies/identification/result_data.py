@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from undertow.core.measurement import BODY_AXES
 from undertow.studies.identification.dive import RESIDUALS, SENSOR_OF_RESIDUAL
 from undertow.studies.identification.identify import Identification, Validation
-from undertow.studies.identification.segments import segments_of
+from undertow.studies.identification.kalman_gains import Disturbance
 from undertow.studies.identification.uncertainty import LEVEL, ParameterInterval
 from undertow.studies.identification.validation import HORIZONS, PredictionErrors, Whiteness, whiteness
 
@@ -35,16 +36,23 @@ def as_data(identification: Identification) -> dict[str, Any]:
             name: float(noise) for name, noise in zip(RESIDUALS, estimate.noise, strict=True) if np.isfinite(noise)
         },
         "residuals": {name: test._asdict() | {"is_white": test.is_white} for name, test in _whiteness(identification)},
+        "method": "output_error" if estimate.disturbance is None else "prediction_error",
+        "disturbance": {} if estimate.disturbance is None else _disturbance_data(estimate.disturbance),
         "iterations": estimate.iterations,
         "converged": estimate.converged,
         "findings": list(identification.findings),
     }
 
 
+def _disturbance_data(disturbance: Disturbance) -> dict[str, Any]:
+    """Standard deviation of the acceleration by axis, m/s^2 and rad/s^2, and correlation time, s."""
+    deviations = dict(zip(BODY_AXES, disturbance.deviations.tolist(), strict=True))
+    return {"deviations": deviations, "correlation_time": disturbance.correlation_time}
+
+
 def _whiteness(identification: Identification) -> Iterator[tuple[str, Whiteness]]:
     """Of the residuals of each sensor, at its samples."""
-    dives = identification.dives
-    segments = segments_of(dives, identification.segment)
+    segments = identification.estimate.segments
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL] > 0
     length = segments.values.shape[1]
     inputs = segments.inputs[:, -length:]

@@ -22,6 +22,10 @@ class Segments(NamedTuple):
         start: guess of position, quaternion, nu, shape (S, 13).
         dive: number of the dive, shape (S,).
         first: step of the dive at which the segment begins, shape (S,).
+        gains: of a filter that follows the motion, from residuals to a change of the motion and of what pushes it, (S,
+            length, 18, 13); None where predictions run freely.
+        whitening: makes the residuals of the filter white noise of variance 1, (S, length, 13, 13).
+        push_kept: share of a push that is left after a step, (S,).
     """
 
     inputs: np.ndarray
@@ -32,6 +36,9 @@ class Segments(NamedTuple):
     start: np.ndarray
     dive: np.ndarray
     first: np.ndarray
+    gains: np.ndarray | None = None
+    whitening: np.ndarray | None = None
+    push_kept: np.ndarray | None = None
 
 
 def segments_of(dives: Sequence[Dive], length: float) -> Segments:

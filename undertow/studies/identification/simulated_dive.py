@@ -1,5 +1,6 @@
 """Logs of simulated dives, of a vehicle whose numbers are known: what an identification is tested with."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -7,12 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.signal import lfilter
 
 from undertow.core.numerics.rotations import euler_from_rotation, rotation_from_quaternion
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
 from undertow.physics.plants.hybrid_vehicle import HybridVehicle
-from undertow.studies.identification.identified_vehicle import IdentifiedVehicle, prior_vehicle
+from undertow.studies.identification.identified_vehicle import AbstractActuation, IdentifiedVehicle, prior_vehicle
 from undertow.studies.identification.prediction import Sensing, early_curve, late_curve, motion, on_cubic
 from undertow.studies.identification.segments import Segments
 
@@ -59,11 +61,25 @@ def telegraph_dive(
         duration: s.
         options: see `simulated_log`.
     """
-    generator = np.random.default_rng(seed)
+    vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
+    return telegraph_log(plant, vehicle, np.random.default_rng(seed), duration, **options)
+
+
+def telegraph_log(
+    plant: HybridVehicle, vehicle: IdentifiedVehicle, generator: np.random.Generator, duration: float, **options: Any
+) -> Log:
+    """The same for a vehicle whose numbers are given as a whole.
+
+    Args:
+        plant: whose thrusters it has, at 16 V.
+        vehicle: see there.
+        generator: of everything random.
+        duration: s.
+        options: see `simulated_log`.
+    """
     inverse = np.linalg.pinv(np.asarray(plant.thruster_matrix))
     thrust = telegraph_wrenches(generator, duration, AMPLITUDES) @ inverse.T
     volts = np.clip(_VOLTS * np.sign(thrust) * np.sqrt(np.abs(thrust)), -16, 16)
-    vehicle = prior_vehicle(plant).with_values({name: jnp.asarray(value) for name, value in truth.items()})
     return simulated_log(vehicle, volts, generator, **options)
 
 
@@ -97,6 +113,7 @@ def simulated_log(
     sensors: Mapping[str, SensorSpecification] = SENSORS,
     current: tuple[float, float, float] = (0.0, 0.0, 0.0),
     command_delay: float = 0.0,
+    disturbance: np.ndarray | None = None,
     depth: float = 5.0,
     name: str = "simulated dive",
 ) -> Log:
@@ -109,10 +126,14 @@ def simulated_log(
         sensors: by signal.
         current: of the water, world, m/s.
         command_delay: s.
+        disturbance: force and moment on the body that no log has, N and N m, (steps, 6); None for none.
         depth: at the begin, m.
         name: of the log.
     """
     held = np.repeat(inputs[::5], 5, axis=0)[: len(inputs)]
+    if disturbance is not None:
+        vehicle = dataclasses.replace(vehicle, actuation=_DisturbedActuation(vehicle.actuation))
+        held = np.hstack([held, disturbance])
     truth = _motion(vehicle, jnp.asarray(command_delay), jnp.asarray(current), jnp.asarray(held), depth)
     curves = {name: _Curve(*map(np.asarray, curve)) for name, curve in truth.items()}
     duration = _FINE * len(inputs)
@@ -127,9 +148,48 @@ def simulated_log(
         values = values + sensor.noise * generator.standard_normal(values.shape)
         columns, unit = _COLUMNS[signal]
         signals[signal] = Series(stamps, values, columns, unit)
-    numbers = tuple(f"T{i + 1}" for i in range(held.shape[1]))
-    signals["input"] = Series(time[:-1:5], held[::5], numbers, "V")
+    numbers = tuple(f"T{i + 1}" for i in range(inputs.shape[1]))
+    signals["input"] = Series(time[:-1:5], inputs[::5], numbers, "V")
     return Log(signals, name, "undertow")
+
+
+def random_wrenches(
+    generator: np.random.Generator, duration: float, deviations: np.ndarray, correlation_time: float
+) -> np.ndarray:
+    """Forces and moments on the body that vary at random, as a tether or eddies do: Gauss-Markov, (steps, 6).
+
+    Args:
+        generator: of random numbers.
+        duration: s.
+        deviations: standard deviations of the six axes, N and N m.
+        correlation_time: s.
+    """
+    steps = round(duration / _FINE)
+    kept = np.exp(-_FINE / correlation_time)
+    pushes = np.sqrt(1 - kept**2) * generator.standard_normal((steps, 6))
+    pushes[0] = generator.standard_normal(6)
+    return deviations * lfilter([1.0], [1.0, -kept], pushes, axis=0)
+
+
+class _DisturbedActuation(AbstractActuation):
+    """Thrusters, and a force and moment that stand behind their inputs."""
+
+    thrusters: AbstractActuation
+
+    def initial_state(self):
+        return self.thrusters.initial_state()
+
+    def dynamics(self, state, u):
+        return self.thrusters.dynamics(state, u[:-6])
+
+    def wrench(self, state, u, nu):
+        return self.thrusters.wrench(state, u[:-6], nu) + u[-6:]
+
+    def solved(self, state, u, step):
+        return self.thrusters.solved(state, u[:-6], step)
+
+    def with_values(self, values):
+        return _DisturbedActuation(self.thrusters.with_values(values))
 
 
 class _Curve(NamedTuple):
