@@ -20,6 +20,7 @@ from undertow.studies.identification.cross_validation import (
     pieces_of,
     predicted,
     with_nuisances,
+    with_published,
 )
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.estimates import Estimates, Say
@@ -152,6 +153,8 @@ def identify(
     if validate:
         parts, validation = cross_validated(model, pieces, estimate, count, estimates)
     validation += tuple(predicted(model, estimate.z[:count], dive.dive) for dive in only_predicted)
+    if not per_axis:  # no gains along the axes are published
+        validation = with_published(validation, built, parameters)
     say("judging how sure it is")
     uncertainty = uncertainty_of(estimate.information, scores, step, with_nuisances(parts, estimate.z, count))
     return Identification(
