@@ -8,6 +8,7 @@ from undertow.logs import frames
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
+from undertow.physics.thrusters.commanded_thrust import commanded_thrust
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.studies.identification.log_check import check_dive
@@ -174,6 +175,18 @@ def test_nothing_makes_the_checks_fail(change):
         assert check(Log({**log.signals, name: spoiled[name]}, "spoiled", "CSV")).findings != ()
     for name in set(log.signals) - {"input"}:
         assert check(without(log, *(set(log.signals) - {"input", name}))).findings != ()
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("lag", [0.01, 0.02])
+def test_inputs_of_quick_thrusters_are_not_said_to_be_late(lag):
+    """At steps of 0.05 s the integration would make 20 ms of lag 116 ms, and nothing of 10 ms."""
+    with in_precision("float64"):
+        plant = hybrid_vehicle(bluerov2_heavy(), commanded_thrust(time_constant=lag))
+        log = telegraph_dive(plant, {}, 0, DURATION)
+        checked = check_dive(log, log["input"], plant)
+    assert checked.findings == ()
+    assert checked.offsets["inputs"].delay == pytest.approx(0.0, abs=0.02)
 
 
 @pytest.mark.full

@@ -24,13 +24,13 @@ from undertow.report.answers.identification_answer import answer_of_identificati
 from undertow.scenario.reading import dump
 from undertow.scenario.vehicle_file import read_vehicle
 from undertow.studies.identification.dive import dive_of
-from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of
+from undertow.studies.identification.free_parameters import FreeParameter, axis_parameters, chosen, parameters_of
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.simulated_dive import AMPLITUDES, simulated_log, telegraph_dive, telegraph_wrenches
-from undertow.studies.identification.validation import whiteness
+from undertow.studies.identification.validation import prediction_errors, whiteness
 
 pytestmark = pytest.mark.full
 
@@ -227,6 +227,7 @@ def test_a_log_of_a_much_heavier_vehicle_is_not_believed(plant):
         ({"priors": {"mass": "heavy"}}, "must be text such as"),
         ({"priors": {"lag": "-1 +- 0.1"}}, "must be positive"),
         ({"step": 0.0}, "`step` must be positive"),
+        ({"step": 0.3}, "`step` must be at most 0.2 s, as the thrusters have a lag of 0.1 s"),
         ({"per_axis": True}, "must have 6 inputs, one for each of the axes"),
     ],
 )
@@ -234,6 +235,16 @@ def test_mistakes_are_one_line(plant, options, message):
     with pytest.raises(ut.BadInput, match=message) as caught:
         ut.identify(SCENARIO, dive_log(plant, 1, 5.0), **options)
     assert "\n" not in str(caught.value)
+
+
+def test_a_free_run_that_diverges_fits_nothing(plant):
+    """What is finite before it diverges is no fit."""
+    log = dive_log(plant, 3, 12.0)
+    with in_precision("float64"):
+        drag = FreeParameter("quadratic_damping.surge", "N s^2/m^2", 1e6, 1.0)
+        model = model_of(prior_vehicle(plant), [drag])
+        errors = prediction_errors(model, np.zeros(1), dive_of(log, log["input"], STEP))
+    assert errors.fit["u"] == -np.inf
 
 
 def test_correlation_of_residuals_is_that_of_a_first_order_process():

@@ -7,7 +7,12 @@ from typing import Any
 import numpy as np
 
 from undertow.core.atomic_io import write_whole
-from undertow.report.answers.identification_answer import answer_of_identification, combination_in_words, in_words
+from undertow.report.answers.identification_answer import (
+    answer_of_identification,
+    combination_in_words,
+    in_words,
+    mean_fits,
+)
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.identification import Series, free_run_figure, intervals_figure
@@ -143,8 +148,24 @@ def _fits(data: Mapping[str, Any]) -> Html:
         for whose, label in (("identified", "identified"), ("prior", "vehicle file")):
             fits = validation[whose]["free_run_fit"]
             rows.append((validation["name"], label, *(number(fits.get(axis), 2) for axis in AXES)))
+    rows += _mean_rows(data)
     head = ("fit of the free run, %", "model", *AXES)
     return table(head, rows, numeric=range(2, 2 + len(AXES)))
+
+
+def _mean_rows(data: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """Mean fits beside those of published parameter sets; none for a vehicle without."""
+    if not data["published"]:
+        return []
+    is_unseen = any(validation["is_unseen"] for validation in data["validation"])
+    label = "mean of the dives that no estimate used" if is_unseen else "mean"
+    fits = mean_fits(data)
+    of_models = {
+        "identified": {axis: own for axis, (own, _) in fits.items()},
+        "vehicle file": {axis: before for axis, (_, before) in fits.items()},
+    }
+    of_models |= {f"published: {name}": of_set for name, of_set in data["published"].items()}
+    return [(label, model, *(number(row.get(axis), 2) for axis in AXES)) for model, row in of_models.items()]
 
 
 def _ahead(data: Mapping[str, Any]) -> Html:

@@ -1,15 +1,22 @@
 """Each dive predicted from the others, and dives that were not used from all."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
+from undertow.physics.plants.hybrid_vehicle import HybridVehicle
+from undertow.scenario.build import Built
+from undertow.scenario.parameter_sets import published_plants
+from undertow.scenario.vehicle_parameters import is_outside
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.estimates import Estimates
 from undertow.studies.identification.fit import Fit
-from undertow.studies.identification.model import IdentificationModel
+from undertow.studies.identification.free_parameters import FreeParameter
+from undertow.studies.identification.identified_vehicle import prior_vehicle
+from undertow.studies.identification.model import IdentificationModel, model_of
 from undertow.studies.identification.validation import PredictionErrors, prediction_errors
 
 _PARTS = 4  # into which a single dive is divided
@@ -24,12 +31,14 @@ class Validation(NamedTuple):
         identified: errors of the model from the other dives.
         prior: errors of the vehicle file.
         is_unseen: whether no estimate used it, not even that of the intervals.
+        published: errors of the published parameter sets of the vehicle, by name.
     """
 
     dive: Dive
     identified: PredictionErrors
     prior: PredictionErrors
     is_unseen: bool = False
+    published: Mapping[str, PredictionErrors] = MappingProxyType({})
 
     @property
     def name(self) -> str:
@@ -68,6 +77,29 @@ def predicted(model, z: np.ndarray, dive: Dive) -> Validation:
     """How the estimate from all dives predicts another one."""
     prior = prediction_errors(model, np.zeros(len(z)), dive)
     return Validation(dive, prediction_errors(model, z, dive), prior, is_unseen=True)
+
+
+def with_published(
+    validation: Sequence[Validation], built: Built, parameters: Sequence[FreeParameter]
+) -> tuple[Validation, ...]:
+    """The same, with how the published parameter sets of the vehicle predict each dive.
+
+    Args:
+        validation: see there.
+        built: scenario of the vehicle.
+        parameters: that are free, of which those of the thrusters have the numbers of the prior for every set.
+    """
+    of_thrusters = [parameter for parameter in parameters if is_outside(parameter.name)]
+    models = {
+        name: model_of(prior_vehicle(plant), of_thrusters)
+        for name, plant in published_plants(built).items()
+        if isinstance(plant, HybridVehicle)
+    }
+    at_prior = np.zeros(len(of_thrusters))
+    return tuple(
+        one._replace(published={name: prediction_errors(model, at_prior, one.dive) for name, model in models.items()})
+        for one in validation
+    )
 
 
 def parts_of(dive: Dive, number: int) -> list[Dive]:

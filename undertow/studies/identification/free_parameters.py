@@ -177,16 +177,24 @@ def chosen(
     return [_with_prior(known[name], priors[name]) if name in priors else known[name] for name in names]
 
 
+def shortest_lag(plant: HybridVehicle) -> float | None:
+    """Time constant of the quickest thruster, s; None of thrusters without a lag, or with an unknown one."""
+    time_constant = plant.thruster.actuator_model(plant.inputs(), False).time_constant()
+    if time_constant is None or not np.all(np.asarray(time_constant) > 0):
+        return None
+    return float(np.min(time_constant))
+
+
 def resolved_by(step: float, plant: HybridVehicle, parameters: Sequence[FreeParameter]) -> list[FreeParameter]:
     """The same parameters, with a lag of the thrusters no shorter, and no surer, than a step of the integration allows.
 
     The fourth-order step multiplies what a lag leaves of a jump by the first terms of the series of an exponential. An
     estimate makes up for the difference with another lag.
     """
-    time_constant = plant.thruster.actuator_model(plant.inputs(), False).time_constant()
-    if time_constant is None or not np.all(np.asarray(time_constant) > 0):
+    shortest = shortest_lag(plant)
+    if shortest is None:
         return list(parameters)
-    steps = step / float(np.min(time_constant))
+    steps = step / shortest
     least, left = _SHORTEST_LAG * steps, math.exp(-steps)
     by_series = 1 - steps + steps**2 / 2 - steps**3 / 6 + steps**4 / 24
     resolution = abs(by_series - left) / (steps * left)  # change of the logarithm of the lag with the same effect

@@ -20,6 +20,7 @@ from undertow.studies.identification.cross_validation import (
     pieces_of,
     predicted,
     with_nuisances,
+    with_published,
 )
 from undertow.studies.identification.dive import Dive
 from undertow.studies.identification.estimates import METHODS, Estimates, Say
@@ -30,6 +31,7 @@ from undertow.studies.identification.free_parameters import (
     chosen_in,
     parameters_of,
     resolved_by,
+    shortest_lag,
 )
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, model_of
@@ -42,6 +44,8 @@ from undertow.studies.identification.uncertainty import (
     undetermined,
 )
 from undertow.studies.identification.validation import AXES
+
+_LONGEST_STEP = 2.0  # lags of the thrusters; the fourth-order integration doubles them there, and is unstable at 2.79
 
 
 class Identification(NamedTuple):
@@ -119,8 +123,8 @@ def identify(
         say: called with the current stage.
 
     Raises:
-        BadInput: the plant is no vehicle, a log lacks something, or inputs are of another number than thrusters or
-            axes.
+        BadInput: the plant is no vehicle, a log lacks something, inputs are of another number than thrusters or axes,
+            or the step is too long for the lag of the thrusters.
     """
     checks.choice("method", method, METHODS)
     checks.positive("step", step, "s")
@@ -129,6 +133,10 @@ def identify(
         raise BadInput("logs", "be given", "none")
     plant = vehicle_of(built)
     known = parameters_of(plant)
+    lag = shortest_lag(plant)
+    if lag is not None and not per_axis and step > _LONGEST_STEP * lag:
+        must = f"be at most {_LONGEST_STEP * lag:.3g} s, as the thrusters have a lag of {lag:.3g} s"
+        raise BadInput("step", must, step, hint="A step as long as the lag makes it 2 % longer")
     if per_axis:
         of_thrusters = ("thruster_gain", "reverse_gain", "lag", "command_delay")
         known = {name: p for name, p in known.items() if not name.startswith(of_thrusters)} | axis_parameters()
@@ -155,6 +163,8 @@ def identify(
     if validate:
         parts, validation = cross_validated(model, pieces, estimate, count, estimates)
     validation += tuple(predicted(model, estimate.z[:count], dive.dive) for dive in only_predicted)
+    if not per_axis:  # no gains along the axes are published
+        validation = with_published(validation, built, parameters)
     say("judging how sure it is")
     uncertainty = uncertainty_of(estimate.information, scores, step, with_nuisances(parts, estimate.z, count))
     return Identification(

@@ -12,7 +12,7 @@ from undertow.physics.plants.hybrid_vehicle import HybridVehicle
 from undertow.studies.identification.clock_offset import ClockOffset
 from undertow.studies.identification.dive import Dive, dive_of, measured_by
 from undertow.studies.identification.finding import SEVERITIES, DiveCheck, LogFinding
-from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of
+from undertow.studies.identification.free_parameters import axis_parameters, chosen, parameters_of, shortest_lag
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.input_check import axis_findings, input_findings
 from undertow.studies.identification.input_signs import InputGains, input_gains
@@ -20,6 +20,7 @@ from undertow.studies.identification.motion_check import is_in_degrees, rates_fi
 from undertow.studies.identification.stream_check import outlier_findings, sensor_series, stream_findings
 
 _STEP = 0.05  # s
+_MOST_PARTS = 10  # of such a step
 _TURNED = 0.5  # rad, from which on a heading has surely changed
 
 
@@ -51,7 +52,8 @@ def check_dive(
         findings += _attitude_findings(series["attitude"], measured, offsets)
     if not any(finding.concern == "log" and finding.severity == "refused" for finding in findings):
         findings += outlier_findings(measured)
-        dive = _dive(log, inputs, {finding.name for finding in findings if finding.severity == "left_out"})
+        step = _STEP if vehicle is None or per_axis else _step_of(vehicle)
+        dive = _dive(log, inputs, step, {finding.name for finding in findings if finding.severity == "left_out"})
         gains = None if dive is None or vehicle is None else _gains(vehicle, dive, inputs, per_axis)
         if gains is not None:
             findings += gains.findings
@@ -104,10 +106,21 @@ def _heading_findings(attitude: Series, measured: dict) -> Iterator[LogFinding]:
         yield LogFinding("sensor", "position", "left_out", sentence)
 
 
-def _dive(log: LogSignals, inputs: Series, left_out: set[str]) -> Dive | None:
+def _step_of(vehicle: HybridVehicle) -> float:
+    """Step of the check, s: no longer than the lag of the thrusters.
+
+    A longer step of the fourth-order integration makes the answer of the thrusters slower than it is, so that the
+    inputs would seem to come late.
+    """
+    lag = shortest_lag(vehicle)
+    parts = 1 if lag is None else min(_MOST_PARTS, math.ceil(_STEP / lag))
+    return _STEP / parts
+
+
+def _dive(log: LogSignals, inputs: Series, step: float, left_out: set[str]) -> Dive | None:
     """The log on a grid without the sensors that are left out; None where nothing remains."""
     try:
-        dive = dive_of(log, inputs, _STEP)
+        dive = dive_of(log, inputs, step)
     except BadInput:
         return None
     counts = dive.counts.copy()

@@ -31,6 +31,7 @@ def as_data(identification: Identification) -> dict[str, Any]:
             for combination in identification.undetermined
         ],
         "validation": [_validation_data(one, identification.velocities) for one in identification.validation],
+        "published": _published_data(identification),
         "refused_axes": list(identification.refused_axes),
         "noise": {
             name: float(noise) for name, noise in zip(RESIDUALS, estimate.noise, strict=True) if np.isfinite(noise)
@@ -86,10 +87,28 @@ def _validation_data(validation: Validation, velocities: Sequence[str]) -> dict[
     }
 
 
+def _published_data(identification: Identification) -> dict[str, dict[str, float]]:
+    """Mean free-run fit of each published parameter set, %, by axis.
+
+    Over the dives that were not used at all where there are any, otherwise over those left out in turn.
+    """
+    validation = [one for one in identification.validation if one.is_unseen] or identification.validation
+    means = {}
+    for name in validation[0].published if validation else ():
+        fits = [_fits(one.published[name], identification.velocities) for one in validation]
+        axes = dict.fromkeys(axis for fit in fits for axis in fit)
+        means[name] = {axis: float(np.mean([fit[axis] for fit in fits if axis in fit])) for axis in axes}
+    return means
+
+
+def _fits(errors: PredictionErrors, velocities: Sequence[str]) -> dict[str, float]:
+    """Free-run fit of the velocities that were identified and measured, %."""
+    return {axis: value for axis, value in errors.fit.items() if axis in velocities and not math.isnan(value)}
+
+
 def _errors_data(errors: PredictionErrors, velocities: Sequence[str]) -> dict[str, Any]:
     ahead = {
         f"{horizon:g}": {name: float(value) for name, value in zip(RESIDUALS, row, strict=True) if np.isfinite(value)}
         for horizon, row in zip(HORIZONS, errors.ahead, strict=True)
     }
-    fit = {axis: value for axis, value in errors.fit.items() if axis in velocities and not math.isnan(value)}
-    return {"free_run_fit": fit, "rms_ahead": ahead}
+    return {"free_run_fit": _fits(errors, velocities), "rms_ahead": ahead}

@@ -22,7 +22,8 @@ class PredictionErrors(NamedTuple):
 
     Attributes:
         fit: 100 (1 - rms of the error / standard deviation) of a free run over the whole dive, in %, by axis of `AXES`;
-            NaN where nothing was measured. 100 is perfect, and 0 no better than the mean.
+            NaN where nothing was measured, -infinity where the free run diverges. 100 is perfect, and 0 no better than
+            the mean.
         ahead: rms of the error after each of `HORIZONS`, (3, 13), in the units of residuals.
         free_run: residuals of the free run, (steps, 13); NaN without a sample.
     """
@@ -52,14 +53,20 @@ def prediction_errors(model: IdentificationModel, z: np.ndarray, dive: Dive) -> 
     unknowns = np.concatenate([z, np.zeros(len(NUISANCES))])
     only = whole(dive)
     free_run = _measured_only(_residuals(model, unknowns, only, dive.step), only)[0]
+    is_measured = only.counts[0][:, SENSOR_OF_RESIDUAL] > 0
     fit = {}
     for axis in AXES:
-        error = free_run[:, RESIDUALS.index(axis)]
-        values = whole_values(dive, axis)[np.isfinite(error)]
-        error = error[np.isfinite(error)]
-        spread = float(values.std()) if len(values) else 0.0
-        fit[axis] = 100 * (1 - float(np.sqrt((error**2).mean())) / spread) if spread > 0 else float("nan")
+        there = is_measured[:, RESIDUALS.index(axis)]
+        fit[axis] = _fit(free_run[there, RESIDUALS.index(axis)], whole_values(dive, axis)[there])
     return PredictionErrors(fit, _ahead(model, unknowns, dive), free_run)
+
+
+def _fit(error: np.ndarray, values: np.ndarray) -> float:
+    """100 (1 - rms of the error / standard deviation of the values), %."""
+    spread = float(values.std()) if len(values) else 0.0
+    if spread == 0:
+        return float("nan")
+    return 100 * (1 - float(np.sqrt((error**2).mean())) / spread) if np.isfinite(error).all() else float("-inf")
 
 
 def _ahead(model: IdentificationModel, unknowns: np.ndarray, dive: Dive) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Training and held-out runs: seeds, sizes of the disturbance, and plant variants beside the nominal model."""
 
-import inspect
-import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core import catalogue, checks
+from undertow.core import checks
 from undertow.core.contracts import AbstractPlant
 from undertow.core.errors import BadInput
 from undertow.core.numerics.random_keys import key_of_seed
-from undertow.scenario import factory
 from undertow.scenario.build import Built
+from undertow.scenario.parameter_sets import parameter_sets, plant_with_set
 from undertow.scenario.reading import Text
 from undertow.scenario.sampled_plants import sampled_plants
 from undertow.scenario.schema import TrainingRuns
@@ -86,7 +84,8 @@ def trials(
     if has_deviations(text):
         plants = sampled_plants(built, first_seed, runs.vehicles)
     else:
-        plants = {name: _plant(text, built, name) for name in names or published[:1] or ("",)}
+        used = names or published[:1] or ("",)
+        plants = {name: plant_with_set(built, name) if name else built.closed_loop.plant for name in used}
     pairs = [(name, seed) for seed in range(runs.seeds) for name in plants]
     return PlantVariants(
         plants=stacked([plants[name] for name, _ in pairs]),
@@ -104,32 +103,9 @@ def joined(variant_sets: Sequence[PlantVariants]) -> PlantVariants:
     return PlantVariants(plants, keys, sizes, tuple(name for variants in variant_sets for name in variants.variants))
 
 
-def parameter_sets(built: Built) -> tuple[str, ...]:
-    """Published parameter sets of the scenario's vehicle, its own first; empty where there is only one."""
-    vehicle = built.resolved["plant"].get("vehicle")
-    if not isinstance(vehicle, dict) or "parameters" not in vehicle:
-        return ()
-    function = catalogue.names("vehicles").get(vehicle["kind"])
-    if function is None or "parameters" not in inspect.signature(function).parameters:
-        return ()
-    names = tuple(getattr(sys.modules[function.__module__], "PARAMETERS", ()))
-    scenario_set = vehicle["parameters"]
-    return (scenario_set, *(name for name in names if name != scenario_set)) if scenario_set in names else ()
-
-
 def stacked(plants: Sequence[AbstractPlant]) -> AbstractPlant:
     """Plants of one kind as one plant with stacked arrays; names and sources are those of the first."""
     numbers = [jax.tree.leaves(eqx.filter(plant, eqx.is_array)) for plant in plants]
     tree = jax.tree.structure(eqx.filter(plants[0], eqx.is_array))
     together = jax.tree.unflatten(tree, [jnp.stack(leaves) for leaves in zip(*numbers, strict=True)])
     return eqx.combine(together, eqx.filter(plants[0], eqx.is_array, inverse=True))
-
-
-def _plant(text: Text, built: Built, name: str) -> AbstractPlant:
-    """The scenario's plant with another parameter set."""
-    if not name or name == built.resolved["plant"]["vehicle"]["parameters"]:
-        return built.closed_loop.plant
-    plant_options = dict(built.scenario.plant.model_dump())
-    vehicle = plant_options.get("vehicle", built.resolved["plant"]["vehicle"])
-    plant_options["vehicle"] = {**({"kind": vehicle} if isinstance(vehicle, str) else vehicle), "parameters": name}
-    return factory.make("plants", plant_options, text.folder)[0]
