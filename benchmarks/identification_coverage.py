@@ -23,18 +23,15 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
 from undertow.studies.identification.dive import dive_of
-from undertow.studies.identification.estimates import METHODS
+from undertow.studies.identification.estimates import METHODS, Estimates
 from undertow.studies.identification.fit import scores_of
 from undertow.studies.identification.free_parameters import chosen, parameters_of, resolved_by
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
-from undertow.studies.identification.output_error import fit
-from undertow.studies.identification.prediction_error import filter_fit
-from undertow.studies.identification.segments import segments_of
 from undertow.studies.identification.simulated_dive import random_wrenches, telegraph_log
 from undertow.studies.identification.uncertainty import uncertainty_of
-from undertow.studies.identification.weak_form import first_estimate
 
+SEGMENT = 10.0  # s
 PRIOR = 0.3  # deviations beforehand, as a share of the usual ones; three times that is another vehicle
 DISTURBANCE = np.repeat([4.0, 0.4], 3)  # N and N m, standard deviations
 CORRELATION_TIME = 2.0  # s, of the disturbance
@@ -77,12 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
         pushes = random_wrenches(generator, duration, DISTURBANCE, CORRELATION_TIME) if arguments.disturbed else None
         log = telegraph_log(plant, vehicle, generator, duration, current=current, disturbance=pushes)
         dive = dive_of(log, log["input"], step)
-        segments = segments_of([dive], 10.0)
-        begin = np.zeros(len(unknowns.least()))
-        begin[: len(parameters)] = first_estimate(prior, parameters, [dive]).z
-        estimate = fit(model, segments, step, begin, unknowns.least())
-        if arguments.method == "prediction_error":
-            estimate = filter_fit(model, segments, step, estimate.z, unknowns.least(), estimate.noise)
+        estimates = Estimates(model, parameters, SEGMENT, arguments.method, 1, lambda stage: None)
+        estimate = estimates.of("dive", [dive], estimates.nearest_begin([dive]))
         uncertainty = uncertainty_of(estimate.information, scores_of(model, step, estimate), step)
         intervals = uncertainty.intervals(parameters, estimate.z)
         values = [parameter.value(z) for parameter, z in zip(parameters, truth, strict=True)]

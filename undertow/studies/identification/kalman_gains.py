@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.model import IdentificationModel
 from undertow.studies.identification.prediction import DisturbedMotion, begin, between, disturbed, step_and_difference
 from undertow.studies.identification.segments import START_DEVIATION, Segments
@@ -48,6 +49,7 @@ class FilterRun(NamedTuple):
         innovations: predicted less measured, (S, length, 13); 0 without a sample.
         transitions: of a change of the state over a step, (S, length, 18, 18).
         pushes: estimated at the begin of the step, m/s^2 and rad/s^2, (S, length, 6).
+        offsets: of the samples after the begin of the step, as a share of it, (S, length, 13).
     """
 
     gains: Any
@@ -55,6 +57,7 @@ class FilterRun(NamedTuple):
     innovations: Any
     transitions: Any
     pushes: Any
+    offsets: Any
 
 
 def with_filter(
@@ -98,9 +101,10 @@ def _filter_runs(model: IdentificationModel, z, segments: Segments, weights, dis
                 return between(after, DisturbedMotion(motion, kept * begun.push))
 
             transition = jax.jacfwd(change_after)(jnp.zeros(18))
-            update = _updated(transition, covariance, weight, disturbance, kept)
+            offsets = measured[1][jnp.asarray(SENSOR_OF_RESIDUAL)]
+            update = _updated(transition, covariance, weight, offsets, disturbance, kept)
             corrected = disturbed(after, -update.gain @ innovation)
-            done = FilterRun(update.gain, update.whitening, innovation, transition, x.push)
+            done = FilterRun(update.gain, update.whitening, innovation, transition, x.push, offsets)
             return (corrected, update.covariance), done
 
         measured = (segment.values, segment.offsets, segment.spreads)
@@ -116,26 +120,31 @@ def _first_covariance(disturbance: Disturbance) -> Float[Array, "18 18"]:
 
 
 class _Update(NamedTuple):
+    measured: Float[Array, "13 18"]  # from a change of the state at the begin of the step to that of the residuals
     gain: Float[Array, "18 13"]
     whitening: Float[Array, "13 13"]
     covariance: Float[Array, "18 18"]
     log_determinant: Float[Array, ""]  # of the covariance of the innovation
 
 
-def _updated(transition, covariance, weight, disturbance: Disturbance, kept) -> _Update:
-    """Prediction of the covariance over a step, and its update by the samples in it; Simon (2006), Eq. (5.19)."""
-    grown = jnp.concatenate([jnp.zeros(12), (1 - kept**2) * disturbance.deviations**2])
-    predicted = transition @ covariance @ transition.T + jnp.diag(grown)
+def _updated(transition, covariance, weight, offsets, disturbance: Disturbance, kept) -> _Update:
+    """Prediction of the covariance over a step with the samples in it, in one; Simon (2006), section 5.3.
+
+    A sample is taken between the begin of the step and its end. The change of the motion is straight in between, and
+    what is new of the push in this step moves the vehicle in the next one only.
+    """
     is_there = weight > 0
-    measured = jnp.where(is_there[:, None], jnp.asarray(_MEASURED), 0.0)
+    between_both = (1 - offsets)[:, None] * jnp.asarray(_MEASURED) + offsets[:, None] * (_MEASURED @ transition)
+    measured = jnp.where(is_there[:, None], between_both, 0.0)
     variance = jnp.where(is_there, 1 / jnp.where(is_there, weight, 1.0), 1.0)
-    root = jnp.linalg.cholesky(measured @ predicted @ measured.T + jnp.diag(variance))
+    root = jnp.linalg.cholesky(measured @ covariance @ measured.T + jnp.diag(variance))
     inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(13), lower=True)
-    gain = predicted @ measured.T @ inverse.T @ inverse
-    left = jnp.eye(18) - gain @ measured
-    updated = left @ predicted @ left.T + (gain * variance[None, :]) @ gain.T
+    gain = transition @ covariance @ measured.T @ inverse.T @ inverse
+    left = transition - gain @ measured
+    grown = jnp.concatenate([jnp.zeros(12), (1 - kept**2) * disturbance.deviations**2])
+    updated = left @ covariance @ left.T + (gain * variance[None, :]) @ gain.T + jnp.diag(grown)
     whitening = jnp.where(is_there[:, None] & is_there[None, :], inverse, 0.0)
-    return _Update(gain, whitening, updated, 2 * jnp.log(jnp.diagonal(root)).sum())
+    return _Update(measured, gain, whitening, updated, 2 * jnp.log(jnp.diagonal(root)).sum())
 
 
 @jax.jit
@@ -158,11 +167,11 @@ def unlikelihood(disturbance: Disturbance, weights, run: FilterRun, run_kept, st
             change, covariance = state  # against the filter that has run
             weight, run = row
             transition = run.transitions.at[12:, 12:].set(kept * jnp.eye(6))
-            change = transition @ change + jnp.concatenate([jnp.zeros(12), (kept - run_kept) * run.pushes])
-            update = _updated(transition, covariance, weight, disturbance, kept)
-            innovation = jnp.where(weight > 0, run.innovations + jnp.asarray(_MEASURED) @ change, 0.0)
+            update = _updated(transition, covariance, weight, run.offsets, disturbance, kept)
+            innovation = run.innovations + update.measured @ change
             white = update.whitening @ innovation
-            change = change - update.gain @ innovation + run.gains @ run.innovations
+            pushed = jnp.concatenate([jnp.zeros(12), (kept - run_kept) * run.pushes])
+            change = transition @ change + pushed - update.gain @ innovation + run.gains @ run.innovations
             return (change, update.covariance), 0.5 * ((white**2).sum() + update.log_determinant)
 
         first = (jnp.zeros(18), _first_covariance(disturbance))

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
+from undertow.core.errors import BadInput
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.fit import Fit, Solution, completed, weights_of
 from undertow.studies.identification.kalman_gains import Disturbance, FilterRun, unlikelihood, with_filter
@@ -50,6 +51,9 @@ def filter_fit(
         noise: standard deviation of each kind of sample at first, (13,); infinite without samples.
         disturbance: at first.
         watch: called with the iteration and the cost.
+
+    Raises:
+        BadInput: the filter diverges.
     """
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     starts = np.zeros((len(segments.dive), 12))
@@ -67,6 +71,9 @@ def filter_fit(
         information = np.eye(len(z))
         for _ in range(_STEPS):
             cost = cost_of(residuals, is_measured, z, starts)
+            if not np.isfinite(cost):
+                hint = "Use output_error, or a shorter `step`"
+                raise BadInput("method", "suit the logs", "prediction_error, whose filter diverges", hint=hint)
             watch(iteration, cost)
             parts = evaluated(model, filtered, is_measured, step, z, starts)
             information = parts.aa.sum(axis=0) + np.eye(len(z))
