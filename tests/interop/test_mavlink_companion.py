@@ -1,6 +1,7 @@
 """When the law of a companion runs, and what the thrusters get when it does not; messages only, without a socket."""
 
 import copy
+import json
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from undertow.outside.mavlink.permission import HEARTBEAT_TIMEOUT, Permission
 from undertow.outside.realtime.control_session import SAFE_PERIOD, ControlSession
 from undertow.outside.realtime.measurement_rate import MOST, WINDOW
 from undertow.outside.realtime.sender_clock import SenderClock
+from undertow.studies.identification.experiment_scenario import LAW
 
 pytestmark = pytest.mark.interop
 
@@ -433,3 +435,27 @@ def test_anything_may_arrive(talk):
 def test_wrong_options(driven, options, said):
     with pytest.raises(BadInput, match=said):
         Companion(driven, **options)
+
+
+def test_an_experiment_pushes_and_a_limit_ends_it(tmp_path):
+    """The vehicle rests at its target, so that the pulses are those of the script alone: 40 N forward from 50 ms on."""
+    script = "t,d1,d2,d3,d4,d5,d6\n0,0,0,0,0,0,0\n0.05,40,0,0,0,0,0\n9,0,0,0,0,0,0\n"
+    scenario = DRIVEN | {
+        "controller": {"kind": "experiment", "csv": script, "law": LAW, "room": [1, 1, 1]},
+        "reference": {"kind": "setpoint", "position": [0, 0, 0, 0, 0, 0]},
+        "disturbance": "none",
+        "initial": {},
+    }
+    path = tmp_path / "experiment.yaml"
+    path.write_text(json.dumps(scenario))
+    talk = Talk(Companion(path, timeout=TIMEOUT))
+    talk.heartbeat()
+    before = [pulses(talk.odometry()) for _ in range(4)]
+    pushed = [pulses(talk.odometry()) for _ in range(8)][-1]
+    talk.odometry(place=(0.7, 0, 0))
+    after = [pulses(talk.odometry()) for _ in range(8)][-1]
+    assert before == [STILL] * 4
+    assert np.abs(np.array(after) - 1500).max() <= 3  # what the law has integrated outside the room
+    horizontal, vertical = (np.array(pushed) - 1500).reshape(2, 4)  # the latter hold the pitch
+    assert (np.abs(horizontal) > 100).all() and (horizontal[:2] * horizontal[2:] < 0).all()
+    assert vertical[0] == vertical[1] and vertical[2] == vertical[3]
