@@ -26,10 +26,12 @@ class Trial(NamedTuple):
     damping: float  # for the next step
 
 
-def improved(model, segments, parts, weights, step, z, starts, least, damping: float, cost: float) -> Trial | None:
-    """The first of some steps, ever shorter, that lowers the cost; None where none does."""
+def improved(
+    model, segments, parts, weights, step, z, starts, least, damping: float, cost: float, held: int | None = None
+) -> Trial | None:
+    """The first of some steps, ever shorter, that lowers the cost; None where none does. One unknown may be held."""
     for _ in range(_TRIES):
-        new_z, new_starts = _step(parts, z, starts, damping, least)
+        new_z, new_starts = _step(parts, z, starts, damping, least, held)
         residuals = residuals_of(model, segments, step, new_z, new_starts)
         new_cost = cost_of(residuals, weights, new_z, new_starts)
         if np.isfinite(new_cost) and new_cost <= cost:
@@ -83,18 +85,18 @@ def _damped(parts: NormalEquations, damping: float) -> np.ndarray:
     return bb + damping * np.einsum("sii->si", bb)[:, :, None] * np.eye(12)
 
 
-def _step(parts: NormalEquations, z: np.ndarray, starts: np.ndarray, damping: float, least: np.ndarray):
+def _step(parts: NormalEquations, z: np.ndarray, starts: np.ndarray, damping: float, least: np.ndarray, held=None):
     """The next unknowns and begins."""
     information, gradient, _ = reduced(parts, z, starts, damping)
     information = information + damping * np.diag(np.diagonal(information))
-    new_z = np.maximum(z + _change(information, gradient, z <= least), least)
+    new_z = np.maximum(z + _change(information, gradient, z <= least, held), least)
     right = parts.b + starts + np.einsum("spq,p->sq", parts.ab, new_z - z)
     return new_z, starts - np.linalg.solve(_damped(parts, damping), right[..., None])[..., 0]
 
 
-def _change(information: np.ndarray, gradient: np.ndarray, at_least: np.ndarray) -> np.ndarray:
-    """Newton's step; unknowns at their smallest value that would become smaller stay there."""
-    free = np.ones(len(gradient), dtype=bool)
+def _change(information: np.ndarray, gradient: np.ndarray, at_least: np.ndarray, held: int | None) -> np.ndarray:
+    """Newton's step; unknowns at their smallest value that would become smaller stay there, and so does a held one."""
+    free = np.arange(len(gradient)) != (-1 if held is None else held)
     while True:
         change = np.zeros(len(gradient))
         change[free] = -np.linalg.solve(information[np.ix_(free, free)], gradient[free])

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from undertow.core.errors import BadInput
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.fit import Fit, Solution, completed
 from undertow.studies.identification.least_squares import cost_of, evaluated, improved, residuals_of
@@ -39,11 +40,17 @@ def fit(
         least: smallest numbers.
         watch: called with the iteration and the cost.
         noise: standard deviations of the residuals, where they and `z` are near those of the estimate.
+
+    Raises:
+        BadInput: the motion diverges where the unknowns begin.
     """
     starts = np.zeros((len(segments.dive), 12))
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     z = np.maximum(z, least)
     residuals = residuals_of(model, segments, step, z, starts)
+    if not np.isfinite(residuals[counts > 0]).all():
+        hint = "Check units and signs, and leave out where it tumbles; a shorter step or segment may help"
+        raise BadInput("log", "have a motion that the vehicle file can follow", "one in which it diverges", hint=hint)
     noise = first_noise(counts) if noise is None else noise
     shares = outlier_shares(residuals, counts)
     damping, converged, iteration = 1e-3, False, 0
@@ -73,10 +80,12 @@ def fit(
 def first_errors(model: IdentificationModel, segments: Segments, step: float, z: np.ndarray) -> float:
     """Sum of squared residuals over usual noise, each at most `_SURPRISE` squared, from the guessed begins.
 
+    It is infinite where a segment diverges.
+
     Args:
         model, segments, step, z: as above.
     """
     counts = segments.counts[:, :, SENSOR_OF_RESIDUAL]
     residuals = residuals_of(model, segments, step, z, np.zeros((len(segments.dive), 12)))
     squares = np.where(counts > 0, counts * residuals**2 / first_noise(counts) ** 2, 0.0)
-    return float(np.minimum(np.nan_to_num(squares, nan=np.inf, posinf=np.inf), _SURPRISE**2).sum())
+    return float(np.minimum(squares, _SURPRISE**2).sum()) if np.isfinite(squares).all() else float("inf")
