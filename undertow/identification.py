@@ -80,6 +80,7 @@ def identify(
     priors: Mapping[str, str] | None = None,
     per_axis: bool = False,
     method: str = "output_error",
+    profile: Sequence[str] = (),
     step: float = 0.05,
     segment: float = 10.0,
     watch: Callable[[str], None] = lambda stage: None,
@@ -98,6 +99,8 @@ def identify(
         per_axis: whether the inputs push along the six axes instead of driving the thrusters.
         method: `output_error`, or `prediction_error` for dives in waves, among eddies or on a tether: a Kalman filter
             follows the motion, and estimates what pushes the vehicle besides its thrusters.
+        profile: names, groups or patterns of free parameters whose intervals are also found by the profile of the
+            likelihood, for those that the log hardly determines.
         step: of the integration, s.
         segment: length of the segments whose begin is estimated, too, s.
         watch: called with the current stage.
@@ -117,6 +120,7 @@ def identify(
         priors={name: _prior(name, text) for name, text in (priors or {}).items()},
         per_axis=per_axis,
         method=method,
+        profile=profile,
         step=step,
         segment=segment,
         say=watch,

@@ -1,5 +1,6 @@
 """A filter follows disturbed dives: its gains, the likelihood of noise, and numbers that forces do not spoil."""
 
+import functools
 import json
 
 import jax.numpy as jnp
@@ -21,6 +22,7 @@ from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.prediction import DisturbedMotion, between, disturbed
 from undertow.studies.identification.prediction_error import filter_fit
+from undertow.studies.identification.profile import names_in, profile_intervals
 from undertow.studies.identification.segments import START_DEVIATION, segments_of
 from undertow.studies.identification.simulated_dive import random_wrenches, telegraph_dive
 from undertow.studies.identification.uncertainty import uncertainty_of
@@ -34,21 +36,34 @@ DEVIATIONS = np.repeat([4.0, 0.4], 3)  # N, N m
 class Problem:
     """A vehicle with few free numbers, and a dive of it, which unknown forces may push."""
 
-    def __init__(self, deviations):
+    def __init__(self, deviations, free=FREE, is_ratio=None):
         plant = hybrid_vehicle(bluerov2_heavy(), t200())
-        self.parameters = chosen(parameters_of(plant), FREE)
+        self.parameters = chosen(parameters_of(plant), free)
+        if is_ratio is not None:  # a deviation of 30 % in the number or in its logarithm
+            change = {True: lambda p: 0.3, False: lambda p: 0.3 * p.prior}[is_ratio]
+            self.parameters = [p._replace(is_ratio=is_ratio, deviation=change(p)) for p in self.parameters]
         self.model = model_of(prior_vehicle(plant), self.parameters)
         pushes = random_wrenches(np.random.default_rng(1), DURATION, deviations, 2.0)
         log = telegraph_dive(plant, TRUTH, 5, DURATION, disturbance=pushes)
         self.segments = segments_of([dive_of(log, log["input"], STEP)], 10.0)
         self.least = Unknowns(tuple(self.parameters), 1).least()
         self.free = fit(self.model, self.segments, STEP, np.zeros(len(self.least)), self.least)
-        self.filtered = filter_fit(self.model, self.segments, STEP, self.free.z, self.least, self.free.noise)
+
+    @functools.cached_property
+    def filtered(self):
+        return filter_fit(self.model, self.segments, STEP, self.free.z, self.least, self.free.noise)
+
+    def uncertainty(self, estimate):
+        return uncertainty_of(estimate.information, scores_of(self.model, STEP, estimate), STEP)
 
     def intervals(self, estimate):
-        uncertainty = uncertainty_of(estimate.information, scores_of(self.model, STEP, estimate), STEP)
-        found = uncertainty.intervals(self.parameters, estimate.z)
+        found = self.uncertainty(estimate).intervals(self.parameters, estimate.z)
         return {interval.parameter.name: interval for interval in found}
+
+    def profiles(self, estimate, names):
+        reaches = self.uncertainty(estimate).reaches(self.parameters)
+        say = lambda stage: None
+        return profile_intervals(self.model, STEP, estimate, self.least, self.parameters, reaches, names, say)
 
 
 @pytest.fixture(scope="module")
@@ -153,3 +168,33 @@ def test_another_method_is_refused():
     log = telegraph_dive(hybrid_vehicle(bluerov2_heavy(), t200()), {}, 1, 3.0)
     with pytest.raises(ut.BadInput, match=r"`method` must be one of .*prediction_error.*, but is kalman"):
         ut.identify(scenario, log, method="kalman")
+
+
+@pytest.mark.full
+def test_a_profile_is_the_usual_interval_where_the_cost_is_a_parabola(pushed):
+    """As for the filter; output error is bent, and its interval not."""
+    names = ["quadratic_damping.surge", "quadratic_damping.yaw"]
+    usual, profiles = pushed.intervals(pushed.filtered), pushed.profiles(pushed.filtered, names)
+    assert list(profiles) == names
+    for name in names:
+        np.testing.assert_allclose(profiles[name], (usual[name].low, usual[name].high), rtol=0.02)
+
+
+@pytest.mark.full
+def test_a_profile_does_not_depend_on_how_a_number_is_written():
+    """Of the logarithm of a number and of the number itself; usual intervals differ."""
+    name = "quadratic_damping.sway"
+    with in_precision("float64"):
+        plain, ratio = (Problem(3 * DEVIATIONS, (name,), is_ratio) for is_ratio in (False, True))
+        usual = [problem.intervals(problem.free)[name] for problem in (plain, ratio)]
+        ends = [problem.profiles(problem.free, [name])[name] for problem in (plain, ratio)]
+    assert abs(usual[0].low / usual[1].low - 1) > 0.05
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0.025)
+
+
+def test_a_profile_of_what_is_not_free_is_refused():
+    known = parameters_of(hybrid_vehicle(bluerov2_heavy(), t200()))
+    free = chosen(known, ("quadratic_damping", "lag"))
+    assert names_in(free, ["*.yaw", "lag"]) == ["quadratic_damping.yaw", "lag"]
+    with pytest.raises(ut.BadInput, match=r"`profile` must name free parameters, but is quadratic_damping.ya"):
+        names_in(free, ["quadratic_damping.ya"])

@@ -19,7 +19,7 @@ from undertow.core import checks
 from undertow.core.errors import BadInput
 from undertow.core.json_text import to_json
 from undertow.core.number_text import plain
-from undertow.report.answers.identification_answer import answer_of_identification, in_words
+from undertow.report.answers.identification_answer import answer_of_identification, in_words, profile_words
 from undertow.report.identification_page import write_identification
 from undertow.scenario.build import Built, build
 from undertow.scenario.log_file import read_log
@@ -68,6 +68,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
                 priors=priors,
                 per_axis=command.per_axis,
                 method=command.method,
+                profile=command.profile or (),
                 step=command.step,
                 segment=command.segment,
                 checkpoint=checkpoint,
@@ -93,7 +94,15 @@ def identify_vehicle(command: IdentifyCommand) -> int:
 def _fingerprint(command: IdentifyCommand, logs: Sequence[Path], built: Built) -> str:
     """Of what an identification depends on: the vehicle, the contents of the logs, and the options."""
     files = [*logs, *(command.unseen or ()), *([command.mapping] if command.mapping else [])]
-    options = (command.free, command.prior, command.per_axis, command.method, command.step, command.segment)
+    options = (
+        command.free,
+        command.prior,
+        command.per_axis,
+        command.method,
+        command.profile,
+        command.step,
+        command.segment,
+    )
     hashes = [recording_hash(path) for path in files]
     return text_hash(dump({"plant": built.resolved["plant"], "files": hashes, "options": repr(options)}))
 
@@ -124,7 +133,10 @@ def interval_table(parameters: Mapping[str, Any], has_prior: bool) -> Table:
     shown = {"prior": "file", "value": "estimate", "low": "from", "high": "to"}
     keys = [key for key in shown if has_prior or key != "prior"]
     columns = ("parameter", *map(numbers, (shown[key] for key in keys)), "unit", "")
-    table = titled("Parameters, with 95 % intervals", *columns)
+    has_profiles = any("profile" in parameter for parameter in parameters.values())
+    table = titled("Parameters, with 95 % intervals", *columns, *(["by the profile"] if has_profiles else []))
     for name, parameter in parameters.items():
-        table.add_row(in_words(name), *(plain(parameter[key]) for key in keys), parameter["unit"], parameter["verdict"])
+        numbers_of = (plain(parameter[key]) for key in keys)
+        profile = [profile_words(parameter)] if has_profiles else []
+        table.add_row(in_words(name), *numbers_of, parameter["unit"], parameter["verdict"], *profile)
     return table

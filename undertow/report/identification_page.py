@@ -12,6 +12,7 @@ from undertow.report.answers.identification_answer import (
     combination_in_words,
     in_words,
     mean_fits,
+    profile_words,
 )
 from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import answer_block
@@ -114,8 +115,12 @@ def _numbers(data: Mapping[str, Any]) -> Html:
     for name, parameter in data["parameters"].items():
         interval, verdict = interval_of(parameter), VERDICTS[parameter["verdict"]]
         values = (number(parameter["prior"]), number(parameter["value"]))
-        rows.append((in_words(name), *values, interval, unit(parameter["unit"]), verdict))
-    return table(("number", "file", "estimate", "95 % interval", "unit", ""), rows, numeric=(1, 2, 3))
+        rows.append((in_words(name), *values, interval, profile_words(parameter), unit(parameter["unit"]), verdict))
+    columns = ["number", "file", "estimate", "95 % interval", "by the profile", "unit", ""]
+    if not any("profile" in parameter for parameter in data["parameters"].values()):
+        columns.remove("by the profile")
+        rows = [(*row[:4], *row[5:]) for row in rows]
+    return table(columns, rows, numeric=(1, 2, 3))
 
 
 def _not_determined(data: Mapping[str, Any]) -> list[Html]:

@@ -85,6 +85,14 @@ class IdentifyCommand(Command):
             "follows the motion, and estimates what pushes the vehicle besides its thrusters.",
         ),
     ] = "output_error"
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Also find the interval of this free parameter, group or pattern by the profile of the likelihood, for "
+            "numbers that the dives hardly determine; may be repeated.",
+        ),
+    ] = None
     step: Annotated[float, typer.Option(metavar="SECONDS", help="Step of the integration.")] = 0.05
     segment: Annotated[
         float, typer.Option(metavar="SECONDS", help="Length of the segments whose begin is estimated, too.")

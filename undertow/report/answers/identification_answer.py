@@ -172,3 +172,11 @@ def interval_words(parameter: Mapping[str, Any]) -> str:
     """An interval with its unit: `13.1 [11.4, 14.9] N s/m`."""
     value, low, high = (plain(parameter[key]) for key in ("value", "low", "high"))
     return f"{value} [{low}, {high}] {parameter['unit']}".rstrip()
+
+
+def profile_words(parameter: Mapping[str, Any]) -> str:
+    """The interval by the profile of the likelihood; empty where it was not asked for."""
+    if "profile" not in parameter:
+        return ""
+    low, high = parameter["profile"]
+    return f"{'none' if low is None else plain(low)} to {'none' if high is None else plain(high)}"

@@ -7,7 +7,7 @@ so that the information of the data is compared with what was known before in ev
 
 import fnmatch
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -170,7 +170,7 @@ def chosen(
     asked = tuple(free) or USUALLY_FREE
     names: list[str] = []
     for pattern in (*asked, *priors):
-        matching = [name for name in known if fnmatch.fnmatchcase(name, pattern) or _in_group(name, pattern)]
+        matching = matching_names(known, pattern)
         if not matching and (free or pattern in priors) and pattern not in USUALLY_FREE:
             raise BadInput("free", "name parameters of the vehicle", pattern, hint=nearest(pattern, known))
         names += [name for name in matching if name not in names]
@@ -207,6 +207,11 @@ def chosen_in(
     """The same, where the deviations of the vehicle file of a scenario are priors, too, unless others are given."""
     of_file = {name: number for name, number in deviations_in(built).items() if name in known}
     return chosen(known, free, of_file | dict(priors))
+
+
+def matching_names(names: Iterable[str], pattern: str) -> list[str]:
+    """Names that a name, a group (`added_mass`) or a pattern (`*.yaw`) means."""
+    return [name for name in names if fnmatch.fnmatchcase(name, pattern) or _in_group(name, pattern)]
 
 
 def _in_group(name: str, group: str) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +35,9 @@ from undertow.studies.identification.free_parameters import (
     shortest_lag,
 )
 from undertow.studies.identification.identified_vehicle import prior_vehicle
-from undertow.studies.identification.model import IdentificationModel, model_of
+from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
+from undertow.studies.identification.profile import ProfileInterval, names_in, profile_intervals
 from undertow.studies.identification.uncertainty import (
     Combination,
     ParameterInterval,
@@ -61,6 +63,7 @@ class Identification(NamedTuple):
         intervals: of the parameters.
         undetermined: combinations that the data do not determine.
         validation: of each dive from the others, and of dives that were not used from all.
+        profiles: intervals by the profile of the likelihood, by name, of those parameters that were asked for.
         refused_axes: that no dive identifies, such as those without motion.
         findings: sentences of the checks before.
     """
@@ -74,6 +77,7 @@ class Identification(NamedTuple):
     intervals: tuple[ParameterInterval, ...]
     undetermined: tuple[Combination, ...]
     validation: tuple[Validation, ...]
+    profiles: Mapping[str, ProfileInterval] = MappingProxyType({})
     refused_axes: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()
 
@@ -98,6 +102,7 @@ def identify(
     priors: Mapping[str, UncertainNumber] | None = None,
     per_axis: bool = False,
     method: str = "output_error",
+    profile: Sequence[str] = (),
     step: float = 0.05,
     segment: float = 10.0,
     validate: bool = True,
@@ -116,6 +121,8 @@ def identify(
             thrusters.
         method: `output_error`, free runs over segments, or `prediction_error`, a Kalman filter that follows the motion:
             for dives in waves, in a changing current or on a tether.
+        profile: names, groups or patterns of free parameters whose intervals are also found by the profile of the
+            likelihood.
         step: of the integration, s.
         segment: length of the segments, s.
         validate: whether to predict each dive from the others.
@@ -151,6 +158,7 @@ def identify(
         raise BadInput(
             "logs", "determine a parameter of some axis", "of no use for any: " + " ".join(_findings(prepared)[:3])
         )
+    profiled = names_in(parameters, profile)
     model = model_of(prior_vehicle(plant, per_axis), parameters)
     count = len(parameters)
     pieces = pieces_of(dives) if validate else []
@@ -167,6 +175,10 @@ def identify(
         validation = with_published(validation, built, parameters)
     say("judging how sure it is")
     uncertainty = uncertainty_of(estimate.information, scores, step, with_nuisances(parts, estimate.z, count))
+    least = Unknowns(tuple(parameters), len(dives)).least()
+    profiles = profile_intervals(
+        model, step, estimate, least, parameters, uncertainty.reaches(parameters), profiled, say
+    )
     return Identification(
         model=model,
         dives=tuple(dives),
@@ -177,6 +189,7 @@ def identify(
         intervals=tuple(uncertainty.intervals(parameters, estimate.z)),
         undetermined=tuple(undetermined(estimate.information, parameters)),
         validation=validation,
+        profiles=profiles,
         refused_axes=refused,
         findings=tuple(_findings([*prepared, *only_predicted])),
     )

@@ -5,12 +5,14 @@ interval ends where it has grown as much as it would at the end of the usual int
 Moolgavkar (1988). How long residuals last is counted as in the usual interval.
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from undertow.core.errors import BadInput, nearest
 from undertow.studies.identification.fit import Fit
-from undertow.studies.identification.free_parameters import FreeParameter
+from undertow.studies.identification.free_parameters import FreeParameter, matching_names
 from undertow.studies.identification.least_squares import cost_of, evaluated, improved, residuals_of
 from undertow.studies.identification.model import IdentificationModel
 
@@ -27,6 +29,39 @@ class ProfileInterval(NamedTuple):
 
     low: float
     high: float
+
+
+def names_in(parameters: Sequence[FreeParameter], profile: Sequence[str]) -> list[str]:
+    """Free parameters that names, groups or patterns mean.
+
+    Raises:
+        BadInput: one of them means none.
+    """
+    free = [parameter.name for parameter in parameters]
+    for pattern in profile:
+        if not matching_names(free, pattern):
+            raise BadInput("profile", "name free parameters", pattern, hint=nearest(pattern, free))
+    return [name for name in free if any(name in matching_names(free, pattern) for pattern in profile)]
+
+
+def profile_intervals(
+    model: IdentificationModel,
+    step: float,
+    estimate: Fit,
+    least: np.ndarray,
+    parameters: Sequence[FreeParameter],
+    reaches: np.ndarray,
+    names: Sequence[str],
+    say: Callable[[str], None],
+) -> dict[str, ProfileInterval]:
+    """The interval of each parameter of these names; see `profile_interval`."""
+    intervals = {}
+    for index, parameter in enumerate(parameters):
+        if parameter.name in names:
+            say(f"profile of {parameter.name}, {len(intervals) + 1} of {len(names)}")
+            reach = float(reaches[index])
+            intervals[parameter.name] = profile_interval(model, step, estimate, least, parameter, index, reach)
+    return intervals
 
 
 def profile_interval(

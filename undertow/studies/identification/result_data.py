@@ -23,7 +23,10 @@ def as_data(identification: Identification) -> dict[str, Any]:
             {"name": dive.name, "duration": dive.duration, "sensors": dive.sensors()} for dive in identification.dives
         ],
         "level": LEVEL,
-        "parameters": {interval.parameter.name: interval_data(interval) for interval in identification.intervals},
+        "parameters": {
+            interval.parameter.name: interval_data(interval) | _profile_data(identification, interval.parameter.name)
+            for interval in identification.intervals
+        },
         "correlation": identification.uncertainty.correlation(range(count)).tolist(),
         "correlation_time": identification.uncertainty.correlation_time,
         "undetermined": [
@@ -43,6 +46,13 @@ def as_data(identification: Identification) -> dict[str, Any]:
         "converged": estimate.converged,
         "findings": list(identification.findings),
     }
+
+
+def _profile_data(identification: Identification, name: str) -> dict[str, Any]:
+    """Ends of the interval by the profile of the likelihood, None where there is no end; nothing if not asked for."""
+    if name not in identification.profiles:
+        return {}
+    return {"profile": [end if math.isfinite(end) else None for end in identification.profiles[name]]}
 
 
 def _disturbance_data(disturbance: Disturbance) -> dict[str, Any]:

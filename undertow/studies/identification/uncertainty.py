@@ -77,10 +77,17 @@ class Uncertainty(NamedTuple):
 
     def intervals(self, parameters: Sequence[FreeParameter], z: np.ndarray) -> list[ParameterInterval]:
         """Of each parameter."""
-        of_data = np.sqrt(np.diagonal(self.covariance))[: len(parameters)]
-        deviations = np.hypot(of_data, [p.resolution / p.deviation for p in parameters])
-        reach = stats.t.ppf(0.5 + LEVEL / 2, self.freedom) * deviations
+        deviations = self._deviations(parameters)
+        reach = self.reaches(parameters)
         return [_interval(p, z[i], deviations[i], reach[i]) for i, p in enumerate(parameters)]
+
+    def reaches(self, parameters: Sequence[FreeParameter]) -> np.ndarray:
+        """Half the interval of each parameter, in deviations beforehand."""
+        return stats.t.ppf(0.5 + LEVEL / 2, self.freedom) * self._deviations(parameters)
+
+    def _deviations(self, parameters: Sequence[FreeParameter]) -> np.ndarray:
+        of_data = np.sqrt(np.diagonal(self.covariance))[: len(parameters)]
+        return np.hypot(of_data, [p.resolution / p.deviation for p in parameters])
 
 
 def _interval(parameter: FreeParameter, z: float, deviation: float, reach: float) -> ParameterInterval:
