@@ -97,8 +97,8 @@ def identify(
         free: names, groups or patterns of parameters; () for the usual ones.
         priors: such as `{"mass": "11.5 +- 0.2"}`.
         per_axis: whether the inputs push along the six axes instead of driving the thrusters.
-        method: `output_error`, or `prediction_error` for dives in waves, among eddies or on a tether: a Kalman filter
-            follows the motion, and estimates what pushes the vehicle besides its thrusters.
+        method: `output_error`, or `prediction_error` for dives that unknown forces disturb (a tether, eddies): a Kalman
+            filter follows the motion, and estimates what pushes the vehicle besides its thrusters.
         profile: names, groups or patterns of free parameters whose intervals are also found by the profile of the
             likelihood, for those that the log hardly determines.
         step: of the integration, s.

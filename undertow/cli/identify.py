@@ -94,15 +94,7 @@ def identify_vehicle(command: IdentifyCommand) -> int:
 def _fingerprint(command: IdentifyCommand, logs: Sequence[Path], built: Built) -> str:
     """Of what an identification depends on: the vehicle, the contents of the logs, and the options."""
     files = [*logs, *(command.unseen or ()), *([command.mapping] if command.mapping else [])]
-    options = (
-        command.free,
-        command.prior,
-        command.per_axis,
-        command.method,
-        command.profile,
-        command.step,
-        command.segment,
-    )
+    options = (command.free, command.prior, command.per_axis, command.method, command.step, command.segment)
     hashes = [recording_hash(path) for path in files]
     return text_hash(dump({"plant": built.resolved["plant"], "files": hashes, "options": repr(options)}))
 

@@ -141,9 +141,7 @@ def _white(data: Mapping[str, Any]) -> Html:
         "lacks."
     )
     if data["method"] == "output_error":
-        sentence += (
-            " If it is a disturbance (waves, eddies, a tether), `--method prediction_error` makes the numbers surer."
-        )
+        sentence += " If forces disturbed the dive (a tether, eddies), `--method prediction_error` is surer."
     return tag("p", prose(sentence))
 
 

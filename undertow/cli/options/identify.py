@@ -81,16 +81,16 @@ class IdentifyCommand(Command):
         str,
         typer.Option(
             metavar="WORD",
-            help="output_error, or prediction_error for dives in waves, among eddies or on a tether: a Kalman filter "
-            "follows the motion, and estimates what pushes the vehicle besides its thrusters.",
+            help="output_error, or prediction_error for dives that unknown forces disturb (a tether, eddies): a Kalman "
+            "filter follows the motion, and estimates what pushes the vehicle besides its thrusters.",
         ),
     ] = "output_error"
     profile: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Also find the interval of this free parameter, group or pattern by the profile of the likelihood, for "
-            "numbers that the dives hardly determine; may be repeated.",
+            help="Also find the interval of this free parameter, group or pattern by the profile of the likelihood, "
+            "for numbers that the dives hardly determine; may be repeated.",
         ),
     ] = None
     step: Annotated[float, typer.Option(metavar="SECONDS", help="Step of the integration.")] = 0.05

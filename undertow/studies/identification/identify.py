@@ -120,7 +120,7 @@ def identify(
         per_axis: whether the inputs push along the six axes (sticks behind a mixer, or wrenches) instead of driving the
             thrusters.
         method: `output_error`, free runs over segments, or `prediction_error`, a Kalman filter that follows the motion:
-            for dives in waves, in a changing current or on a tether.
+            for dives that unknown forces disturb, such as those of a tether.
         profile: names, groups or patterns of free parameters whose intervals are also found by the profile of the
             likelihood.
         step: of the integration, s.

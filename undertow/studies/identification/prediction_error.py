@@ -1,7 +1,7 @@
 """The estimate by prediction errors: a Kalman filter follows the motion, and its innovations are made small.
 
-For dives in waves, among eddies or on a tether: forces that no log has push the vehicle, as strong and as fast as makes
-the measurements most likely. Ljung (1999), sections 7.2 and 7.4.
+For dives on a tether or among eddies: forces that no log has push the vehicle, as strong and as fast as makes the
+measurements most likely. Ljung (1999), sections 7.2 and 7.4.
 """
 
 from collections.abc import Callable
