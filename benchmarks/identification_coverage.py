@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.errors import BadInput
 from undertow.core.runtime import in_precision
 from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.t200 import t200
@@ -64,6 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
     inside = np.zeros((seeds, len(parameters)), dtype=bool)
     shares = np.zeros((seeds, len(parameters)))
     errors = np.zeros((seeds, len(parameters)))
+    done = np.zeros(seeds, dtype=bool)
     started = time.process_time()
     for number in range(seeds):
         generator = np.random.default_rng(first + number)
@@ -75,7 +77,12 @@ def run(arguments: argparse.Namespace) -> None:
         log = telegraph_log(plant, vehicle, generator, duration, current=current, disturbance=pushes)
         dive = dive_of(log, log["input"], step)
         estimates = Estimates(model, parameters, SEGMENT, arguments.method, 1, lambda stage: None)
-        estimate = estimates.of("dive", [dive], estimates.nearest_begin([dive]))
+        try:
+            estimate = estimates.of("dive", [dive], estimates.nearest_begin([dive]))
+        except BadInput as refused:
+            print(f"seed {first + number}: {refused}")
+            continue
+        done[number] = True
         uncertainty = uncertainty_of(estimate.information, scores_of(model, step, estimate), step)
         intervals = uncertainty.intervals(parameters, estimate.z)
         values = [parameter.value(z) for parameter, z in zip(parameters, truth, strict=True)]
@@ -86,13 +93,16 @@ def run(arguments: argparse.Namespace) -> None:
         print(
             f"seed {first + number}: {estimate.iterations} iterations, converged {estimate.converged}, missed {missed}"
         )
+    inside, shares, errors = inside[done], shares[done], errors[done]
     rms = lambda values: float(np.sqrt((values**2).mean()))
     print(f"{'parameter':28}covered, %   deviation left   error, rms   of the deviation beforehand")
     for i, parameter in enumerate(parameters):
         covered, share = 100 * inside[:, i].mean(), np.median(shares[:, i])
         relative = rms(errors[:, i] / shares[:, i])
         print(f"{parameter.name:28}{covered:8.1f}   {share:12.3f}   {relative:13.2f}   {rms(errors[:, i]):13.3f}")
-    print(f"all: {100 * inside.mean():.1f} %, {(time.process_time() - started) / seeds:.1f} s of processor time a seed")
+    print(
+        f"all {done.sum()}: {100 * inside.mean():.1f} %, {(time.process_time() - started) / seeds:.1f} s of processor time a seed"
+    )
 
 
 if __name__ == "__main__":
