@@ -100,9 +100,8 @@ def run(arguments: argparse.Namespace) -> None:
         covered, share = 100 * inside[:, i].mean(), np.median(shares[:, i])
         relative = rms(errors[:, i] / shares[:, i])
         print(f"{parameter.name:28}{covered:8.1f}   {share:12.3f}   {relative:13.2f}   {rms(errors[:, i]):13.3f}")
-    print(
-        f"all {done.sum()}: {100 * inside.mean():.1f} %, {(time.process_time() - started) / seeds:.1f} s of processor time a seed"
-    )
+    seconds = (time.process_time() - started) / seeds
+    print(f"all {done.sum()}: {100 * inside.mean():.1f} %, {seconds:.1f} s of processor time a seed")
 
 
 if __name__ == "__main__":

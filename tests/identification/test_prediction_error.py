@@ -22,7 +22,7 @@ from undertow.studies.identification.model import NUISANCES, Unknowns, model_of
 from undertow.studies.identification.output_error import fit
 from undertow.studies.identification.prediction import DisturbedMotion, between, disturbed
 from undertow.studies.identification.prediction_error import filter_fit
-from undertow.studies.identification.profile import names_in, profile_intervals
+from undertow.studies.identification.profile_likelihood import names_in, profile_intervals
 from undertow.studies.identification.segments import START_DEVIATION, segments_of
 from undertow.studies.identification.simulated_dive import random_wrenches, telegraph_dive
 from undertow.studies.identification.uncertainty import uncertainty_of

@@ -37,7 +37,7 @@ from undertow.studies.identification.free_parameters import (
 from undertow.studies.identification.identified_vehicle import prior_vehicle
 from undertow.studies.identification.model import IdentificationModel, Unknowns, model_of
 from undertow.studies.identification.prepared_dive import PreparedDive, prepared_dive
-from undertow.studies.identification.profile import ProfileInterval, names_in, profile_intervals
+from undertow.studies.identification.profile_likelihood import ProfileInterval, names_in, profile_intervals
 from undertow.studies.identification.uncertainty import (
     Combination,
     ParameterInterval,
