@@ -280,6 +280,6 @@ def test_a_model_as_good_as_the_file_may_be_used():
         "prior": {"free_run_fit": {"u": before}},
     }
     data = {"dives": [{"duration": 60.0}], "parameters": {}, "refused_axes": [], "undetermined": [], "converged": True}
-    data["findings"] = []
+    data |= {"findings": [], "disturbance": {}}
     verdicts = [answer_of_identification(data | {"validation": [fit(90.0, b)]}).verdict for b in (90.4, 50.0, 97.0)]
     assert [" as well as " in verdicts[0], " better than " in verdicts[1], "do not use it" in verdicts[2]] == [True] * 3
