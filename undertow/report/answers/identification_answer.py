@@ -35,12 +35,12 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *_far_line(far),
         f"{len(data['parameters'])} numbers were estimated from {dives}, {seconds:.0f} s together.",
         *_fit_line(fits),
-        *_pushes(data),
         *_convergence(data),
         *_best_known(data),
         *_refused(data),
         *_unknown(data),
         *_ratios(data),
+        *_pushes(data),
         *(_hints(data) if better is False else ()),
         *_next(better, folder),
     )
