@@ -28,7 +28,7 @@ from undertow.studies.campaign.build_trials import build_trial
 from undertow.studies.campaign.run_campaign import STORE
 from undertow.studies.campaign.store_results import load
 from undertow.studies.comparison.budget_tables import budget_sentences
-from undertow.studies.comparison.candidates import file_stem
+from undertow.studies.comparison.candidates import entries_of, file_stem
 from undertow.studies.comparison.comparison import ComparisonResult, read_comparison
 from undertow.studies.comparison.equal_budgets import FOLDER, check_budget, equal_budgets
 from undertow.studies.comparison.findings import Findings
@@ -54,7 +54,7 @@ def compare(command: CompareCommand) -> int:
     count = worker_count(command.workers)
     if trials is not None:
         checks.positive("--trials", trials)
-    controllers = None if entries is None else [word for word in map(str.strip, entries.split(",")) if word]
+    controllers = None if entries is None else entries_of(entries)
     resume_command = ["compare", *map(str, paths), *(["--controllers", entries] if entries else [])]
     resume_command += ["--trials", str(trials)] if trials is not None else []
     resume_command += ["--replay"] if replay else []

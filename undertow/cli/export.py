@@ -17,7 +17,7 @@ from undertow.outside.export.navigation import export_navigation
 from undertow.outside.export.vehicle import export_vehicle
 from undertow.scenario.build import Built, build
 from undertow.scenario.reading import read
-from undertow.studies.comparison.candidates import built_with_each, label
+from undertow.studies.comparison.candidates import built_with_each, entries_of, label
 
 _PARTS = ("controller", "navigation", "vehicle")
 
@@ -72,8 +72,7 @@ def _built_by_law(built: Built, command: ExportCommand) -> dict[str, Built]:
     """Name -> the scenario with it, for each controller of the page."""
     if command.controllers is None:
         return {label(built.resolved["controller"]): built}
-    entries = [word for word in map(str.strip, command.controllers.split(",")) if word]
-    return built_with_each(entries, built.text, command.scenario)
+    return built_with_each(entries_of(command.controllers), built.text, command.scenario)
 
 
 def _in_c(built: Built, part: str, name: str, output: str, formats: dict[str, Any]) -> Exported:

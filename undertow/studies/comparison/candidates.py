@@ -35,6 +35,11 @@ class Candidate(NamedTuple):
     source: Path | None
 
 
+def entries_of(text: str) -> list[str]:
+    """Entries of a list that a user writes, such as `robust, pid`."""
+    return [word for word in map(str.strip, text.split(",")) if word]
+
+
 def controllers(entries: Sequence[str] | Mapping[str, Any], scenario: Text, path: Path | None) -> list[Candidate]:
     """Controllers that are compared on one scenario.
 

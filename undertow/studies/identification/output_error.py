@@ -6,7 +6,7 @@ import numpy as np
 
 from undertow.core.errors import BadInput
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
-from undertow.studies.identification.fit import Fit, Solution, completed
+from undertow.studies.identification.fit import Fit, Solution, completed, weights_of
 from undertow.studies.identification.least_squares import cost_of, evaluated, improved, residuals_of
 from undertow.studies.identification.model import IdentificationModel
 from undertow.studies.identification.residual_noise import first_noise, noise_of, outlier_shares
@@ -55,7 +55,7 @@ def fit(
     shares = outlier_shares(residuals, counts)
     damping, converged, iteration = 1e-3, False, 0
     for iteration in range(1, _ITERATIONS + 1):
-        weights = shares * counts / noise**2
+        weights = weights_of(segments, noise, shares)
         cost = cost_of(residuals, weights, z, starts)
         watch(iteration, cost)
         parts = evaluated(model, segments, weights, step, z, starts)
