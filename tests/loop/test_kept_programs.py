@@ -11,7 +11,7 @@ import pytest
 
 from undertow.core import checks, installation, kept_programs, program_key
 from undertow.core.errors import BadInput
-from undertow.core.kept_programs import kept_program, kept_result
+from undertow.core.kept_programs import kept_program, kept_result, kept_values
 from undertow.core.process_setup import KEEP_PROGRAMS
 from undertow.core.structure_key import Constant
 from undertow.physics.thrusters import t200
@@ -185,6 +185,48 @@ def test_inside_a_trace_it_is_a_part_of_it(folder):
     run = kept_program(matvec)
     np.testing.assert_allclose(jax.jacfwd(lambda v: run(MATRIX, v))(VECTOR), MATRIX)
     assert not entries(folder)
+
+
+def counted(calls):
+    @of_undertow
+    def halves(matrix, scale):
+        calls.append(scale)
+        return {"half": matrix / 2, "words": ("scale", scale)}
+
+    return kept_values(halves)
+
+
+def test_values_are_kept_by_the_numbers_of_their_arguments(folder):
+    calls = []
+    for _ in range(2):  # as two processes do
+        for scale in (1.0, 2.0):
+            kept = counted(calls)(scale * MATRIX, scale)
+            assert kept["words"] == ("scale", scale)
+            assert isinstance(kept["half"], jax.Array) and kept["half"].dtype == MATRIX.dtype
+            np.testing.assert_array_equal(kept["half"], scale * MATRIX / 2)
+    assert calls == [1.0, 2.0]
+    with jax.enable_x64(False):
+        assert counted(calls)(MATRIX.astype("float32"), 1.0)["half"].dtype == "float32"
+    assert calls == [1.0, 2.0, 1.0]
+
+
+def test_kept_values_may_be_used_inside_a_trace(folder):
+    calls = []
+    run = counted(calls)
+    used = jax.jit(lambda vector: run(MATRIX, 1.0)["half"] @ vector)
+    np.testing.assert_allclose(used(VECTOR), MATRIX @ VECTOR / 2)
+    np.testing.assert_array_equal(run(MATRIX, 1.0)["half"], MATRIX / 2)  # no value of a trace was kept
+    np.testing.assert_allclose(jax.jacfwd(lambda scale: run(MATRIX * scale, 1.0)["half"])(1.0), MATRIX / 2)
+    assert len(entries(folder)) == 1
+
+
+def test_a_search_does_not_fill_the_disk_with_values(folder, monkeypatch):
+    monkeypatch.setattr(kept_programs, "_MOST_VALUES", 3)
+    calls = []
+    run = counted(calls)
+    for scale in range(10):
+        np.testing.assert_array_equal(run(scale * MATRIX, 1.0)["half"], scale * MATRIX / 2)
+    assert len(calls) == 10 and len(entries(folder)) == 3
 
 
 def test_parts_are_arguments(folder):

@@ -9,6 +9,7 @@ from undertow.analysis import motor_loop, small_signal
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import disturbance_profile
 from undertow.analysis.linearization.equilibrium import equilibrium
+from undertow.analysis.linearization.jacobians import Parts
 from undertow.analysis.linearization.response import compare_metrics
 from undertow.control import controllers
 from undertow.control.controllers import rcaf
@@ -244,6 +245,16 @@ def test_a_vehicle_rests_in_a_constant_current():
     c, s = np.cos(heading), np.sin(heading)
     expected = [c * north + s * east, c * east - s * north]
     np.testing.assert_allclose(mean.local.values["estimate"][:2], expected, rtol=1e-8)
+
+
+def test_a_search_for_rest_ends_where_rounding_does(monkeypatch):
+    """Rounding leaves 5e-8 V of the command, which no step makes smaller: the search took 30 of them."""
+    looks, differentiate = [], Parts.differentiate
+    monkeypatch.setattr(Parts, "differentiate", lambda *point: looks.append(point) or differentiate(*point))
+    plant = {"vehicle": "bluerov2_heavy", "thruster": "t200"}
+    loop = build(from_data({"plant": plant, "reference": {"kind": "setpoint", "position": [0.0] * 6}})).closed_loop
+    assert equilibrium(loop, 0.01, np.zeros(6), np.zeros(6)).found
+    assert len(looks) < 50
 
 
 def test_loads_along_the_reference_are_the_disturbance():

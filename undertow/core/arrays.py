@@ -49,6 +49,11 @@ def quotient(over: Any, under: Any) -> Any:
     return as_array(library_of(over, under).divide(over, under))
 
 
+def product(left: Any, right: Any) -> Any:
+    """Array of one number, or array, times another."""
+    return as_array(library_of(left, right).multiply(left, right))
+
+
 def in_present_precision(tree: Any) -> Any:
     """The tree of parts with its numbers converted to the precision that JAX uses now."""
 

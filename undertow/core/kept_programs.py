@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import equinox as eqx
 import jax
 import numpy as np
+from jax.core import Tracer
 
 from undertow.core.arrays import as_array
 from undertow.core.installation import may_keep
@@ -27,6 +28,8 @@ if TYPE_CHECKING or KEEPS:
     from simdjit import PortableProgram, Unsupported
 
 Result = TypeVar("Result")
+
+_MOST_VALUES = 20  # new ones of a function that a process keeps
 
 
 def kept_program(function: Callable[..., Any], optimize: bool = True) -> Callable[..., Any]:
@@ -63,6 +66,33 @@ def briefly_compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     It is for large functions that are called a few times, and whose results enter no run.
     """
     return kept_program(function, optimize=False)
+
+
+def kept_values(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Keep what a pure function gave for the numbers of its arguments, for later processes.
+
+    It is for what follows from the numbers of a vehicle or a gain rule and takes hundredths of a second, such as a
+    program that calls LAPACK, with which SciPy is loaded. A file is read in a thousandth.
+
+    Args:
+        function: of positional arguments, trees of numbers and arrays. Its result can be pickled.
+    """
+    name, made = f"{function.__module__}.{function.__qualname__}", []
+
+    @functools.wraps(function)
+    def run(*arguments: Any) -> Any:
+        # A process that makes vehicles by the thousand, as a search does, would keep a file of each.
+        if len(made) >= _MOST_VALUES or any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(arguments)):
+            return function(*arguments)
+
+        def compute() -> Any:
+            made.append(None)
+            return function(*arguments)
+
+        with jax.ensure_compile_time_eval():  # an array made during tracing would belong to that trace
+            return kept_result(name, Constant(arguments), compute)
+
+    return run
 
 
 def kept_result(name: str, subject: Any, compute: Callable[[], Result]) -> Result:

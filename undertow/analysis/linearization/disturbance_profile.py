@@ -1,14 +1,18 @@
 """Loads and measurement errors along the reference, before a run."""
 
+import dataclasses
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
-from undertow.core.contracts import Load, Pose
+from undertow.analysis.linearization.jacobians import Parts
+from undertow.core.arrays import as_array
+from undertow.core.contracts import Load, Outputs, Pose
 from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -33,12 +37,14 @@ class DisturbanceProfile(NamedTuple):
             rests, m/s^2 and rad/s^2: disturbances, and what moving along the reference takes beyond the model.
         noise: measured minus true position and velocity, m, rad, m/s, rad/s.
         flow: velocity of the water past the vehicle, m/s, world axes where the loop rests; None for other plants.
+        start: states of plant and law at t = 0 as vectors of `Parts`, where the outputs there were given.
     """
 
     time: np.ndarray
     load: np.ndarray
     noise: np.ndarray
     flow: np.ndarray | None
+    start: tuple[np.ndarray, np.ndarray] | None = None
 
     def operating_points(self, shares: tuple[float, ...]) -> list[OperatingConditions]:
         """Where the load is larger than given shares of all, and for a vehicle the flow faster than nine tenths of all.
@@ -57,7 +63,12 @@ class DisturbanceProfile(NamedTuple):
 
 
 def disturbance_profile(
-    loop: ClosedLoop, at: Equilibrium, key: PRNGKeyArray, steps: int, dt: float
+    loop: ClosedLoop,
+    at: Equilibrium,
+    key: PRNGKeyArray,
+    steps: int,
+    dt: float,
+    outputs: tuple[Outputs, Outputs] | None = None,
 ) -> DisturbanceProfile:
     """What acts along the reference, with the same chances as in a run with this key.
 
@@ -67,16 +78,18 @@ def disturbance_profile(
         key: of everything random in the run.
         steps: how many, from t = 0.
         dt: s.
+        outputs: position and velocity at t = 0, for the states of a run there; None for none.
     """
-    x, _ = at.parts.states(at.at)
-    unknown, noise, flow = _along(loop, key, x, jnp.asarray(at.at["u"]), jnp.asarray(dt, dtype=float), steps)
+    x, u = as_array(at.at["plant"]), as_array(at.at["u"])
+    unknown, noise, flow, start = _along(loop, at.parts, key, x, u, as_array(dt), steps, outputs)
     flow = None if flow is None else np.asarray(flow)
-    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow)
+    start = None if start is None else (np.asarray(start[0]), np.asarray(start[1]))
+    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow, start)
 
 
 @briefly_compiled
-def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
-    realization = loop.realize(key)
+def _along(loop: ClosedLoop, parts: Parts, key: PRNGKeyArray, x_rest, u, dt, steps: int, at_start):
+    realization, x_rest = loop.realize(key), parts.plant_state(x_rest)
     plant = loop.plant
     zero = jnp.zeros(())
     dynamics, coordinates, actuators = loop.controller.model
@@ -108,7 +121,7 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
             _flow(load, plant.pose(x), resting),
         )
 
-    outputs, loads, flow = jax.vmap(along)(times)
+    truths, loads, flow = jax.vmap(along)(times)
 
     def look(measuring, instant):
         t, truth = instant
@@ -121,7 +134,12 @@ def _along(loop: ClosedLoop, key: PRNGKeyArray, x_rest, u, dt, steps: int):
     measuring = loop.navigation.init(
         realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
-    return loads, jax.lax.scan(look, measuring, (times, outputs))[1], flow
+    noise = jax.lax.scan(look, measuring, (times, truths))[1]
+    if at_start is None:
+        return loads, noise, flow, None
+    # Of the law as it is linearised; what is random is the same.
+    begun = dataclasses.replace(loop, controller=parts.loop.controller).realize(key).start(*at_start)
+    return loads, noise, flow, [ravel_pytree(state)[0] for state in begun]
 
 
 def _flow(load: Load, pose: Pose | None, resting: Pose | None) -> Array | None:

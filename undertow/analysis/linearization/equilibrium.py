@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.linalg
+import scipy  # its parts are loaded when they are used
 from jaxtyping import Array
 
 from undertow.analysis.linearization.jacobians import Local, Parts, take_apart
@@ -80,7 +80,10 @@ class Balance(NamedTuple):
                     break
             if not best[2] < _WORSE * size:  # far from rest a larger residual may still be the way
                 break
+            rounded = size < _RESTS and best[2] > _SHRINKS * size
             at, (residual, jacobian, size) = trial, best
+            if rounded:
+                break
         return at
 
 
@@ -111,7 +114,7 @@ class Equilibrium(NamedTuple):
     @property
     def found(self) -> bool:
         """Whether it rests."""
-        return self.moving < 1e-5
+        return self.moving < _RESTS
 
 
 def equilibrium(
@@ -137,7 +140,7 @@ def equilibrium(
         held = _together(balance, balance.solve(near.at, unknown=("law",), still=("law",)))
         if held.found:
             return held
-    holding = lambda load: np.asarray(_settled_input(model, y, jnp.asarray(load)))
+    holding = lambda load: np.asarray(_settled_input(model, y, as_array(load)))
     from_afar = lambda load: _from_afar(balance, start | {"load": load, "u": holding(load)})
     at_full_load = from_afar(load)
     # Where that fails, the load is put on little by little, from a share that can be held.
@@ -220,4 +223,6 @@ _STEPS = 30
 _ROUNDING = 1e-13  # slopes below this share of the largest one are rounding errors
 _LENGTHS = (1.0, 0.5, 0.25, 0.1)  # of a step
 _WORSE = 1e3  # times the residual before: further than this nothing is looked for
-_AT_REST = 1e-8  # of what moves, in SI units
+_AT_REST = 1e-8  # of what moves, in SI units; no step is taken below it
+_RESTS = 1e-5  # the same, of an equilibrium
+_SHRINKS = 0.9  # share of it that a step of such a point leaves; more is rounding

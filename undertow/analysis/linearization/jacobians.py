@@ -8,6 +8,7 @@ gets the same.
 import dataclasses
 from typing import Any, NamedTuple, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -44,7 +45,7 @@ class Flow(NamedTuple):
     pushes: Array  # acceleration of the outputs that it causes there, m/s^2 and rad/s^2: a part of the load
 
 
-class Parts(NamedTuple):
+class Parts(eqx.Module):
     """A closed loop whose states are vectors.
 
     Attributes:
@@ -91,7 +92,7 @@ class Parts(NamedTuple):
 
     def states(self, at: dict[str, Any]) -> tuple[PyTree, PyTree]:
         """States of plant and law of a point."""
-        return self.plant_state(jnp.asarray(at["plant"])), self.law_state(jnp.asarray(at["law"]))
+        return _states(self, as_array(at["plant"]), as_array(at["law"]))
 
 
 def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts, dict[str, np.ndarray]]:
@@ -109,27 +110,39 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     law = theory_of(loop.controller).at_rest
     loop = loop if law is None else dataclasses.replace(loop, controller=law)
     loop = without(loop, ("dead_zone",))  # inside a dead zone nothing has a slope
-    position = jnp.asarray(position, dtype=float)
-    still = jnp.zeros_like(position)
+    position = as_array(position)
+    still = as_array(np.zeros(position.shape))
     target = Target(position, still, still)
-    x, z, flow_at_rest = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
-    flat_x, plant_state = ravel_pytree(x)
-    flat_z, law_state = ravel_pytree(z)
+    x, z, vectors, flow_at_rest = _at_rest(loop, target, as_array(np.zeros(3) if flow is None else flow))
+    at = {name: np.asarray(vector) for name, vector in vectors.items()}
     axes, inputs = position.shape[0], loop.plant.inputs()
-    sizes = (flat_x.size, flat_z.size, inputs, axes, 2 * axes)
-    parts = Parts(loop, target, plant_state, law_state, sizes, flow_at_rest)
-    return parts, {"plant": np.asarray(flat_x), "law": np.asarray(flat_z)}
+    sizes = (at["plant"].size, at["law"].size, inputs, axes, 2 * axes)
+    return Parts(loop, target, _from_vector(x), _from_vector(z), sizes, flow_at_rest), at
 
 
 @briefly_compiled
-def _at_rest(loop: ClosedLoop, target: Target, velocity: Array) -> tuple[PyTree, PyTree, Flow | None]:
+def _at_rest(loop: ClosedLoop, target: Target, velocity: Array):
+    """States of plant and law, the same as vectors, and the flow."""
     plant, zero = loop.plant, jnp.zeros(())
     x, unloaded = plant.initial_state(target.position, target.velocity), plant.no_load()
     z = loop.controller.init(plant.output(zero, x), target)
+    vectors = {"plant": ravel_pytree(x)[0], "law": ravel_pytree(z)[0]}
     if plant.pose(x) is None:
-        return x, z, None
+        return x, z, vectors, None
     pushed = lambda load: plant.acceleration(zero, x, jnp.zeros(plant.inputs()), load)
-    return x, z, Flow(velocity, pushed(_moved(unloaded, velocity)) - pushed(unloaded))
+    return x, z, vectors, Flow(velocity, pushed(_moved(unloaded, velocity)) - pushed(unloaded))
+
+
+def _from_vector(state: PyTree) -> Any:
+    """Function that makes a state of this form from a vector."""
+    functions = []
+    jax.eval_shape(lambda state: functions.append(ravel_pytree(state)[1]), state)  # compiles nothing
+    return functions[0]
+
+
+@briefly_compiled
+def _states(parts: Parts, plant: Array, law: Array) -> tuple[PyTree, PyTree]:
+    return parts.plant_state(plant), parts.law_state(law)
 
 
 def _moved(unloaded: Load, velocity: Array) -> Load:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+import scipy  # its parts are loaded when they are used
 
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.jacobians import SIGNALS, Slopes
@@ -126,6 +126,6 @@ def _followed(state_matrix: np.ndarray, entries: tuple[np.ndarray, ...], dt: flo
     n, wide = len(state_matrix), sum(entry.shape[1] for entry in entries)
     block = np.zeros((n + wide, n + wide))
     block[:n, :n], block[:n, n:] = state_matrix, np.hstack(entries)
-    power = expm(block * dt)
+    power = scipy.linalg.expm(block * dt)
     ends = np.cumsum([entry.shape[1] for entry in entries])[:-1]
     return [power[:n, :n], *np.split(power[:n, n:], ends, axis=1)]

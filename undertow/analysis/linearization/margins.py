@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
+import scipy  # its parts are loaded when they are used
 
 from undertow.analysis.linearization.disturbance_profile import OperatingConditions
 from undertow.analysis.linearization.equilibrium import Equilibrium, equilibrium
@@ -145,7 +145,7 @@ def noise_gain(loop: LinearLoop, signal: str, deviations: np.ndarray) -> np.ndar
     direct = loop.direct[signal]["noise"] * deviations
     if np.abs(multipliers(loop, ("noise",), (signal,))).max(initial=0.0) >= 1:
         return np.full(len(loop.signals[signal]), np.inf)
-    covariance = solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
+    covariance = scipy.linalg.solve_discrete_lyapunov(_FADING * small.matrix, entry @ entry.T)
     output = small.signals[signal]
     return np.sqrt(np.einsum("ij,jk,ik->i", output, covariance, output) + (direct**2).sum(axis=1))
 

@@ -3,7 +3,7 @@
 from typing import cast
 
 import numpy as np
-from scipy.linalg import eig, matrix_balance
+import scipy  # its parts are loaded when they are used
 
 from undertow.analysis.linearization.linear_loop import LinearLoop
 
@@ -24,7 +24,7 @@ def visible(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, ...]
     """
     # Rates instead of steps, in units in which rows and columns are alike, so that one tolerance serves all.
     rates = (loop.matrix - np.eye(len(loop.matrix))) / loop.dt
-    _, (units, _) = matrix_balance(rates, permute=False, separate=True)
+    _, (units, _) = scipy.linalg.matrix_balance(rates, permute=False, separate=True)
     rates = rates / units[:, None] * units
     into = np.hstack([loop.entries[name] for name in entries]) / units[:, None]
     out = np.vstack([loop.signals[name] for name in signals]) * units
@@ -44,7 +44,7 @@ def visible(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, ...]
 def multipliers(loop: LinearLoop, entries: tuple[str, ...], signals: tuple[str, ...]) -> np.ndarray:
     """Eigenvalues, from step to step, of the modes that the entries excite and the signals show."""
     small = visible(loop, entries, signals)
-    values, left, right = cast(tuple[np.ndarray, ...], eig(small.matrix, left=True, right=True))
+    values, left, right = cast(tuple[np.ndarray, ...], scipy.linalg.eig(small.matrix, left=True, right=True))
     into = np.hstack([small.entries[name] for name in entries])
     out = np.vstack([small.signals[name] for name in signals])
     into, out = into / _sizes(into, 0), out / _sizes(out.T, 0)[:, None]

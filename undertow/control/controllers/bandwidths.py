@@ -23,7 +23,7 @@ from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
 from undertow.core.arrays import as_array
 from undertow.core.contracts import Model
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import kept_program, kept_values
 from undertow.core.numerics.linear_algebra import matvec
 
 # Largest sensitivity |1 / (1 + L)| allowed with a factor on the nominal lag, an additional lag of the actuator and an
@@ -162,6 +162,7 @@ def largest_forces(actuators: AbstractActuatorModel, count: int) -> Float[Array,
 
 
 @functools.lru_cache(maxsize=4096)
+@kept_values
 def robust_bandwidths(axis: Axis, order: int = 2) -> Bandwidths:
     """Bandwidths of an estimator of order 2, as of preset `robust`, or 1, state feedback and controlled actuators."""
     bandwidth, share, faster = (grid.ravel()[:, None] for grid in np.meshgrid(*_robust_grid(axis), indexing="ij"))
@@ -202,6 +203,7 @@ def default_bandwidths(axes: Sequence[Axis], bandwidth, tracking, actuator_rate,
 
 
 @functools.lru_cache(maxsize=4096)
+@kept_values
 def pid_frequency(axis: Axis) -> float:
     """Natural frequency w of a PID with k_p = w^2, k_d = 2 w and k_i = w^3 / 10, rad/s: Fossen (2021), ch. 15."""
     return best_frequency(axis, lambda w, s: LoopTransfer(w**2 + 0.1 * w**3 / s, 2 * w + 0 * s))

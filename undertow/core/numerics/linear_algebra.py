@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import kept_program, kept_values
 from undertow.core.numerics.number import Number
 
 
@@ -46,12 +46,14 @@ def printed_inverse(gain: Gain) -> Inverse:
     return gain.T @ jnp.linalg.inv(gain @ gain.T)
 
 
+@kept_values
 @kept_program
 def inverse(square: Square) -> Square:
     """Inverse of a square matrix."""
     return jnp.linalg.inv(square)
 
 
+@kept_values
 @kept_program
 def pseudo_inverse(gain: Gain) -> Inverse:
     """Moore-Penrose inverse G+ for any rank; it equals Eq. (22) where that exists."""

@@ -13,7 +13,7 @@ from undertow.core.actuator_model import DirectActuator
 from undertow.core.arrays import as_array, library_of
 from undertow.core.contracts import AbstractPlant, Effort, Load, Measurement, Model, Pose
 from undertow.core.errors import BadInput
-from undertow.core.kept_programs import kept_program
+from undertow.core.kept_programs import kept_program, kept_values
 from undertow.core.measurement import BODY_AXES, BODY_OUTPUTS, measurement_of_pose
 from undertow.core.numerics.linear_algebra import matvec
 from undertow.core.numerics.number import Number
@@ -263,6 +263,7 @@ def _possible_wrenches(thruster_matrix, rank: int):
     return as_array(directions[:, :rank])
 
 
+@kept_values
 @kept_program
 def _static(inverse_mass, thruster_matrix, voltage_gain):
     """Acceleration per volt at rest, and minimum-norm voltages per wrench; one voltage gain for all or one each."""

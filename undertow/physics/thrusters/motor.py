@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from undertow.core import checks
-from undertow.core.arrays import quotient
+from undertow.core.arrays import product, quotient
 from undertow.core.param import Param, Sources, param, sources_field
 from undertow.physics.thrusters.thruster import PerThruster, Powers
 
@@ -76,7 +76,7 @@ class DCMotor(eqx.Module):
     @property
     def voltage_gain(self) -> PerThruster:
         """alpha = 1 / (k_3 c_tq), N/V. Eq. (15)."""
-        return quotient(1.0, self.k3 * self.torque_per_thrust)
+        return quotient(1.0, product(self.k3, self.torque_per_thrust))
 
     def torque(self, speed: PerThruster) -> PerThruster:
         """Shaft torque Q, N m, at a propeller speed in rad/s. Eq. (10)."""

@@ -57,4 +57,5 @@ class QuasiStaticActuator(AbstractMemorylessActuator):
 
     def dead_zone(self):
         share = quotient(self.thruster.dead_zone, self.thruster.supply)
-        return as_array(library_of(share).max(share))
+        library = library_of(share)
+        return as_array(library.max(library.asarray(share)))

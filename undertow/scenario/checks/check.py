@@ -131,9 +131,15 @@ def _place(part: Any, key: str) -> str:
 
 
 def _of_thruster(thruster: AbstractThruster, title: str, where: Callable[[str], str]) -> Report:
+    findings, rows = kept_result("thruster", Constant(thruster), lambda: _checked_thruster(thruster))
+    return _report(findings, where, title, rows)
+
+
+def _checked_thruster(thruster: AbstractThruster) -> tuple[tuple[Finding, ...], tuple[tuple[str, str, str], ...]]:
+    """Findings, and numbers to look at unless there are errors."""
     findings = check_contract(thruster)
     broken = any(finding.level == "error" for finding in findings)
-    return _report(findings, where, title, () if broken else derived_of_thruster(thruster))
+    return findings, () if broken else derived_of_thruster(thruster)
 
 
 @in_its_precision
@@ -156,13 +162,17 @@ def _of_scenario(text: Text) -> list[Report]:
     findings = kept_result("contract", Constant(loop.plant), lambda: check_contract(loop.plant))
     reports.append(_report(findings, partial(_place, loop.plant)))
     if not reports[-1].errors:
-        around = of_plant(loop.plant)
+        plant = loop.plant
         for part in (loop.reference, loop.disturbance, loop.navigation, loop.controller):
-            findings = kept_result("contract", Constant((part, around)), partial(check_contract, part, around))
+            findings = kept_result("contract", Constant((part, plant)), partial(_contract_beside, part, plant))
             reports.append(_report(findings, partial(_place, part)))
         if not any(report.errors for report in reports):
             reports.append(_of_own_law(built))
     return reports
+
+
+def _contract_beside(part: Any, plant: AbstractPlant) -> tuple[Finding, ...]:
+    return check_contract(part, of_plant(plant))
 
 
 def _of_own_law(built: Built) -> Report:

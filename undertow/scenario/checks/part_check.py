@@ -56,10 +56,9 @@ class Surroundings(NamedTuple):
     pose: Pose | None
 
 
-_BODY = Surroundings(
-    truth=measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6)),
-    pose=Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)),
-)
+def _body_in_water() -> Surroundings:
+    truth = measurement_of_outputs(jnp.linspace(0.1, 0.5, 6), jnp.linspace(0.2, -0.1, 6))
+    return Surroundings(truth, Pose(jnp.zeros(3), jnp.eye(3), jnp.zeros(3)))
 
 
 def of_plant(plant: AbstractPlant) -> Surroundings:
@@ -68,13 +67,14 @@ def of_plant(plant: AbstractPlant) -> Surroundings:
     return Surroundings(plant.output(jnp.zeros(()), x), plant.pose(x))
 
 
-def check_contract(part: Any, around: Surroundings = _BODY) -> tuple[Finding, ...]:
+def check_contract(part: Any, around: Surroundings | None = None) -> tuple[Finding, ...]:
     """Violations of the contract of a part; none for kinds that are data only.
 
     Args:
         part: part to check.
-        around: plant around it; by default a body in water.
+        around: plant around it; None for a body in water.
     """
+    around = _body_in_water() if around is None else around
     for kind, use in _USES.items():
         if isinstance(part, kind):
             with contextlib.redirect_stdout(io.StringIO()) as printed:

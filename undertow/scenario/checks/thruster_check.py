@@ -6,8 +6,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy  # its parts are loaded when they are used
 from jax.flatten_util import ravel_pytree
-from scipy.integrate import solve_ivp
 
 from undertow.physics.thrusters.motor import DCMotor
 from undertow.physics.thrusters.thruster import AbstractThruster, Powers, PropellerReport
@@ -82,8 +82,9 @@ def _settled_thrust(thruster: AbstractThruster, voltage: float) -> tuple[float, 
     if flat.size:
         rates = lambda x: [thruster.dynamics(state, volt) for state, volt in zip(tree(x), volts, strict=True)]
         rate = jax.jit(lambda x: ravel_pytree(rates(x))[0])
-        end = solve_ivp(lambda t, x: np.asarray(rate(x)), (0, _LONG), np.asarray(flat), method="LSODA").y[:, -1]
-        states = tree(jnp.asarray(end))
+        rates_at = lambda t, x: np.asarray(rate(x))
+        settled = scipy.integrate.solve_ivp(rates_at, (0, _LONG), np.asarray(flat), method="LSODA")
+        states = tree(jnp.asarray(settled.y[:, -1]))
     forward, reverse = (float(np.mean(thruster.thrust(state, volt))) for state, volt in zip(states, volts, strict=True))
     return forward, reverse
 

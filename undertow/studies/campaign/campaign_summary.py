@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are loaded when they are used
 import xarray as xr
-from scipy.special import bdtr
 
 from undertow.studies.campaign.columns import ENDINGS, JUDGEMENTS
 from undertow.studies.campaign.random_scalars import realized_scalars
@@ -37,7 +37,7 @@ def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float
     with few values the smallest and largest are taken. David and Nagaraja (2003), section 7.1.
     """
     ordered = np.sort(values)
-    below = bdtr(np.arange(ordered.size // 2 + 1), ordered.size, 0.5)  # probability of at most so many
+    below = scipy.special.bdtr(np.arange(ordered.size // 2 + 1), ordered.size, 0.5)  # probability of at most so many
     rank = max(int(np.argmax(below >= (1 - confidence) / 2)), 1)
     return float(ordered[rank - 1]), float(ordered[-rank])
 
@@ -69,7 +69,6 @@ def correlations(results: Results, realized: Mapping[str, np.ndarray]) -> dict[s
 
 def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Input -> metric -> rank correlation, for columns with one value per completed trial."""
-    from scipy.stats import spearmanr  # takes as long to import as all else here
 
     by_input: dict[str, dict[str, float]] = {}
     numbers = results.combinations[results.lasted][:_CORRELATED]
@@ -81,7 +80,7 @@ def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[s
         pairs = [(column[group], values[group]) for group in groups]
         # Without three points, or where one of the two is constant, there is no rank correlation.
         coefficients = [
-            float(spearmanr(x, y)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
+            float(scipy.stats.spearmanr(x, y)[0])  # pyright: ignore[reportArgumentType] - SciPy's result
             for x, y in pairs
             if len(x) > 2 and np.ptp(x) > 0 and np.ptp(y) > 0
         ]

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are loaded when they are used
 from jaxtyping import Float, Int, UInt32
-from scipy.special import ndtr, ndtri
 
 from undertow.core.errors import BadInput
 from undertow.scenario.correlation import correlated, correlation_matrix, square_root
@@ -52,7 +52,9 @@ class Samples:
         """Points of samples, in [0, 1), in the order of `vary`."""
         points = _entries(self._points, self._block, samples)
         if self._correlated:
-            points[:, self._correlated] = ndtr(correlated(_normal(points[:, self._correlated]), self._factor))
+            points[:, self._correlated] = scipy.special.ndtr(
+                correlated(_normal(points[:, self._correlated]), self._factor)
+            )
         return points
 
     def seeds(self, samples: Int[np.ndarray, " n"]) -> UInt32[np.ndarray, " n"]:
@@ -66,12 +68,11 @@ class Samples:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":
             return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
-        from scipy.stats import qmc  # takes as long to import as all else here
 
         chance = np.random.default_rng([seed, _POINTS])
         if self._campaign.design == "latin":
-            return qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
-        sequence = qmc.Sobol(dimensions, rng=chance)
+            return scipy.stats.qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
+        sequence = scipy.stats.qmc.Sobol(dimensions, rng=chance)
         if block:  # SciPy cannot go forward by nothing
             sequence.fast_forward(block * self._block)
         return sequence.random(self._block)
@@ -114,4 +115,4 @@ def quantiles(spread: Distribution, shares: Float[np.ndarray, " n"]) -> list[Any
 
 def _normal(shares: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     """Quantiles of the standard normal distribution."""
-    return ndtri(np.clip(shares, _EDGE, 1 - _EDGE))
+    return scipy.special.ndtri(np.clip(shares, _EDGE, 1 - _EDGE))

@@ -55,4 +55,4 @@ def _flat_thrust(result: ScenarioResult) -> str:
 
 def _has_state(thruster: AbstractThruster, count: int) -> bool:
     """Whether thrust has dynamics; a thruster that wraps another one has those of the inner one."""
-    return any(leaf.size for leaf in jax.tree.leaves(thruster.initial_state(count)))
+    return any(leaf.size for leaf in jax.tree.leaves(jax.eval_shape(lambda: thruster.initial_state(count))))

@@ -1,11 +1,8 @@
 """Operating point of a scenario under its mean load, and the metrics predicted from there."""
 
-import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, PRNGKeyArray
 
 from undertow.analysis.linearization import margins
 from undertow.analysis.linearization.disturbance_profile import DisturbanceProfile, disturbance_profile
@@ -14,15 +11,15 @@ from undertow.analysis.linearization.linear_loop import LinearLoop
 from undertow.analysis.linearization.response import from_start, metrics_of, signals_within
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
-from undertow.core.contracts import AbstractController, AbstractReference, Outputs, Time
+from undertow.core.contracts import AbstractController, AbstractPlant, AbstractReference, Inputs, Outputs, Time
 from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built
-from undertow.simulation.loop.closed_loop import ClosedLoop
 
 _MAX_STEPS = 200_000  # largest number of predicted steps
 _ABSURD = 10.0  # an input of so many times its limit comes from a gain near zero, not from the load
 _LITTLE = 0.05  # of its limit: an input close to zero
+_HUGE = 1e9  # an input beyond every limit
 
 
 class OperatingPoint(NamedTuple):
@@ -47,7 +44,8 @@ def operating_point(built: Built) -> OperatingPoint:
     position = np.asarray(_desired(loop.reference, as_array((start + min(stop, settings.duration)) / 2)))
     unloaded = equilibrium(loop, settings.dt, position, np.zeros(len(position)))
     steps = min(round(settings.duration / settings.dt) + 1, _MAX_STEPS)
-    around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt)
+    outputs = loop.outputs_at_start(built.scenario.initial.position, built.scenario.initial.velocity)
+    around = disturbance_profile(loop, unloaded, key_of_seed(built.scenario.seed), steps, settings.dt, outputs)
     inside = (around.time >= start) & (around.time <= stop)
     steady = inside if inside.any() else slice(None)
     load, flow = around.load[steady].mean(axis=0), None if around.flow is None else around.flow[steady].mean(axis=0)
@@ -87,7 +85,8 @@ def predicted(op_point: OperatingPoint) -> tuple[dict[str, float] | None, str]:
     start, stop = op_point.built.window()
     settings = op_point.built.scenario.loop
     every = max(1, round(settings.record / settings.dt))
-    transient = from_start(op_point.linear, op_point.mean, *_start(op_point))
+    assert op_point.around.start is not None
+    transient = from_start(op_point.linear, op_point.mean, *op_point.around.start)
     signals = signals_within(op_point.mean, transient, op_point.around, (start, stop), every)
     forbidden = _forbidden(op_point.built.closed_loop.controller, signals) or _beyond_limits(op_point, signals["u"])
     units = op_point.built.closed_loop.plant.output_units
@@ -131,19 +130,10 @@ def input_limits(built: Built, at: Equilibrium) -> tuple[np.ndarray, np.ndarray]
     """Smallest and largest input that reaches the actuators; infinite without a limit."""
     plant = built.closed_loop.plant
     x, _ = at.parts.states(at.at)
-    ask = as_array(np.full(plant.inputs(), 1e9))
-    low, high = (np.asarray(plant.admissible(x, side * ask)) for side in (-1, 1))
-    return np.where(low < -1e8, -np.inf, low), np.where(high > 1e8, np.inf, high)
-
-
-def _start(op_point: OperatingPoint) -> list[np.ndarray]:
-    """States of plant and controller at t = 0 as vectors."""
-    loop, initial = op_point.built.closed_loop, op_point.built.scenario.initial
-    loop = dataclasses.replace(loop, controller=op_point.mean.parts.loop.controller)
-    outputs = loop.outputs_at_start(initial.position, initial.velocity)
-    return [np.asarray(state) for state in _states_at_start(loop, key_of_seed(op_point.built.scenario.seed), *outputs)]
+    low, high = (np.asarray(_admissible(plant, x, as_array(np.full(plant.inputs(), ask)))) for ask in (-_HUGE, _HUGE))
+    return np.where(low < -0.1 * _HUGE, -np.inf, low), np.where(high > 0.1 * _HUGE, np.inf, high)
 
 
 @briefly_compiled
-def _states_at_start(loop: ClosedLoop, key: PRNGKeyArray, position: Outputs, velocity: Outputs) -> list[Array]:
-    return [ravel_pytree(state)[0] for state in loop.realize(key).start(position, velocity)]
+def _admissible(plant: AbstractPlant, x, ask: Inputs) -> Inputs:
+    return plant.admissible(x, ask)
