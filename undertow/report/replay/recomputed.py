@@ -9,6 +9,7 @@ import xarray as xr
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PRNGKeyArray
 
+from undertow.control.estimation.fuzzy_system import FuzzySystem
 from undertow.core.contracts import AbstractController, Pose
 from undertow.core.kept_programs import briefly_compiled
 from undertow.core.numerics.random_keys import key_of_seed
@@ -34,14 +35,14 @@ def thrust_along(thruster: AbstractThruster, inputs: Series, step: float) -> Ser
         step: time between records, s.
     """
     state = thruster.initial_state(inputs.shape[1])
-    dt = jnp.asarray(step, dtype=inputs.dtype)
+    dt = jax.device_put(inputs.dtype.type(step))
     parts = []
     padded = np.concatenate([inputs, np.repeat(inputs[-1:], -(len(inputs) - 1) % _CHUNK, axis=0)])
     for first in range(0, len(padded) - 1, _CHUNK):
-        block = jnp.asarray(padded[first : first + _CHUNK + 1])
-        state, thrust = _thrust_of_chunk(thruster, state, block[:-1], block[1:], dt)
+        block = padded[first : first + _CHUNK + 1]
+        state, thrust = _thrust_of_chunk(thruster, state, *jax.device_put((block[:-1], block[1:])), dt)
         parts.append(np.asarray(thrust))
-    last = np.asarray(_thrust(thruster, state, jnp.asarray(padded[-1])))
+    last = np.asarray(_thrust(thruster, state, jax.device_put(padded[-1])))
     return np.concatenate([*parts, last[None]])[: len(inputs)]
 
 
@@ -101,7 +102,7 @@ def environment(loop: ClosedLoop, seed: int, time: Series, position: Series, vel
         position: outputs, shape (records, 6).
         velocity: their rates, shape (records, 6).
     """
-    histories = _environment(loop, key_of_seed(seed), *map(jnp.asarray, (time, position, velocity)))
+    histories = _environment(loop, key_of_seed(seed), *jax.device_put((time, position, velocity)))
     return Environment(*(None if series is None else np.asarray(series) for series in histories))
 
 
@@ -130,4 +131,10 @@ def firing_along(controller: AbstractController, run: xr.Dataset) -> Series | No
         inputs = np.stack([run["measured_position"].values, run["measured_velocity"].values], axis=-1)
     else:
         inputs = run["modelling_error"].values[..., None]
-    return np.asarray(fuzzy.basis(jnp.asarray(inputs.reshape(-1, inputs.shape[-1])))).reshape(*inputs.shape[:2], -1)
+    basis = _basis(fuzzy, jax.device_put(inputs.reshape(-1, inputs.shape[-1])))
+    return np.asarray(basis).reshape(*inputs.shape[:2], -1)
+
+
+@briefly_compiled
+def _basis(fuzzy: FuzzySystem, inputs: Array) -> Array:
+    return fuzzy.basis(inputs)
