@@ -123,6 +123,7 @@ _TANH = 0.27846454
 
 # An impulse response is added up until it has fallen to this share, over this many steps at most.
 _FORGOTTEN, _STEPS = 1e-12, 20_000
+_AT_ONCE = 64  # powers of a matrix
 
 
 def lyapunov_residual(law: RCAF, axes: int) -> float:
@@ -165,9 +166,12 @@ def estimation_bound(estimator: Estimator, dt: float, rate: np.ndarray) -> np.nd
     step = transition(estimator, dt, len(rate))
     slowest = np.abs(np.linalg.eigvals(step)).max()
     steps = _STEPS if slowest >= 1 else min(_STEPS, int(np.ceil(np.log(_FORGOTTEN) / np.log(slowest))) + 2)
-    rows, row = np.zeros(step.shape[:1] + (2,)), np.tile([[0.0, 1.0]], (len(rate), 1))
-    for _ in range(steps):
-        rows += np.abs(row)
-        row = np.einsum("ni,nij->nj", row, step)
+    # The second rows of the powers of the matrix, as many at once as `_AT_ONCE`.
+    powers = np.stack([np.linalg.matrix_power(step, power) for power in range(_AT_ONCE)])
+    further, row = np.linalg.matrix_power(step, _AT_ONCE), np.tile([[[0.0, 1.0]]], (len(rate), 1, 1))
+    rows = np.zeros((len(rate), 2))
+    for first in range(0, steps, _AT_ONCE):
+        rows += np.abs(row @ powers[: steps - first]).sum(axis=(0, 2))
+        row = row @ further
     # In one step d moves by rate dt; its mean over the step is off by half of that, and eps by dt times as much.
     return rate * dt * (rows[:, 1] + dt / 2 * rows[:, 0])
