@@ -11,6 +11,7 @@ from undertow.physics.plants.hybrid_vehicle import hybrid_vehicle
 from undertow.physics.thrusters.commanded_thrust import commanded_thrust
 from undertow.physics.thrusters.t200 import t200
 from undertow.physics.vehicles.bluerov2_heavy import bluerov2_heavy
+from undertow.run import simulate_scenario
 from undertow.studies.identification.log_check import check_dive
 from undertow.studies.identification.simulated_dive import telegraph_dive
 
@@ -203,3 +204,24 @@ def test_a_dive_of_a_vehicle_passes_and_a_late_input_is_noticed():
         with_gaps[::3] = np.nan
         checked = check_dive(log, log["input"]._replace(values=with_gaps), plant)
         assert [(finding.concern, finding.severity) for finding in checked.findings] == [("input", "note")]
+
+
+@pytest.mark.full
+def test_a_controller_that_answers_to_a_current_is_no_late_clock():
+    """It pushes against an acceleration that it did not cause: inputs seemed to come 0.3 s late, and were moved."""
+    wandering = {"kind": "gauss_markov_current", "mean": [0.1, 0.1, 0.0], "deviation": [0.1, 0.1, 0.05]}
+    scenario = {
+        "plant": {"vehicle": "bluerov2_heavy", "thruster": {"kind": "t200", "supply": 16}},
+        "controller": {"kind": "pid", "frequency": 1.5},
+        "reference": {"kind": "lissajous", "amplitude": [1, 1, 0.5, 1], "frequency": [0.4, 0.5, 0.6, 0.4], "depth": 5},
+        "disturbance": wandering | {"correlation_time": 4.0, "span": 100.0},
+        "navigation": {"kind": "degraded", "position_noise": [0.01] * 6, "velocity_noise": [0.01] * 6},
+        "initial": {"position": [0, 0, 5, 0, 0, 0]},
+        "loop": {"duration": 60, "dt": 0.02, "record": 0.02},
+    }
+    run = simulate_scenario(scenario)
+    log = run.log()
+    checked = check_dive(log, log["input"], run.result.built.closed_loop.plant)
+    assert "inputs" not in checked.offsets
+    (finding,) = [finding for finding in checked.findings if finding.concern == "input"]
+    assert finding.severity == "note" and "of the thrust that the file says" in finding.sentence

@@ -5,6 +5,7 @@ are linear, so that their signs are seen at once, and how well the dive would be
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -25,6 +26,10 @@ _BETTER = 0.85  # on some axis
 # Clocks that differ by some tenths of a second turn the sign of what a quick pilot does: the best offset is taken.
 _OFFSETS = 0.1 * np.arange(-6, 7)  # s
 _WORTH_SAYING = 0.05  # s
+# Of the thrust of the file that all inputs together seem to give. Less is what a controller looks like that holds the
+# vehicle against moving water: it pushes against an acceleration that it did not cause, and later. Then the best offset
+# is that of the controller, not of a clock.
+_PLAUSIBLE_GAIN = 0.5
 
 
 class InputGains(NamedTuple):
@@ -35,7 +40,8 @@ class InputGains(NamedTuple):
         gains: over those of the file.
         deviations: their standard errors.
         swapped: pairs of inputs that explain the dives much better the other way round.
-        offset: of the inputs, behind the motion that they cause according to the lags of the file.
+        offset: of the inputs, behind the motion that they cause according to the lags of the file; of infinite deviation
+            where they cause little of the motion.
         effect: on each axis, size of the acceleration that is unexplained without inputs over that with them; NaN where
             no motion is measured.
         findings: in words.
@@ -82,6 +88,10 @@ def input_gains(
     offset = shift._replace(delay=-shift.delay)
     has_known_gains = not isinstance(prior.actuation, AxisActuation)
     findings = _findings(names, solution, matters, swapped, has_known_gains)
+    overall = _overall_gain(regressions[best], order)
+    if has_known_gains and overall < _PLAUSIBLE_GAIN and not are_wrong:
+        offset = ClockOffset(0.0, math.inf)
+        findings.append(_little_thrust(overall))
     if offset.is_worth_saying(_WORTH_SAYING):
         findings.append(_offset_finding(offset))
     effect = np.array([_effect(regressions[best], order, axis) for axis in range(len(BODY_AXES))])
@@ -111,6 +121,21 @@ def _swap(order: Order, pair: tuple[int, int]) -> Order:
 
 def _best(solutions: Sequence[GainSolution]) -> int:
     return int(np.argmin([solution.mean_error for solution in solutions]))
+
+
+def _overall_gain(regression: InputRegression, order: Order) -> float:
+    """The gain that all inputs have together, over those of the file."""
+    together = regression.of_inputs[:, list(order), range(len(order))].sum(axis=1)
+    return float(solved(regression._replace(of_inputs=together[:, None, None]), (0,)).gains[0])
+
+
+def _little_thrust(overall: float) -> LogFinding:
+    sentence = f"All inputs together seem to give {max(overall, 0.0):.2f} of the thrust that the file says"
+    remedy = (
+        "A controller that holds the vehicle against moving water looks like that: identify from dives whose inputs move "
+        "the vehicle. Otherwise look at the supply, at the unit of the inputs and at the clocks"
+    )
+    return LogFinding("input", "", "note", sentence, remedy)
 
 
 def _offset_finding(offset: ClockOffset) -> LogFinding:
