@@ -40,8 +40,8 @@ class InputGains(NamedTuple):
         gains: over those of the file.
         deviations: their standard errors.
         swapped: pairs of inputs that explain the dives much better the other way round.
-        offset: of the inputs, behind the motion that they cause according to the lags of the file; of infinite deviation
-            where they cause little of the motion.
+        offset: of the inputs, behind the motion that they cause according to the lags of the file; its deviation is
+            infinite where they cause little of the motion.
         effect: on each axis, size of the acceleration that is unexplained without inputs over that with them; NaN where
             no motion is measured.
         findings: in words.
@@ -132,8 +132,8 @@ def _overall_gain(regression: InputRegression, order: Order) -> float:
 def _little_thrust(overall: float) -> LogFinding:
     sentence = f"All inputs together seem to give {max(overall, 0.0):.2f} of the thrust that the file says"
     remedy = (
-        "A controller that holds the vehicle against moving water looks like that: identify from dives whose inputs move "
-        "the vehicle. Otherwise look at the supply, at the unit of the inputs and at the clocks"
+        "A controller that holds the vehicle against moving water looks like that: identify from dives whose inputs "
+        "move the vehicle. Otherwise look at the supply, at the unit of the inputs and at the clocks"
     )
     return LogFinding("input", "", "note", sentence, remedy)
 
