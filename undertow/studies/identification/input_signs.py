@@ -133,7 +133,7 @@ def _little_thrust(overall: float) -> LogFinding:
     sentence = f"All inputs together seem to give {max(overall, 0.0):.2f} of the thrust that the file says"
     remedy = (
         "A controller that holds the vehicle against moving water looks like that: identify from dives whose inputs "
-        "move the vehicle. Otherwise look at the supply, at the unit of the inputs and at the clocks"
+        "move the vehicle. Otherwise look at supply, unit and clock of the inputs, and whether it is this vehicle"
     )
     return LogFinding("input", "", "note", sentence, remedy)
 
