@@ -125,7 +125,10 @@ def _conclude(console: Console, ready: PreparedComparison, folder: Path, command
         )
     warn_of([*missing, *failures])
     rows = medians(findings, times)
-    table = titled(f"Median of {findings.trials} trials", rows.head[0], *map(numbers, rows.head[1:]))
+    windows = {built.window() for built in ready.built}
+    # Scenarios that are compared as a whole may differ in it.
+    when = "".join(f", from {start:g} to {stop:g} s" for start, stop in windows) if len(windows) == 1 else ""
+    table = titled(f"Median of {findings.trials} trials{when}", rows.head[0], *map(numbers, rows.head[1:]))
     for row in rows.rows:
         table.add_row(*row)
     console.print(table)
