@@ -121,7 +121,7 @@ def _along(loop: ClosedLoop, parts: Parts, key: PRNGKeyArray, x_rest, u, dt, ste
             _flow(load, plant.pose(x), resting),
         )
 
-    truths, loads, flow = jax.vmap(along)(times)
+    outputs, loads, flow = jax.vmap(along)(times)
 
     def look(measuring, instant):
         t, truth = instant
@@ -134,7 +134,7 @@ def _along(loop: ClosedLoop, parts: Parts, key: PRNGKeyArray, x_rest, u, dt, ste
     measuring = loop.navigation.init(
         realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
     )
-    noise = jax.lax.scan(look, measuring, (times, truths))[1]
+    noise = jax.lax.scan(look, measuring, (times, outputs))[1]
     if at_start is None:
         return loads, noise, flow, None
     # Of the law as it is linearised; what is random is the same.
