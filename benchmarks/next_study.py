@@ -1,7 +1,7 @@
 """The paper's next study in numbers: observer-based, non-affine and large-scale control.
 
-Prints every number of docs/explanation/next-study.md. Runs are those of the batch compiler, one seed each; errors are
-rms per axis over the window that is named.
+Prints every number of docs/explanation/next-study.md and its three parts. Runs are those of the batch compiler, one
+seed each; errors are rms per axis over the window that is named.
 
     python benchmarks/next_study.py [observer] [thrust] [pair] [--long]
 
