@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 # Pixels of a picture that fills a phone, with letters of 13 pixels.
 WIDTH, SIDE, WIDEST_BOX, SPACE = 420.0, 104.0, 340.0, 14.0
-LINE_HEIGHT, LETTER, MARGIN = 17.0, 7.1, 15.0
+LINE_HEIGHT, LETTER, MARGIN = 17.0, 6.8, 15.0
 
 
 class Arrow(NamedTuple):

@@ -22,8 +22,10 @@ class SignalFlow(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         caption = " ".join(self.arguments[0].split())
+        page = self.env.doc2path(self.env.docname, base=False)
+        first = self.lineno + self.content_offset + 1  # in Markdown the offset counts from the line of the directive
         try:
-            arrows = arrows_of([*self.content], self.env.docname, self.content_offset + 1)
+            arrows = arrows_of([*self.content], str(page), first)
         except ValueError as error:
             raise self.error(str(error)) from error
         figure = nodes.figure()

@@ -1,6 +1,7 @@
 """The directive `{signal-flow}`: who sends what to whom, as boxes and labelled arrows."""
 
 import importlib
+import io
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -93,6 +94,24 @@ def test_a_line_that_cannot_be_read_is_named(signal_flow, line):
     with pytest.raises(ValueError) as error:
         signal_flow.arrows_of(["a -> b: c", "", line], "how-to/mavlink", 7)
     assert str(error.value) == f"how-to/mavlink, line 9: must be `SENDER -> RECEIVER: SIGNAL`, got `{line}`."
+
+
+def test_sphinx_names_the_page_and_the_line(signal_flow, tmp_path):
+    pytest.importorskip("myst_nb")
+    from sphinx.application import Sphinx
+
+    (tmp_path / "conf.py").write_text("extensions = ['myst_nb', 'signal_flow']\nhtml_theme = 'basic'\n")
+    page = tmp_path / "index.md"
+    page.write_text("# Page\n\n```{signal-flow} A caption.\na -> b: x\nb <- a: y\n```\n")
+    warnings = io.StringIO()
+    site = Sphinx(tmp_path, tmp_path, tmp_path / "site", tmp_path / "cache", "html", status=None, warning=warnings)
+    site.build()
+    assert "index.md, line 5: must be `SENDER -> RECEIVER: SIGNAL`, got `b <- a: y`." in warnings.getvalue()
+    page.write_text(page.read_text().replace("<-", "->"))
+    site.build()
+    html = (tmp_path / "site" / "index.html").read_text("utf-8")
+    assert html.count("<polyline") == 2
+    assert '<span class="caption-text">A caption.</span>' in html
 
 
 def test_boxes_of_one_row_have_no_arrow(signal_flow):
