@@ -31,6 +31,7 @@ extensions = [
     "api",
     "live_page",
     "pictures",
+    "signal_flow",
 ]
 # The gallery also writes its examples as notebooks to download; its pages are the .rst files.
 exclude_patterns = ["_build", ".jupyter_cache", "gallery/GALLERY_HEADER.rst", "gallery/*.ipynb"]

@@ -1,7 +1,8 @@
 """Directive that shows a figure which the commands of the page write.
 
 `{picture} runs/first/figures/summary.png` runs the command of the page whose `--out` is `runs/first`, before it those
-whose results it reads, with the files that the page shows. The figure is kept until undertow or the page changes.
+whose results it reads, with the files that the page shows and those that its Python writes. The figure is kept until
+undertow or the page changes.
 """
 
 import hashlib
@@ -58,14 +59,14 @@ def _made(page: str, figure: str, cache: Path) -> Path:
         for name, content in files.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
         for command in needed:
-            subprocess.run([sys.executable, "-m", *command], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+            subprocess.run([sys.executable, *command], cwd=folder, check=True, stdout=subprocess.DEVNULL)
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_bytes((Path(folder) / figure).read_bytes())
     return kept
 
 
 def _blocks(page: str) -> tuple[dict[str, str], list[list[str]]]:
-    """Files that a page shows, and the undertow commands in it, in their order."""
+    """Files that a page shows, and, as arguments of Python, its commands and its code that writes files, in order."""
     files, commands = {}, []
     for block in _BLOCK.finditer(page):
         code = block["code"]
@@ -74,18 +75,20 @@ def _blocks(page: str) -> tuple[dict[str, str], list[list[str]]]:
             files[name["name"]] = code
         elif block["language"] == "bash":
             lines = [shlex.split(line, comments=True) for line in code.replace("\\\n", " ").splitlines()]
-            commands += [words for words in lines if words[:1] == ["undertow"]]
+            commands += [["-m", *words] for words in lines if words[:1] == ["undertow"]]
+        elif ".write_text(" in code:
+            commands.append(["-c", code])
     return files, commands
 
 
 def _needed(commands: Sequence[list[str]], path: str) -> list[list[str]]:
-    """The commands that have to run for a file: the one that writes it, and what that reads, and every `init`."""
+    """What has to run for a file: the command that writes it, those that it reads, every `init` and the Python."""
     for number, words in enumerate(commands):
         out = words[words.index("--out") + 1] if "--out" in words else None
         if out is not None and path.startswith(f"{out}/"):
             before = commands[:number]
-            begins = [command for command in before if command[1] == "init"]
-            read = [command for word in words[1:] for command in _needed(before, word)]
+            begins = [command for command in before if command[0] == "-c" or command[2] == "init"]
+            read = [command for word in words[3:] for command in _needed(before, word)]
             return [command for command in commands[: number + 1] if command in (*begins, *read, words)]
     return []
 

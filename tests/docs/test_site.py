@@ -55,6 +55,16 @@ def test_named_code_files_exist(page):
     ] == []
 
 
+# What a reader sees at once: a figure of a run, boxes and arrows, the layers of the package, or an image.
+_PICTURE = re.compile(r"^(```\{(picture|signal-flow|layers)\}|!\[)", re.M)
+
+
+@pytest.mark.parametrize("folder", ["tutorials", "how-to", "explanation"])
+def test_every_page_has_a_picture(folder):
+    pages = [page for page in (DOCS / folder).glob("*.md") if page.stem not in ("index", "simdjit")]
+    assert [page.name for page in pages if not _PICTURE.search(page.read_text("utf-8"))] == []
+
+
 def test_every_kind_of_part_has_a_page():
     assert {path.stem for path in (DOCS / "reference" / "parts").glob("*.md")} - {"index"} == set(catalogue.KINDS)
 
@@ -113,14 +123,18 @@ def test_a_part_is_described_with_its_values_units_and_sources(monkeypatch):
 def test_a_picture_runs_what_its_command_reads(monkeypatch):
     pictures = extension("pictures", monkeypatch)
     page = (
-        "```yaml\n# dive.yaml\nloop: {}\n```\n```bash\nundertow init --own-vehicle\nundertow list\n"
+        "```yaml\n# dive.yaml\nloop: {}\n```\n```bash\nundertow init --own-vehicle\nundertow list\n```\n"
+        "```python\nPath('real.yaml').write_text('')\n```\n```python\nprint('more')\n```\n```bash\n"
         "undertow simulate dive.yaml --out runs/dive\nundertow identify my.yaml runs/dive/run.mcap --out runs/rov\n"
         "undertow tune runs/rov/identified.yaml --out runs/rov-tuned\n```\n"
     )
     files, commands = pictures._blocks(page)
     assert files == {"dive.yaml": "# dive.yaml\nloop: {}\n"}
-    ran = [words[1] for words in pictures._needed(commands, "runs/rov-tuned/figures/tuning.png")]
-    assert ran == ["init", "simulate", "identify", "tune"]
+    ran = [
+        words[2] if words[0] == "-m" else words[1]
+        for words in pictures._needed(commands, "runs/rov-tuned/figures/tuning.png")
+    ]
+    assert ran == ["init", "Path('real.yaml').write_text('')\n", "simulate", "identify", "tune"]
     assert pictures._needed(commands, "runs/other/figures/summary.png") == []
 
 
