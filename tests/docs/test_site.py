@@ -61,7 +61,8 @@ _PICTURE = re.compile(r"^(```\{(picture|signal-flow|layers)\}|!\[)", re.M)
 
 @pytest.mark.parametrize("folder", ["tutorials", "how-to", "explanation"])
 def test_every_page_has_a_picture(folder):
-    pages = [page for page in (DOCS / folder).glob("*.md") if page.stem not in ("index", "simdjit")]
+    tables = (DOCS / "explanation" / "index.md").read_text("utf-8").split("These pages hold tables")[1].split()
+    pages = [page for page in (DOCS / folder).glob("*.md") if page.stem not in ("index", "simdjit", *tables)]
     assert [page.name for page in pages if not _PICTURE.search(page.read_text("utf-8"))] == []
 
 
