@@ -19,12 +19,13 @@ from undertow.cli.options.run import RunCommand
 from undertow.cli.results_folder import check_folder, output_folder, remove
 from undertow.cli.stages import stage
 from undertow.cli.step_logs import logging_to
-from undertow.cli.tables import numbers, terminal_table, titled, wide_console
+from undertow.cli.tables import numbers, print_lines, terminal_table, titled, wide_console
 from undertow.control.supervision.conditions import State
 from undertow.control.supervision.transition_log import SupervisorTransition
 from undertow.core import checks
 from undertow.core.atomic_io import sync, write_whole
 from undertow.core.errors import BadInput
+from undertow.logs.read import read_log
 from undertow.outside.autopilot.autopilot import Autopilot
 from undertow.outside.autopilot.measured_motion import Format
 from undertow.outside.realtime.control_loop import RealTimeLoop
@@ -36,6 +37,7 @@ from undertow.outside.realtime.loop_statistics import LoopStatistics
 from undertow.outside.realtime.process_priority import scheduled
 from undertow.outside.realtime.udp_link import UdpVehicleLink, UdpVehicleServer
 from undertow.outside.realtime.vehicle_link import VehicleLink
+from undertow.report.answers.realtime_answer import answer_of_realtime_run
 from undertow.report.run_tables import transition_rows
 from undertow.scenario.build import Built, build
 from undertow.scenario.link_scenario import at_sampling_time, read_for_link
@@ -43,6 +45,7 @@ from undertow.scenario.reading import Text, dump
 
 _BEFORE = ".unbegun"  # where the log is before the first step, when an earlier one is still there
 _WRITTEN = ("run.mcap", "statistics.json", "scenario.yaml")
+_MOST_READ = 200_000  # steps of a log that is read for the answer, half an hour at 100 Hz: that takes twenty seconds
 
 
 def run(command: RunCommand) -> int:
@@ -109,7 +112,9 @@ def _controlled(built: Built, command: RunCommand) -> int:
                     write_whole(folder / name, text)
                 except OSError as error:
                     troubles.append(f"{folder / name} could not be written: {error.strerror or error}")
-            _print(statistics, folder, command.as_json)
+            _print(statistics, command.as_json)
+            if not command.as_json:
+                _answer(statistics, built, folder, troubles)
         else:
             remove(folder / _BEFORE)
             with contextlib.suppress(OSError):  # it held something before
@@ -179,7 +184,20 @@ def _supervision(autopilot: Autopilot) -> dict[str, Any]:
     }
 
 
-def _print(statistics: dict[str, Any], folder: Path, as_json: bool) -> None:
+def _answer(statistics: dict[str, Any], built: Built, folder: Path, troubles: list[str]) -> None:
+    """Say whether the vehicle held its reference, and where the results are."""
+    path = folder / "run.mcap"
+    console = wide_console()
+    log = None
+    if statistics["steps"] <= _MOST_READ and not troubles:
+        with stage(console, "reading the log"), contextlib.suppress(BadInput, OSError):
+            log = read_log(path)
+    answer = answer_of_realtime_run(log, built.closed_loop.plant.output_units, built.criterion(), statistics)
+    again = f"Next: undertow run {folder / 'scenario.yaml'} --link log:{path} computes the commands once more."
+    print_lines(console, [*answer.text, f"Results: {folder}", again])
+
+
+def _print(statistics: dict[str, Any], as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(statistics, indent=2))
         return
@@ -208,7 +226,6 @@ def _print(statistics: dict[str, Any], folder: Path, as_json: bool) -> None:
             for transition in statistics["transitions"]
         ]
         console.print(terminal_table(transition_rows(transitions)))
-    console.print(f"Ended: {statistics['ended']}. The last output is the safe one. Results: {folder}", highlight=False)
 
 
 def _ending(reason: Reason, link: AbstractLink, command: RunCommand, stop: EndingSignal) -> int:
