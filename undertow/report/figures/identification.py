@@ -20,6 +20,13 @@ _AXES = {
 _WIDTH = 6.4  # in
 _ROW = 0.17  # in, of a parameter
 _LEAST = 0.05  # smallest ratio that is shown
+# Ratios with a tick, for wide and narrow ranges: the first of these with three or more inside is taken.
+_TICKS = (
+    (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20),
+    (0.4, 0.5, 0.6, 0.8, 1, 1.2, 1.5, 2, 2.5),
+    (0.8, 0.9, 1, 1.1, 1.2),
+    (0.9, 0.95, 1, 1.05, 1.1),
+)
 _COLOURS = {"determined": style.SOLID.colour, "partly": style.DASHED.colour, "unknown": style.MEASURED.colour}
 
 
@@ -65,7 +72,8 @@ def intervals_figure(parameters: Mapping[str, Mapping[str, Any]]) -> Figure:
     low, high = max(_LEAST, 0.8 * float(ends.min())), min(1 / _LEAST, 1.25 * float(ends.max()))
     panel.set_xscale("log")
     panel.set_xlim(low, high)
-    ticks = [tick for tick in (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20) if low <= tick <= high]
+    inside = [[tick for tick in choice if low <= tick <= high] for choice in _TICKS]
+    ticks = next((choice for choice in inside if len(choice) > 2), inside[-1])
     panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     panel.minorticks_off()
     panel.set_yticks([-i for i in range(len(rows))], [in_words(name) for name in rows])
