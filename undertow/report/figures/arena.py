@@ -17,7 +17,8 @@ from undertow.studies.arena.scores import FINEST, LOST
 
 _SHOWN = 6  # laws with a colour in the charts of robustness; the others are grey
 _COLUMNS, _WIDTH, _HEIGHT = 3, 2.6, 1.75  # panels, in
-_PAGE, _SLANTED = 9.6, 0.85  # width of the figure of the tasks, and of the name of the last one beside its cell, in
+_PAGE, _NARROWEST = 9.6, 5.6  # widths of the figure of the tasks: of all of them, and that of its title, in
+_SLANTED = 0.85  # of the name of the last task, beside its cell, in
 
 
 def arena_plots(board: Board) -> Mapping[str, Callable[[], Figure]]:
@@ -35,7 +36,8 @@ def tasks_figure(board: Board) -> Figure:
     left = 0.25 + 0.075 * max(map(len, laws))
     top = 1.35
     cell = (min(0.6, (_PAGE - left - _SLANTED) / len(tasks)), 0.24)
-    figure = style.blank(_PAGE, top + cell[1] * len(laws) + 0.2)
+    width = min(_PAGE, max(_NARROWEST, left + cell[0] * len(tasks) + _SLANTED))
+    figure = style.blank(width, top + cell[1] * len(laws) + 0.2)
     style.head(figure, "Error / tolerance by task (geometric mean over the vehicles)", {})
     panel = style.place(figure, left, top, cell[0] * len(tasks), cell[1] * len(laws))
     panel.imshow(errors, norm=LogNorm(FINEST, LOST), cmap="RdYlBu_r", aspect="auto")
