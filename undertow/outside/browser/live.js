@@ -206,9 +206,9 @@ async function startLive(box) {
     shown.frames += 1;
     const elapsed = (wall - shown.since) / 1000;
     if (elapsed < 0.5) return;
-    const factor = ((steps - shown.steps) * loop.period) / elapsed, most = (spent.steps * loop.period) / (spent.wall / 1000);
+    const factor = ((steps - shown.steps) * loop.period) / elapsed, most = spent.wall ? (spent.steps * loop.period) / (spent.wall / 1000) : 0;
     Object.assign(box.dataset, { time: now().toFixed(2), factor: factor.toFixed(2), most: most.toFixed(1), frames: (shown.frames / elapsed).toFixed(1) });
-    const fast = spent.steps ? `, up to ${most.toFixed(0)} \u00d7` : "";
+    const fast = most ? `, up to ${most.toFixed(0)} \u00d7` : "";
     page.time.textContent = `${now().toFixed(1)} s \u00b7 ${factor.toFixed(1)} \u00d7 real time${fast}`;
     Object.assign(shown, { since: wall, steps, frames: 0 });
     if (spent.wall > 5000) Object.assign(spent, { wall: spent.wall / 2, steps: spent.steps / 2 });
