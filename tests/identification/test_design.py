@@ -6,10 +6,14 @@ import pytest
 
 from undertow.core.errors import BadInput
 from undertow.core.runtime import in_precision
+from undertow.report.answers.design_answer import answer_of_design
+from undertow.report.experiment_page import write_design
+from undertow.report.figures.experiment import rehearsal_figure
 from undertow.scenario.build import build
 from undertow.scenario.scenario_vehicle import vehicle_of
 from undertow.studies.identification.block_choice import greedy_choice, least_shares, loss, shares_left
 from undertow.studies.identification.design import STEP, design
+from undertow.studies.identification.design_data import design_data
 from undertow.studies.identification.design_result import DesignRequest
 from undertow.studies.identification.dive import SENSOR_OF_RESIDUAL
 from undertow.studies.identification.dive_information import information_of
@@ -112,11 +116,38 @@ def test_information_is_that_of_finite_differences(built):
     np.testing.assert_allclose(simulated.noise[:3], 0.02, rtol=0.2)
 
 
+@pytest.fixture(scope="module")
+def designed(built):
+    with in_precision("float64"):
+        return design(built, DesignRequest(ROOM, 74.0, free=FREE))
+
+
 @pytest.mark.full
-def test_experiment_keeps_its_room_and_lowers_the_deviations(built):
+def test_page_has_the_rehearsal_and_every_number(designed, tmp_path):
+    data = design_data(designed)
+    assert write_design("rov", designed, data, tmp_path, tmp_path) == []
+    page = (tmp_path / "experiment.html").read_text("utf-8")
+    assert answer_of_design(data, tmp_path).verdict in page
+    numbers, _, script = page.partition('id="script"')
+    for parameter in data["parameters"].values():
+        assert f">{100 * parameter['deviation_left']:.0f} %<" in numbers
+    assert script.count("<tr>") == 1 + len(designed.blocks) + 1 + 5  # with two heads, and five limits
+    assert {path.name for path in (tmp_path / "figures").glob("*.svg")} == {"rehearsal.svg", "deviations.svg"}
+
+
+def test_figure_of_the_rehearsal_has_the_limits_of_the_room():
+    time = np.linspace(0.0, 10.0, 11)
+    panels = rehearsal_figure(time, np.column_stack([0.1 * time, -0.1 * time, 0 * time]), ROOM).axes
+    for panel, length, last in zip(panels, ROOM, (1.0, -1.0, 0.0), strict=True):
+        way, low, high = panel.get_lines()
+        assert way.get_ydata()[-1] == pytest.approx(last)
+        assert (low.get_ydata()[0], high.get_ydata()[0]) == (-length / 2, length / 2)
+
+
+@pytest.mark.full
+def test_experiment_keeps_its_room_and_lowers_the_deviations(built, designed):
     """A minute, rehearsed anew from the scenario that is written, also with another vehicle."""
     with in_precision("float64"):
-        designed = design(built, DesignRequest(ROOM, 74.0, free=FREE))
         assert len(designed.blocks) == 6
         assert all(expected.share < 0.5 for expected in designed.expected)
         assert max(designed.use) < 1

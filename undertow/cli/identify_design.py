@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from undertow.cli.exit_codes import DONE
+from undertow.cli.exit_codes import DONE, warn_of
 from undertow.cli.identify import priors_of
 from undertow.cli.interruptible import interruptible
 from undertow.cli.options.identify_design import IdentifyDesignCommand
@@ -15,6 +15,7 @@ from undertow.core.json_text import to_json
 from undertow.core.number_text import plain
 from undertow.report.answers.design_answer import answer_of_design
 from undertow.report.answers.identification_answer import in_words
+from undertow.report.experiment_page import write_design
 from undertow.scenario.build import build
 from undertow.scenario.reading import read
 from undertow.scenario.scenario_vehicle import with_reference
@@ -22,7 +23,7 @@ from undertow.studies.identification.design import design
 from undertow.studies.identification.design_data import design_data, write_experiment
 from undertow.studies.identification.design_result import DesignRequest
 
-_WRITTEN = ("experiment.json", "experiment.yaml", "experiment.csv")
+_WRITTEN = ("experiment.json", "experiment.yaml", "experiment.csv", "figures", "experiment.html")
 
 
 def identify_design(command: IdentifyDesignCommand) -> int:
@@ -49,9 +50,11 @@ def identify_design(command: IdentifyDesignCommand) -> int:
         data = design_data(result)
         (draft.path / "experiment.json").write_text(to_json(data, indent=1) + "\n", encoding="utf-8")
         write_experiment(result, draft.path)
+        failures = write_design(command.scenario.stem, result, data, draft.path, folder)
+    warn_of(failures)
     if command.details:
         console.print(_table(data))
-    print_lines(console, [*answer_of_design(data, folder).text, f"Results: {folder}"])
+    print_lines(console, [*answer_of_design(data, folder).text, f"Page: {folder / 'experiment.html'}"])
     return DONE
 
 

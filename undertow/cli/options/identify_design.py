@@ -16,8 +16,8 @@ class IdentifyDesignCommand(Command):
 
     The deviations of the vehicle file, or usual ones, are what is known beforehand; noise is that of the scenario's
     navigation. The command writes experiment.yaml, a scenario whose controller keeps the place and adds the forces of
-    experiment.csv, with limits that end it. `undertow simulate`, `run` and `mavlink` take it. experiment.json has the
-    deviations to expect.
+    experiment.csv, with limits that end it. `undertow simulate`, `run` and `mavlink` take it. experiment.html
+    and experiment.json have the deviations to expect.
     """
 
     runs: ClassVar = "undertow.cli.identify_design:identify_design"
