@@ -22,6 +22,7 @@ import numpy as np
 import undertow as ut
 from undertow.core.errors import BadInput
 from undertow.studies.identification.estimates import METHODS
+from undertow.studies.identification.validation import prediction_errors
 
 AXES = ("u", "v", "w", "p", "q", "r")
 
@@ -127,13 +128,17 @@ def main() -> None:
 
 
 def heavy_mocap(folder: Path, work: Path, method: str) -> None:
-    """Each run from the others, free run from its first sample, beside the owners' simulator."""
+    """Each run from the others, and from all; free runs from the first sample, beside the owners' simulator."""
     scenario, mapping = _written(work, "heavy.yaml", HEAVY), _written(work, "sticks.yaml", STICKS)
     files = sorted(folder.glob("*.csv"))
     logs = [ut.read_log(file, mapping=mapping) for file in files]
     model = ut.identify(scenario, logs, per_axis=True, method=method, step=0.1)
     rows = [np.array([validation.identified.fit[axis] for axis in AXES]) for validation in model.result.validation]
     _print_fits([*(file.stem for file in files), "mean"], [*rows, np.mean(rows, axis=0)])
+    found = model.result
+    inside = [prediction_errors(found.model, found.z, dive).fit for dive in found.dives]
+    rows = [np.array([fit[axis] for axis in AXES]) for fit in inside]
+    _print_fits([*(f"{file.stem}, used" for file in files), "mean, used"], [*rows, np.mean(rows, axis=0)])
     theirs = [_simulator_fit(file) for file in files]
     _print_fits([*(f"{file.stem}, owners" for file in files), "mean, owners"], [*theirs, np.mean(theirs, axis=0)])
     _print_fits(["at least"], [np.array(BARS)])
