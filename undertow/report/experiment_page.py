@@ -16,11 +16,18 @@ from undertow.report.page import Html, bullets, document, figure, join, section,
 from undertow.report.quantities import quantity
 from undertow.studies.identification.design_result import Design
 
+_FORMS = {
+    "telegraph": "to and fro at random, each way for less than a second",
+    "slow telegraph": "to and fro at random, each way for a second or two",
+    "multisine": "smooth swings of several frequencies together",
+    "steps": "one way, the other way for twice as long, and back",
+    "decay": "a push, and then nothing",
+}
 _CAPTIONS = {
     "rehearsal": "How far the simulated vehicle of the file goes from its station while the script runs. Beyond the "
     "dashed lines the script ends by itself.",
     "deviations": "What is left of the standard deviation of each number, of that before the experiment. Blue: numbers "
-    "that the experiment is for. Grey: further ones that are estimated. The line is at one half.",
+    "that the experiment is for. Grey, if any: further ones that are estimated. The line is at one half.",
 }
 
 
@@ -80,11 +87,12 @@ def _not_determined(data: Mapping[str, Any]) -> list[Html]:
 
 
 def _blocks(data: Mapping[str, Any]) -> Html:
-    rows = [(i, b["form"], b["where"], quantity(b["size"], "")) for i, b in enumerate(data["blocks"], 1)]
+    blocks = enumerate(data["blocks"], 1)
+    rows = [(i, b["form"], _FORMS[b["form"]], b["where"], quantity(b["size"], "")) for i, b in blocks]
     note = (
         "Blocks of ten seconds, one after the other; sizes are shares of the largest force of the thrusters that way."
     )
-    return join(tag("p", note), table(("block", "form", "where", "size"), rows, numeric=(0, 3)))
+    return join(tag("p", note), table(("block", "form", "what", "where", "size"), rows, numeric=(0, 4)))
 
 
 def _limits(data: Mapping[str, Any]) -> Html:

@@ -35,7 +35,8 @@ _CAPTIONS = {
 _SURE = (
     "An interval contains the true value in 95 of 100 cases if the model has the right form. It allows for "
     "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the "
-    "model lacks: the free run above tells whether that matters."
+    "model lacks: the free run above tells whether that matters. In vehicle.yaml `+-` is one standard deviation, half of "
+    "what the interval is wide to each side."
 )
 
 
@@ -114,13 +115,14 @@ def _numbers(data: Mapping[str, Any]) -> Html:
     rows = []
     for name, parameter in data["parameters"].items():
         interval, verdict = interval_of(parameter), VERDICTS[parameter["verdict"]]
-        values = (number(parameter["prior"]), number(parameter["value"]))
+        before, after = parameter["prior"], parameter["value"]
+        values = (number(before), number(after), f"{100 * (after / before - 1):+.0f} %" if before else "")
         rows.append((in_words(name), *values, interval, profile_words(parameter), unit(parameter["unit"]), verdict))
-    columns = ["number", "file", "estimate", "95 % interval", "by the profile", "unit", ""]
+    columns = ["number", "file", "estimate", "change", "95 % interval", "by the profile", "unit", ""]
     if not any("profile" in parameter for parameter in data["parameters"].values()):
         columns.remove("by the profile")
-        rows = [(*row[:4], *row[5:]) for row in rows]
-    return table(columns, rows, numeric=(1, 2, 3))
+        rows = [(*row[:5], *row[6:]) for row in rows]
+    return table(columns, rows, numeric=(1, 2, 3, 4))
 
 
 def _not_determined(data: Mapping[str, Any]) -> list[Html]:
@@ -136,12 +138,12 @@ def _white(data: Mapping[str, Any]) -> Html:
     if not coloured:
         return tag("p", "What remains unexplained looks like noise in every sensor (autocorrelation over 20 samples).")
     sentence = (
-        f"What remains unexplained in {', '.join(coloured)} is no noise: it lasts longer than a sample, or goes with "
-        "the inputs. The intervals allow for its duration. Its cause is a disturbance, or something that the model "
-        "lacks."
+        f"What is left between model and measurement in {', '.join(coloured)} is more than noise of the sensors: it "
+        "lasts longer than a sample, or goes with the inputs. The intervals are wider for it. Its cause is a "
+        "disturbance, or something that the model lacks; where the fits are near 100 % it is small."
     )
     if data["method"] == "output_error":
-        sentence += " If forces disturbed the dive (a tether, eddies), `--method prediction_error` is surer."
+        sentence += " If a tether or eddies pulled at the vehicle, compare with `--method prediction_error`."
     return tag("p", prose(sentence))
 
 
@@ -185,4 +187,6 @@ def _ahead(data: Mapping[str, Any]) -> Html:
                 errors = [error for error in errors if error is not None]
                 cells.append(number(float(np.sqrt(np.mean(np.square(errors)))) if errors else None))
             rows.append((f"{horizon} s", label, *cells))
+    if not names:  # dives, or parts of one, that are too short for a look ahead
+        return Html("")
     return table(("error ahead, rms", "model", *names), rows, numeric=range(2, 2 + len(names)), wide=True)

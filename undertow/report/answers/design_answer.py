@@ -23,9 +23,10 @@ def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
     of_interest = {name: p for name, p in data["parameters"].items() if p["of_interest"]}
     halved = [name for name, p in of_interest.items() if p["halved"]]
     verdict = (
-        f"A script of {data['duration']:.0f} s is expected to halve the deviations of {len(halved)} of "
-        f"{len(of_interest)} numbers, or more."
+        f"A script of {data['duration']:.0f} s is expected to make {len(halved)} of {len(of_interest)} numbers twice "
+        "as sure, or more."
     )
+    experiment = folder / "experiment.yaml"
     lines = (
         *_gains(of_interest),
         *_kept(of_interest),
@@ -34,19 +35,21 @@ def answer_of_design(data: Mapping[str, Any], folder: Path) -> PlainAnswer:
         "These deviations are for a model of the right form and the noise of the scenario; waves, a tether or what the "
         "model lacks leave more.",
         *data["notes"],
-        f"Rehearse it: undertow simulate {folder / 'experiment.yaml'}",
-        "Carry it out with `undertow run` or `undertow mavlink` and the same file; then give the log to "
-        "`undertow identify`.",
+        f"Rehearse it: undertow simulate {experiment}. Carry it out: undertow run {experiment} --link udp:HOST:PORT, "
+        f"or undertow mavlink {experiment} --log dive.mcap; the controller keeps the place, and Ctrl-C ends it. Then "
+        "give the log to `undertow identify`.",
     )
-    return PlainAnswer(len(halved) == len(of_interest), verdict, lines)
+    return PlainAnswer(None if 0 < len(halved) < len(of_interest) else bool(halved), verdict, lines)
 
 
 def _gains(of_interest: Mapping[str, Any]) -> Iterator[str]:
     order = sorted(of_interest, key=lambda name: of_interest[name]["deviation_left"])
     order = [name for name in order if of_interest[name]["halved"]]
     if order:
-        shown = "; ".join(f"{in_words(name)} from {_before_and_after(of_interest[name])}" for name in order[-_SHOWN:])
-        yield f"Of these, the least: {shown} (one standard deviation)."
+        shown = "; ".join(
+            f"{in_words(name)} from {_before_and_after(of_interest[name])}" for name in order[::-1][:_SHOWN]
+        )
+        yield f"The least of these gains: {shown} (give or take, one standard deviation)."
 
 
 def _before_and_after(parameter: Mapping[str, Any]) -> str:
@@ -58,20 +61,24 @@ def _kept(of_interest: Mapping[str, Any]) -> Iterator[str]:
     kept = [name for name, p in of_interest.items() if not p["halved"]]
     if kept:
         shown = "; ".join(f"{in_words(name)} ({100 * of_interest[name]['deviation_left']:.0f} % left)" for name in kept)
-        yield f"Not halved: {shown}."
+        yield f"These gain less: {shown}."
 
 
 def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
     for combination in data["undetermined"][:1]:
-        yield f"{combination_in_words(combination)}: weigh the vehicle, or measure a thrust, to separate them."
+        sentence = combination_in_words(combination).replace("these data", "them")
+        yield f"By this experiment alone: {sentence}. To weigh the vehicle, or to measure a thrust, separates them."
 
 
 def _room(data: Mapping[str, Any]) -> str:
     along, across, vertical = data["farthest"]
     others = np.array(data["largest_use_of_limits"][1:])
     staying = int((others <= 1).sum())
+    least, most = data["limits"]["depth"]
     return (
-        f"In the rehearsal the vehicle stays within {along:.2f} m along its heading, {across:.2f} m across and "
-        f"{vertical:.2f} m vertically of its station. Of {len(others)} other vehicles within the deviations {staying} "
-        "stay within the limits, which end the script where one does not."
+        f"In the rehearsal the centre of the vehicle stays within {along:.2f} m forward and back, {across:.2f} m "
+        f"sideways and {vertical:.2f} m up and down of where it begins; its hull needs half its size more. It begins "
+        f"{data['station'][2]:.3g} m deep, and above {least:.3g} m or below {most:.3g} m the script ends. If the "
+        f"numbers are as wrong as they may be, {len(others) - staying} of {len(others)} tries leave the room, and the "
+        "script ends by itself."
     )

@@ -13,6 +13,16 @@ from undertow.report.quantities import quantity
 _SHOWN = 4  # parameters named in a line
 _ALIKE = 1.0  # difference of mean fits, %, that is none
 _FAR = 4.0  # deviations beforehand, from which on an estimate is not believable
+_VELOCITIES = {"u": "surge", "v": "sway", "w": "heave", "p": "roll rate", "q": "pitch rate", "r": "yaw rate"}
+# Groups of numbers that stay as the file has them where none of them is estimated.
+_GROUPS = {
+    "added mass": ("added_mass",),
+    "linear damping": ("linear_damping",),
+    "quadratic damping": ("quadratic_damping",),
+    "centre of buoyancy": ("r_b",),
+    "net buoyancy": ("net_buoyancy",),
+    "thrusters": ("thruster_gain", "reverse_gain", "lag", "axis_gain", "axis_lag"),
+}
 _AS_BEFORE = "their intervals are as wide as what was known before"
 
 
@@ -37,6 +47,7 @@ def answer_of_identification(data: Mapping[str, Any], folder: Path | None = None
         *_fit_line(fits),
         *_convergence(data),
         *_best_known(data),
+        *_not_estimated(data),
         *_refused(data),
         *_unknown(data),
         *_ratios(data),
@@ -101,8 +112,10 @@ def _far_line(far: Sequence[str]) -> Iterator[str]:
 
 def _fit_line(fits: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     if fits:
-        pairs = ", ".join(f"{axis} {_or_worse(own)} ({_or_worse(before)})" for axis, (own, before) in fits.items())
-        yield f"Fit of the velocities over whole dives, with that of the file in brackets: {pairs}; 100 % is perfect."
+        both = {_VELOCITIES[axis]: f"{_or_worse(own)} ({_or_worse(before)})" for axis, (own, before) in fits.items()}
+        pairs = ", ".join(f"{name} {fit}" for name, fit in both.items())
+        scale = "100 % is perfect, 0 % no better than the mean"
+        yield f"Predicted speeds, with those of the file in brackets: {pairs}; {scale}."
 
 
 def _or_worse(fit: float) -> str:
@@ -131,8 +144,20 @@ def _best_known(data: Mapping[str, Any]) -> Iterator[str]:
     known = {name: p for name, p in data["parameters"].items() if p["verdict"] == "determined"}
     if known:
         order = sorted(known, key=lambda name: known[name]["deviation_left"])[:_SHOWN]
-        shown = "; ".join(f"{in_words(name)} {interval_words(known[name])}" for name in order)
-        yield f"{len(known)} of them are determined by the dives, best: {shown} (95 % intervals)."
+        shown = "; ".join(_found(name, known[name]) for name in order)
+        yield f"{len(known)} of them are determined, best: {shown}. The truth is within such brackets in 95 of 100 cases."
+
+
+def _found(name: str, parameter: Mapping[str, Any]) -> str:
+    return f"{in_words(name)} {interval_words(parameter)}, in the file {plain(parameter['prior'])}"
+
+
+def _not_estimated(data: Mapping[str, Any]) -> Iterator[str]:
+    """Numbers on which the others rest."""
+    estimated = {name.partition(".")[0] for name in data["parameters"]}
+    kept = [words for words, names in _GROUPS.items() if not estimated & set(names)]
+    if kept:
+        yield f"As the file has them: {', '.join(kept)}. Where these are wrong, the others may be."
 
 
 def _refused(data: Mapping[str, Any]) -> Iterator[str]:

@@ -42,11 +42,11 @@ def free_run_figure(series: Mapping[str, Series], fits: Mapping[str, float]) -> 
     """
     height, gap, top = 0.75, 0.22, 0.45  # in
     figure = style.blank(_WIDTH, top + len(series) * (height + gap) + 0.35)
-    style.head(figure, "Free run over a dive not used", {"measured": style.MEASURED, "predicted": style.SOLID})
+    style.head(figure, "Free run over a dive not used", {"measured": style.TRUTH, "predicted": style.SOLID})
     for i, (axis, (time, measured, predicted)) in enumerate(series.items()):
         panel = style.place(figure, 0.75, top + i * (height + gap), 4.9, height)
-        panel.plot(time, measured, **style.MEASURED.line)
         panel.plot(time, predicted, **style.SOLID.line)
+        panel.plot(time, measured, **style.TRUTH.line)
         panel.set_xlim(float(time[0]), float(time[-1]))
         panel.text(1.02, 0.5, f"{fits[axis]:.0f} %", transform=panel.transAxes, va="center", fontsize=style.TEXT)
         is_last = i == len(series) - 1
