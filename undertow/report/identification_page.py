@@ -35,8 +35,8 @@ _CAPTIONS = {
 _SURE = (
     "An interval contains the true value in 95 of 100 cases if the model has the right form. It allows for "
     "disturbances that last for seconds, and for estimates that differ from dive to dive. It cannot allow for what the "
-    "model lacks: the free run above tells whether that matters. In vehicle.yaml `+-` is one standard deviation, half of "
-    "what the interval is wide to each side."
+    "model lacks: the free run above tells whether that matters. In vehicle.yaml `+-` is one standard deviation: "
+    "about half of what the interval has to each side."
 )
 
 

@@ -66,8 +66,9 @@ def _kept(of_interest: Mapping[str, Any]) -> Iterator[str]:
 
 def _ratios(data: Mapping[str, Any]) -> Iterator[str]:
     for combination in data["undetermined"][:1]:
-        sentence = combination_in_words(combination).replace("these data", "them")
-        yield f"By this experiment alone: {sentence}. To weigh the vehicle, or to measure a thrust, separates them."
+        sentence = combination_in_words(combination)
+        alone = f"{sentence[0].lower()}{sentence[1:]}"
+        yield f"By this experiment alone {alone}. Weighing the vehicle, or measuring a thrust, separates them."
 
 
 def _room(data: Mapping[str, Any]) -> str:

@@ -145,7 +145,7 @@ def _best_known(data: Mapping[str, Any]) -> Iterator[str]:
     if known:
         order = sorted(known, key=lambda name: known[name]["deviation_left"])[:_SHOWN]
         shown = "; ".join(_found(name, known[name]) for name in order)
-        yield f"{len(known)} of them are determined, best: {shown}. The truth is within such brackets in 95 of 100 cases."
+        yield f"{len(known)} of them are determined, best: {shown}. In 95 of 100 cases the brackets hold the truth."
 
 
 def _found(name: str, parameter: Mapping[str, Any]) -> str:
