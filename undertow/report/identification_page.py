@@ -116,7 +116,7 @@ def _numbers(data: Mapping[str, Any]) -> Html:
     for name, parameter in data["parameters"].items():
         interval, verdict = interval_of(parameter), VERDICTS[parameter["verdict"]]
         before, after = parameter["prior"], parameter["value"]
-        values = (number(before), number(after), f"{100 * (after / before - 1):+.0f} %" if before else "")
+        values = (number(before), number(after), f"{round(100 * (after / before - 1)):+d} %" if before else "")
         rows.append((in_words(name), *values, interval, profile_words(parameter), unit(parameter["unit"]), verdict))
     columns = ["number", "file", "estimate", "change", "95 % interval", "by the profile", "unit", ""]
     if not any("profile" in parameter for parameter in data["parameters"].values()):
