@@ -7,6 +7,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
@@ -260,6 +261,19 @@ def test_correlation_of_residuals_is_that_of_a_first_order_process():
     assert not test.is_white
     assert test.correlation == pytest.approx(0.6, abs=0.02)
     assert whiteness(noise + 0.2 * np.roll(inputs[:, 0], 3), inputs).with_inputs == pytest.approx(0.2, abs=0.02)
+
+
+def test_correlations_of_residuals_are_those_of_scipy():
+    generator = np.random.default_rng(4)
+    e, u = generator.standard_normal((2, 300))
+    e, lags = e - e.mean(), np.arange(1, 21)
+    theirs = scipy.signal.correlate(e, e)[len(e) - 1 + lags] / (e @ e)
+    with_u = scipy.signal.correlate(e, u - u.mean())[len(e) - 1 + np.arange(21)] / np.sqrt(
+        (e @ e) * ((u - u.mean()) ** 2).sum()
+    )
+    test = whiteness(e + 1.0, u[:, None])
+    assert test.correlation == pytest.approx(np.abs(theirs).max(), rel=1e-12)
+    assert test.with_inputs == pytest.approx(np.abs(with_u).max(), rel=1e-12)
 
 
 def test_dives_that_no_estimate_used_are_what_a_model_is_judged_by():
