@@ -21,6 +21,7 @@ import numpy as np
 
 import undertow as ut
 from undertow.core.errors import BadInput
+from undertow.core.runtime import in_precision
 from undertow.studies.identification.estimates import METHODS
 from undertow.studies.identification.validation import prediction_errors
 
@@ -136,7 +137,8 @@ def heavy_mocap(folder: Path, work: Path, method: str) -> None:
     rows = [np.array([validation.identified.fit[axis] for axis in AXES]) for validation in model.result.validation]
     _print_fits([*(file.stem for file in files), "mean"], [*rows, np.mean(rows, axis=0)])
     found = model.result
-    inside = [prediction_errors(found.model, found.z, dive).fit for dive in found.dives]
+    with in_precision("float64"):
+        inside = [prediction_errors(found.model, found.z, dive).fit for dive in found.dives]
     rows = [np.array([fit[axis] for axis in AXES]) for fit in inside]
     _print_fits([*(f"{file.stem}, used" for file in files), "mean, used"], [*rows, np.mean(rows, axis=0)])
     theirs = [_simulator_fit(file) for file in files]
