@@ -9,8 +9,8 @@ from undertow.report.answers.arena_answer import answer_of_board
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.arena import arena_plots
 from undertow.report.figures.writing import save_all
-from undertow.report.formats import prose
-from undertow.report.page import Html, bullets, document, figure, section, table, tag
+from undertow.report.formats import captioned, prose
+from undertow.report.page import Html, bullets, document, section, table, tag
 from undertow.studies.arena.leader_board import (
     BASELINE,
     Board,
@@ -61,10 +61,7 @@ def write_board(board: Board, folder: Path, pdf: str | None = None) -> tuple[Pat
         OSError: the folder cannot be written.
     """
     saved = save_all(lambda: arena_plots(board), folder / "figures", pdf)
-    pictures = {
-        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
-        for name, vector in saved.vectors.items()
-    }
+    pictures = captioned(saved.vectors, _CAPTIONS)
     title = f"Arena, version {VERSION}"
     trials = max(len(result.errors) for standing in board.standings for result in standing.score.cells.values())
     lead = (

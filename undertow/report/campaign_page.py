@@ -15,8 +15,8 @@ from undertow.report.answers.campaign_answer import answer_of_campaign, by_xla
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.campaign import SHOWN, distributions_figure, sensitivity_figure, shown_inputs
 from undertow.report.figures.writing import Plots, Saved, save_all
-from undertow.report.formats import chip, ending, number, prose, quantity, unit
-from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
+from undertow.report.formats import captioned, chip, ending, number, prose, quantity, unit
+from undertow.report.page import Html, bullets, document, join, section, table, tag
 from undertow.report.replay.replay_data import ReplayData
 from undertow.report.replay.replay_section import replay_looks, replay_section
 from undertow.studies.campaign.campaign_schema import Distribution
@@ -136,10 +136,7 @@ def _plots(results: Results, summary: Mapping[str, Any]) -> Plots:
 
 def _figures(saved: Saved) -> dict[str, Html]:
     """Figures by name, for the page."""
-    return dict.fromkeys(_CAPTIONS, Html("")) | {
-        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
-        for name, vector in saved.vectors.items()
-    }
+    return dict.fromkeys(_CAPTIONS, Html("")) | captioned(saved.vectors, _CAPTIONS)
 
 
 def _values(results: Results, summary: Mapping[str, Any]) -> dict[str, dict[str, np.ndarray]]:

@@ -11,8 +11,8 @@ from undertow.report.answers.identification_answer import combination_in_words, 
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.experiment import deviations_figure, rehearsal_figure
 from undertow.report.figures.writing import save_all
-from undertow.report.formats import number, prose, unit
-from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
+from undertow.report.formats import captioned, number, prose, unit
+from undertow.report.page import Html, bullets, document, join, section, table, tag
 from undertow.report.quantities import quantity
 from undertow.studies.identification.design_result import Design
 
@@ -50,10 +50,7 @@ def write_design(title: str, design: Design, data: Mapping[str, Any], out: Path,
         "deviations": lambda: deviations_figure(data["parameters"]),
     }
     saved = save_all(lambda: figures, out / "figures", None)
-    pictures = {
-        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
-        for name, vector in saved.vectors.items()
-    }
+    pictures = captioned(saved.vectors, _CAPTIONS)
     page = document(
         f"Experiment for {title}",
         tag("h1", prose(f"Experiment for {title}")),

@@ -6,12 +6,13 @@ A number has three significant digits, a typographic minus sign, and a power of 
 import math
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from undertow.analysis.success import DEFAULT, evaluate_success
 from undertow.core.number_text import DIGITS, LARGE, SMALL, display_units, plain, with_minus
 from undertow.report.mathml import with_symbols
-from undertow.report.page import Html, join, marked, tag, text
+from undertow.report.page import Html, figure, join, marked, tag, text
 
 # In plain text, as Python prints them: powers of ten, minus signs (not hyphens), and plus or minus.
 _POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]?)0*(\d+)(?!\w)")
@@ -140,3 +141,11 @@ def ending(entry: Mapping[str, Any]) -> str:
 def round_time(seconds: float) -> str:
     """Three digits, but whole seconds from 100 s on."""
     return f"{seconds:.0f}" if seconds >= 100 else f"{seconds:.3g}"
+
+
+def captioned(vectors: Mapping[str, Path], captions: Mapping[str, str]) -> dict[str, Html]:
+    """Figures that were saved as SVG, by name, each with its caption, which also says what it shows."""
+    return {
+        name: figure(vector.read_text(encoding="utf-8"), name, captions[name], prose(captions[name]))
+        for name, vector in vectors.items()
+    }

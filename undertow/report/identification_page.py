@@ -18,7 +18,7 @@ from undertow.report.answers.notebook import in_notebook
 from undertow.report.answers.plain_answer import answer_block
 from undertow.report.figures.identification import Series, free_run_figure, intervals_figure
 from undertow.report.figures.writing import Plots, save_all, small_png
-from undertow.report.formats import number, prose, unit
+from undertow.report.formats import captioned, number, prose, unit
 from undertow.report.identified_numbers import VERDICTS, findings_of, interval_of
 from undertow.report.page import Html, bullets, document, figure, join, section, table, tag
 from undertow.studies.identification.identify import Identification
@@ -57,10 +57,7 @@ def write_identification(
         OSError: the folder cannot be written.
     """
     saved = save_all(lambda: identification_plots(identification, data), out / "figures", pdf)
-    pictures = {
-        name: figure(vector.read_text(encoding="utf-8"), name, _CAPTIONS[name], prose(_CAPTIONS[name]))
-        for name, vector in saved.vectors.items()
-    }
+    pictures = captioned(saved.vectors, _CAPTIONS)
     page = document(
         f"Identification of {title}",
         tag("h1", prose(f"Identification of {title}")),

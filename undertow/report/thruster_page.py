@@ -15,9 +15,9 @@ from undertow.report.answers.plain_answer import answer_block
 from undertow.report.answers.thruster_answer import NAMES, answer_of_thruster
 from undertow.report.figures.thruster_bench import bench_figure
 from undertow.report.figures.writing import save_all
-from undertow.report.formats import number, prose, unit
+from undertow.report.formats import captioned, number, prose, unit
 from undertow.report.identified_numbers import VERDICTS, findings_of, interval_of
-from undertow.report.page import Html, document, figure, join, section, table, tag
+from undertow.report.page import Html, document, join, section, table, tag
 from undertow.studies.identification.bench.bench_response import settled_response
 from undertow.studies.identification.bench.bench_table import UNIT_OF
 from undertow.studies.identification.bench.identify_thruster import ThrusterIdentification
@@ -60,10 +60,7 @@ def write_thruster_page(
     """
     plot = lambda: _plot(identification, others)
     saved = save_all(lambda: {"thrust": plot}, out / "figures", pdf)
-    pictures = [
-        figure(vector.read_text(encoding="utf-8"), name, _CAPTION, prose(_CAPTION))
-        for name, vector in saved.vectors.items()
-    ]
+    pictures = captioned(saved.vectors, {"thrust": _CAPTION}).values()
     page = document(
         f"Thruster of {title}",
         tag("h1", prose(f"Thruster of {title}")),

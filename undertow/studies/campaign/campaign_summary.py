@@ -69,7 +69,6 @@ def correlations(results: Results, realized: Mapping[str, np.ndarray]) -> dict[s
 
 def _correlations(results: Results, columns: Mapping[str, np.ndarray]) -> dict[str, dict[str, float]]:
     """Input -> metric -> rank correlation, for columns with one value per completed trial."""
-
     by_input: dict[str, dict[str, float]] = {}
     numbers = results.combinations[results.lasted][:_CORRELATED]
     columns = {key: column[:_CORRELATED] for key, column in columns.items()}

@@ -68,7 +68,6 @@ class Samples:
             return np.zeros((self._block, 0))
         if self._campaign.design == "random":
             return np.random.default_rng([seed, _POINTS, block]).random((self._block, dimensions))
-
         chance = np.random.default_rng([seed, _POINTS])
         if self._campaign.design == "latin":
             return scipy.stats.qmc.LatinHypercube(dimensions, rng=chance).random(self._block)
