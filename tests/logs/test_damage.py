@@ -1,5 +1,6 @@
 """Files that are damaged, cut off, or of somebody else: one line that names the file and the place, or what is left."""
 
+import netCDF4
 import numpy as np
 import pytest
 from other_programs import json_mcap, ros1_bag
@@ -7,6 +8,7 @@ from test_log_formats import bag, bin_file, ros_messages, ulg_file
 from test_mavlink_logs import tlog_file
 
 from undertow.core.errors import BadInput
+from undertow.logs import result_file
 from undertow.logs.csv_writer import write_csv
 from undertow.logs.log import Log
 from undertow.logs.log_signals import Series
@@ -277,3 +279,19 @@ def test_gaps_are_counted():
     found = Log({"depth": Series(time, values, (), "m")}, "x", "CSV").sampling("depth")
     assert (found.samples, found.gaps) == (150, 1) and found.longest_gap == pytest.approx(4.01)
     assert found.rate == pytest.approx(100) and found.missing == pytest.approx(29 / 150)
+
+
+def test_a_netcdf_file_that_its_library_reads_for_ever(tmp_path, monkeypatch):
+    """The first entry of a heap has number 0 and length 0, so that HDF5 comes back to it without end."""
+    monkeypatch.setattr(result_file, "_LONGEST", 3.0)  # s
+    path = tmp_path / "run.nc"
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("time", 4)
+        file.createVariable("time", "f8", ("time",))
+        file.createVariable("position", "f8", ("time",))
+    damaged = bytearray(path.read_bytes())
+    heap = damaged.index(b"GCOL")
+    damaged[heap + 16 : heap + 32] = bytes(16)
+    path.write_bytes(damaged)
+    with pytest.raises(BadInput, match=r"run\.nc.* damaged: the netCDF library does not finish opening it"):
+        read_log(path)

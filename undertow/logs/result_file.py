@@ -1,6 +1,8 @@
 """Opening the result file of a run, which may be damaged or hostile."""
 
 import contextlib
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +11,10 @@ from undertow.core.unpacked_size import size_complaint
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# HDF5 reads some damaged heaps for ever, and nothing ends that in this process. To open a file of any size takes a
+# quarter of a second there, most of it the import.
+_LONGEST = 20.0  # s
 
 
 class UnreadableResult(Exception):
@@ -28,6 +34,8 @@ def opened_result(path: Path) -> Iterator["xr.Dataset"]:
         raise UnreadableResult("missing")
     if path.stat().st_size == 0:
         raise UnreadableResult("empty (0 bytes)")
+    if not _opens(path):
+        raise UnreadableResult("damaged: the netCDF library does not finish opening it")
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
             if complaint := size_complaint(path, dataset.nbytes):
@@ -37,3 +45,16 @@ def opened_result(path: Path) -> Iterator["xr.Dataset"]:
         raise
     except Exception as error:  # netCDF and xarray raise many kinds of errors for whatever bytes there are
         raise UnreadableResult("damaged, incomplete, or not a netCDF file") from error
+
+
+def _opens(path: Path) -> bool:
+    """Whether another process comes to an end, well or with an error, when it opens a netCDF file."""
+    command = f"import sys; sys.path[:] = {sys.path!r}; from netCDF4 import Dataset; Dataset(sys.argv[1]).close()"
+    quiet = subprocess.DEVNULL
+    try:
+        opening = [sys.executable, "-c", command, str(path.absolute())]
+        return subprocess.run(opening, stdout=quiet, stderr=quiet, timeout=_LONGEST, check=False).returncode >= 0
+    except subprocess.TimeoutExpired:
+        return False
+    except OSError:  # no process can be started: opened here, as it is
+        return True
