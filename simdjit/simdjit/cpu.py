@@ -1,7 +1,9 @@
 """Machine code for this processor."""
 
 import ctypes
+import itertools
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,10 @@ from simdjit.graph import Unsupported
 # Arguments of a program: numbers, carry, series; steps, steps between records.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 
+# Calls of briefly compiled code after which a thread compiles it thoroughly. A command calls it once or a few times;
+# somebody who moves a slider, hundreds of times.
+_OFTEN = 8
+
 
 class Code:
     """A compiled program; may be run by several threads at once.
@@ -27,14 +33,24 @@ class Code:
     """
 
     def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False, optimize: bool = True):
-        level = _THOROUGH if optimize and os.environ.get("SIMDJIT_OPTIMIZATION") != "0" else _BRIEF
-        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target(level))
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(_object(assembly, cache, sparing, level)))
-        self._engine.finalize_object()
-        self._run: Callable[..., None] = _SIGNATURE(self._engine.get_function_address("run"))
+        may_optimize = os.environ.get("SIMDJIT_OPTIMIZATION") != "0"
+        self._compile = lambda level: self._load(_object(assembly, cache, sparing, level), level)
+        self._brief = may_optimize and not optimize
+        self._calls = itertools.count(1)
+        self._engines: list[Any] = []  # another thread may still run the code of an earlier one
+        self._compile(_THOROUGH if may_optimize and optimize else _BRIEF)
+
+    def _load(self, code: bytes, level: int) -> None:
+        engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target(level))
+        engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        self._engines.append(engine)
+        self._run: Callable[..., None] = _SIGNATURE(engine.get_function_address("run"))
 
     def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
         """Run it for every group of lanes; memories as `layout.Layout` makes them."""
+        if self._brief and next(self._calls) == _OFTEN:
+            threading.Thread(target=self._compile, args=(_THOROUGH,)).start()
         for group in range(len(numbers)):
             self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
 

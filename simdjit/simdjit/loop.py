@@ -44,7 +44,8 @@ class Loop:
         planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
         portable: whether it will be `written`.
         optimize: whether the machine code is to be as fast as it can be. Without, it is made in a third of the time and
-            takes half as long again: worth it for some ten thousand steps. No result depends on it.
+            takes half as long again: worth it for some ten thousand steps. A thread makes the fast one where it is run
+            often after all. No result depends on it.
 
     Raises:
         Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the

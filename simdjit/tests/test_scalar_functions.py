@@ -1,5 +1,8 @@
 """What programs of lanes compute against closed forms, and the same bits however hard LLVM tries."""
 
+import threading
+import time
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -77,6 +80,27 @@ def test_a_loop_may_be_compiled_quickly(tmp_path, monkeypatch):
             finals.append(np.asarray(final).tobytes())
     assert len(set(finals)) == 1
     assert len(list(tmp_path.rglob("*.o"))) == 2
+
+
+def test_a_loop_that_is_run_often_is_compiled_thoroughly(tmp_path, monkeypatch):
+    """By a thread, once, while the brief code goes on; results have the same bits before and after."""
+    monkeypatch.delenv("SIMDJIT_OPTIMIZATION", raising=False)
+    known = lambda numbers: numbers
+    step = lambda rates, angles, k: angles + 0.1 * jnp.sin(rates * angles)
+    functions = known, lambda rates: 2 * rates, step, lambda rates, angles, k: angles
+    loop = simdjit.Loop(*functions, np.zeros(5), lanes=1, cache=tmp_path, optimize=False)
+    made = lambda: len(list(tmp_path.rglob("*.o")))
+    finals, before = [], threading.active_count()
+    for _ in range(7):
+        finals.append(loop.run(np.linspace(-2.0, 2.0, 5)[None], steps=20)[0].tobytes())
+    assert made() == 1 and threading.active_count() == before
+    for _ in range(20):
+        finals.append(loop.run(np.linspace(-2.0, 2.0, 5)[None], steps=20)[0].tobytes())
+        time.sleep(0.02)
+    while threading.active_count() > before:
+        time.sleep(0.01)
+    finals.append(loop.run(np.linspace(-2.0, 2.0, 5)[None], steps=20)[0].tobytes())
+    assert made() == 2 and len(set(finals)) == 1
 
 
 def test_without_optimization_the_bits_are_the_same(runs, tmp_path, monkeypatch):
