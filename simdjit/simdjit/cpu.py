@@ -1,9 +1,9 @@
 """Machine code for this processor."""
 
 import ctypes
-import itertools
 import os
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,9 @@ from simdjit.graph import Unsupported
 # Arguments of a program: numbers, carry, series; steps, steps between records.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
 
-# Calls of briefly compiled code after which a thread compiles it thoroughly. A command calls it once or a few times;
-# somebody who moves a slider, hundreds of times.
-_OFTEN = 8
+# Seconds that briefly compiled code has run, after which a thread compiles it thoroughly as soon as it is called again.
+# Where a command calls it once or twice nothing is gained; somebody who moves a slider calls it hundreds of times.
+_LONG = 0.1
 
 
 class Code:
@@ -35,8 +35,7 @@ class Code:
     def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False, optimize: bool = True):
         may_optimize = os.environ.get("SIMDJIT_OPTIMIZATION") != "0"
         self._compile = lambda level: self._load(_object(assembly, cache, sparing, level), level)
-        self._brief = may_optimize and not optimize
-        self._calls = itertools.count(1)
+        self._brief, self._spent = may_optimize and not optimize, 0.0
         self._engines: list[Any] = []  # another thread may still run the code of an earlier one
         self._compile(_THOROUGH if may_optimize and optimize else _BRIEF)
 
@@ -49,10 +48,13 @@ class Code:
 
     def run(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray, steps: int, every: int) -> None:
         """Run it for every group of lanes; memories as `layout.Layout` makes them."""
-        if self._brief and next(self._calls) == _OFTEN:
+        if self._brief and self._spent > _LONG:
+            self._brief = False
             threading.Thread(target=self._compile, args=(_THOROUGH,)).start()
+        began = time.perf_counter()
         for group in range(len(numbers)):
             self._run(*(memory[group].ctypes.data for memory in (numbers, carry, series)), steps, every)
+        self._spent += time.perf_counter() - began
 
     def repeated(self, numbers: np.ndarray, carry: np.ndarray, series: np.ndarray) -> Callable[[], None]:
         """A function that records one instant of all groups, with as little ado as possible."""

@@ -105,13 +105,14 @@ class Loop:
         driver: Driver | None = None,
         cache: Path | None = None,
         portable: bool = False,
+        optimize: bool = True,
     ) -> "Loop":
         """A loop that carries nothing from step to step and records what a function gives for its numbers.
 
         Args:
             function: of as many trees of arrays as `example` has.
             example: its arguments for one run.
-            constant, lanes, driver, cache, portable: as of a loop.
+            constant, lanes, driver, cache, portable, optimize: as of a loop.
 
         Raises:
             Unsupported, OSError: as of a loop.
@@ -119,7 +120,7 @@ class Loop:
         nothing = np.zeros(())
         record = lambda arguments, carry, k: function(*arguments)
         functions = lambda arguments: arguments, lambda arguments: nothing, lambda arguments, carry, k: carry, record
-        return cls(*functions, example, constant, lanes, driver, cache, portable=portable)
+        return cls(*functions, example, constant, lanes, driver, cache, portable=portable, optimize=optimize)
 
     def _load(self, parts: "_Parts", driver: Driver | None, cache: Path | None) -> None:
         self._parts, self.operations = parts, parts.program.operations

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 
-from undertow.core import program_key
+from undertow.core import kept_loops, program_key
 from undertow.core.errors import BadInput
 from undertow.core.process_setup import KEEP_PROGRAMS
 from undertow.outside.autopilot.autopilot import Autopilot
@@ -30,7 +30,7 @@ def folder(tmp_path, monkeypatch):
     """A cache of its own, in a process that has used no loop, and without code of others, which the tests are."""
     monkeypatch.setenv("UNDERTOW_CACHE", str(tmp_path))
     monkeypatch.setenv(KEEP_PROGRAMS, "1")
-    monkeypatch.setattr(simd_batch, "_LOOPS", {})
+    monkeypatch.setattr(kept_loops, "_LOOPS", {})
     return tmp_path / "native"
 
 
@@ -39,7 +39,7 @@ def later(monkeypatch):
     """As a later process: no loop is in memory, and none may be traced."""
 
     def forbid():
-        monkeypatch.setattr(simd_batch, "_LOOPS", {})
+        monkeypatch.setattr(kept_loops, "_LOOPS", {})
         untraced(monkeypatch)
 
     return forbid
@@ -72,7 +72,7 @@ OTHER_NUMBERS = changed(controller={"frequency": 2.3}, plant={"limit": 15.0})
 @pytest.mark.full
 def test_a_later_process_finds_it_for_other_numbers(folder, later, monkeypatch):
     expected = position(simulate_scenario(OTHER_NUMBERS))
-    monkeypatch.setattr(simd_batch, "_LOOPS", {})
+    monkeypatch.setattr(kept_loops, "_LOOPS", {})
     for path in folder.glob("*"):
         path.unlink()
     simulate_scenario(SCENARIO)
@@ -103,13 +103,13 @@ def test_another_structure_is_another_loop(folder, monkeypatch, values):
     found = position(simulate_scenario(data))
     assert len(loops(folder)) == 2
     monkeypatch.delenv(KEEP_PROGRAMS)
-    monkeypatch.setattr(simd_batch, "_LOOPS", {})
+    monkeypatch.setattr(kept_loops, "_LOOPS", {})
     np.testing.assert_array_equal(position(simulate_scenario(data)), found)
 
 
 def test_other_sources_are_another_loop(folder, monkeypatch):
     simulate_scenario(SCENARIO)
-    monkeypatch.setattr(simd_batch, "_LOOPS", {})
+    monkeypatch.setattr(kept_loops, "_LOOPS", {})
     monkeypatch.setattr(program_key, "installation", lambda: ("other sources",))
     simulate_scenario(SCENARIO)
     assert len(loops(folder)) == 2
@@ -121,11 +121,11 @@ def test_a_damaged_entry_is_made_again(folder, monkeypatch, damage):
     expected = position(simulate_scenario(SCENARIO))
     (entry,) = loops(folder)
     contents = entry.read_bytes()
-    monkeypatch.setattr(simd_batch, "_LOOPS", {})
+    monkeypatch.setattr(kept_loops, "_LOOPS", {})
     if damage == "one bit":
         entry.write_bytes(contents[:200] + bytes([contents[200] ^ 1]) + contents[201:])
     elif damage == "of no use":  # whole, but no loop
-        monkeypatch.setattr(simd_batch, "kept_code", lambda key, make: b"no loop")
+        monkeypatch.setattr(kept_loops, "kept_code", lambda key, make: b"no loop")
     else:
         entry.write_bytes(contents[: len(contents) // 2] if damage == "cut off" else b"")
     np.testing.assert_array_equal(position(simulate_scenario(SCENARIO)), expected)

@@ -4,8 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from undertow.core import batch_compiler
+from undertow.core.batch_compiler import Unsupported
 from undertow.simulation.loop import simd_batch, stepped, stepped_batch
-from undertow.simulation.loop.simd_batch import Unsupported
 from undertow.simulation.loop.vmap_batch import _batched
 
 NUMBERS = {"stiffness": np.array([2.0, 3.0]), "damping": np.array(0.5)}
@@ -27,7 +28,7 @@ def expected(numbers, state, force):
 
 def without_simd(monkeypatch):
     """As on a machine that lacks the batch compiler, for which these names are made anew."""
-    monkeypatch.setattr(simd_batch, "_REASON", "the batch compiler cannot be imported")
+    monkeypatch.setattr(batch_compiler, "_REASON", "the batch compiler cannot be imported")
 
 
 @pytest.mark.parametrize("backend", ["simd", "xla"])
@@ -94,7 +95,7 @@ def test_many_starts(monkeypatch, backend):
 
 def test_where_the_batch_compiler_is_missing(monkeypatch):
     without_simd(monkeypatch)
-    assert "cannot be imported" in simd_batch.unavailable()
+    assert "cannot be imported" in batch_compiler.unavailable()
     assert simd_batch.simd_width(64) == 1 and simd_batch.gpu() is None
     for call in (
         lambda: simd_batch.kept_step(oscillators, NUMBERS, STATE, np.zeros(2)),

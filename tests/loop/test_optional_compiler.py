@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from undertow.cli.main import run
-from undertow.core import process_setup
+from undertow.core import batch_compiler, process_setup
 from undertow.scenario.results.run_scenario import run_scenario
 from undertow.simulation.loop import simd_batch
 from undertow.studies.speed import measure
@@ -120,7 +120,7 @@ def test_analyze(tmp_path):
 @pytest.mark.full
 def test_bench_leaves_out_what_it_cannot_measure(monkeypatch, capsys):
     """The other figures stand, and the reason."""
-    monkeypatch.setattr(simd_batch, "unavailable", lambda: "there is no compiler")
+    monkeypatch.setattr(measure, "unavailable", lambda: "there is no compiler")
     monkeypatch.setattr(measure, "_first_results", lambda: (2.0, 1.0))
     monkeypatch.setattr(measure, "_by_xla", lambda one: {"single_xla_compile_s": 3.0, "single_xla_ns": 2000.0})
     monkeypatch.setattr(measure, "_shortest", lambda work, repetitions=1: 2000.0 * 6e5)
@@ -149,7 +149,7 @@ def test_nothing_is_exported(folder, done):
 
 @pytest.mark.full
 def test_few_modules_know_the_compiler():
-    """One compiles by it, two use its cache; and all of them only its public face."""
+    """One makes it known, two use its cache; and all of them only its public face."""
     import ast
     from pathlib import Path
 
@@ -167,13 +167,13 @@ def test_few_modules_know_the_compiler():
             for module, name in imported:
                 if module.split(".")[0] in ("simdjit", "llvmlite"):
                     found.setdefault(str(path.relative_to(root)), set()).add((module, name))
-    assert set(found) == {"simulation/loop/simd_batch.py", "core/kept_code.py", "core/kept_programs.py"}
+    assert set(found) == {"core/batch_compiler.py", "core/kept_code.py", "core/kept_programs.py"}
     used = set.union(*found.values())
     assert all(module == "simdjit" and (not name or hasattr(simdjit, name)) for module, name in used)
 
 
 def test_where_there_is_one():
-    assert simd_batch.unavailable() == ""
+    assert batch_compiler.unavailable() == ""
     assert simd_batch.simd_width(64) == 2 * simd_batch.simd_width(128) > 1
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from undertow.analysis.metrics import Gathered, accumulators, results
 from undertow.core.atomic_io import write_whole
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.core.runtime import on_processor
 from undertow.core.status import Status
@@ -23,7 +24,6 @@ from undertow.scenario.results.run_result import ScenarioResult
 from undertow.scenario.results.run_scenario import finished, gathered_of, run_scenario
 from undertow.simulation.loop import continuous
 from undertow.simulation.loop.outcome import Outcome
-from undertow.simulation.loop.simd_batch import Unsupported
 from undertow.simulation.prepared_run import PreparedRun
 from undertow.simulation.processes import Tasks, worker_processes
 from undertow.simulation.programs import ProgramCache, RunGroup

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import runtime
+from undertow.core.kept_loops import decides_structure
 from undertow.simulation.loop.batch_runner import BatchRunner
-from undertow.simulation.loop.loop_runs import RunPlan, decides_structure, numbers_of, structure, with_numbers
+from undertow.simulation.loop.loop_runs import RunPlan, numbers_of, structure, with_numbers
 from undertow.simulation.loop.simd_batch import simd_width
 from undertow.simulation.prepared_run import PreparedRun, RunBatch, batch_of
 

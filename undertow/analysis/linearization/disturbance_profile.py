@@ -1,7 +1,7 @@
 """Loads and measurement errors along the reference, before a run."""
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,10 +12,11 @@ from jaxtyping import Array, PRNGKeyArray
 from undertow.analysis.linearization.equilibrium import Equilibrium
 from undertow.analysis.linearization.jacobians import Parts
 from undertow.core.arrays import as_array
-from undertow.core.contracts import Load, Outputs, Pose
-from undertow.core.kept_programs import briefly_compiled
+from undertow.core.contracts import Load, Measurement, Outputs, Pose, Time
+from undertow.core.kept_functions import Recursion, along_steps
 from undertow.core.numerics.linear_algebra import matvec
-from undertow.simulation.loop.closed_loop import ClosedLoop
+from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
+from undertow.simulation.loop.recording import instant
 
 _BRIEF = 0.1  # share of the time for which the flow may be faster: too short for errors to grow
 
@@ -81,65 +82,90 @@ def disturbance_profile(
         outputs: position and velocity at t = 0, for the states of a run there; None for none.
     """
     x, u = as_array(at.at["plant"]), as_array(at.at["u"])
-    unknown, noise, flow, start = _along(loop, at.parts, key, x, u, as_array(dt), steps, outputs)
-    flow = None if flow is None else np.asarray(flow)
-    start = None if start is None else (np.asarray(start[0]), np.asarray(start[1]))
-    return DisturbanceProfile(np.arange(steps) * dt, np.asarray(unknown), np.asarray(noise), flow, start)
+    subject = _Subject(loop, at.parts, key, x, u, as_array(dt), outputs)
+    (_, start), (load, noise, flow) = along_steps(_ALONG, subject, steps)
+    return DisturbanceProfile(np.arange(steps) * dt, load, noise, flow, start)
 
 
-@briefly_compiled
-def _along(loop: ClosedLoop, parts: Parts, key: PRNGKeyArray, x_rest, u, dt, steps: int, at_start):
-    realization, x_rest = loop.realize(key), parts.plant_state(x_rest)
-    plant = loop.plant
-    zero = jnp.zeros(())
-    dynamics, coordinates, actuators = loop.controller.model
-    held = actuators.quasi_static()
-    forces = held.force(held.init(), u)
+class _Subject(NamedTuple):
+    """What a profile follows from: arguments of `disturbance_profile`, and state and input of the loop at rest."""
 
-    def unknown(t, x, load):
+    loop: ClosedLoop
+    parts: Parts
+    key: PRNGKeyArray
+    x_rest: Array
+    u: Array
+    dt: Array
+    at_start: tuple[Outputs, Outputs] | None
+
+
+_Sampled = tuple[_Subject, Realization]  # with everything random
+
+
+def _prepare(subject: _Subject) -> _Sampled:
+    return subject, subject.loop.realize(subject.key)
+
+
+def _start(sampled: _Sampled) -> tuple[Any, list[Array] | None]:
+    """State of the navigation; and those of plant and law at t = 0, as vectors."""
+    (subject, realization), zero = sampled, jnp.zeros(())
+    _, truth = _on_reference(subject.loop, zero)
+    measuring = subject.loop.navigation.init(realization.navigation_realization, truth)
+    if subject.at_start is None:
+        return measuring, None
+    # Of the law as it is linearised; what is random is the same.
+    linearised = dataclasses.replace(subject.loop, controller=subject.parts.loop.controller)
+    begun = realization._replace(loop=linearised).start(*subject.at_start)
+    return measuring, [ravel_pytree(state)[0] for state in begun]
+
+
+def _step(sampled: _Sampled, carry: tuple[Any, Any], k: Array) -> tuple[Any, Any]:
+    (subject, realization), (measuring, begun) = sampled, carry
+    t = instant(k, subject.dt)
+    _, truth = _on_reference(subject.loop, t)
+    return subject.loop.navigation.measure(realization.navigation_realization, measuring, t, truth)[1], begun
+
+
+def _record(sampled: _Sampled, carry: tuple[Any, Any], k: Array) -> tuple[Array, Array, Array | None]:
+    """Load, noise and flow of a `DisturbanceProfile`."""
+    subject, realization = sampled
+    t, loop, plant = instant(k, subject.dt), subject.loop, subject.loop.plant
+    x, truth = _on_reference(loop, t)
+    load = realization.load(t, x)
+    y, _ = loop.navigation.measure(realization.navigation_realization, carry[0], t, truth)
+    position_error = loop.controller.model.coordinates.difference(y.position, truth.position)
+    errors = jnp.concatenate([position_error, y.velocity - truth.velocity])
+    noise = jnp.where(jnp.isfinite(errors), errors, 0.0)  # the law is given what it expects
+    x_rest = subject.parts.plant_state(subject.x_rest)
+    return _load_at_rest(subject, x_rest, t, x, load), noise, _flow(load, plant.pose(x), plant.pose(x_rest))
+
+
+def _on_reference(loop: ClosedLoop, t: Time) -> tuple[Any, Measurement]:
+    """State of the plant on the reference, and its outputs."""
+    r = loop.reference.at(t)
+    x = loop.plant.initial_state(r.position, r.velocity)
+    return x, loop.plant.output(t, x)
+
+
+def _load_at_rest(subject: _Subject, x_rest: Any, t: Time, x: Any, load: Load) -> Array:
+    """What the model does not know at a state, as an acceleration of the outputs where the loop rests."""
+    (dynamics, coordinates, actuators), plant, zero = subject.loop.controller.model, subject.loop.plant, jnp.zeros(())
+    held, y_rest = actuators.quasi_static(), plant.output(zero, x_rest)
+    forces, still = held.force(held.init(), subject.u), jnp.zeros_like(y_rest.position)
+
+    def unknown(t: Time, x: Any, load: Load) -> Array:
         y = plant.output(t, x)
-        moved = coordinates.acceleration(y, plant.acceleration(t, x, u, load))
+        moved = coordinates.acceleration(y, plant.acceleration(t, x, subject.u, load))
         return moved - dynamics.drift(y) - dynamics.gain(y) @ forces
 
-    y_rest = plant.output(zero, x_rest)
-    zero_outputs = jnp.zeros_like(y_rest.position)
     # With actuators as they are along the reference, where they begin to turn: their thrust is no part of the load.
-    at_rest = unknown(zero, plant.initial_state(y_rest.position, zero_outputs), plant.no_load())
+    at_rest = unknown(zero, plant.initial_state(y_rest.position, still), plant.no_load())
     # From accelerations of the outputs to those along the axes of the law, at rest.
-    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(zero_outputs)
+    scale = jax.jacfwd(lambda a: coordinates.acceleration(y_rest, a))(still)
+    return jnp.linalg.solve(scale, unknown(t, x, load) - at_rest)
 
-    times = jnp.arange(steps, dtype=float) * dt
-    resting = plant.pose(x_rest)
 
-    def along(t):
-        r = loop.reference.at(t)
-        x = plant.initial_state(r.position, r.velocity)
-        load = realization.load(t, x)
-        return (
-            plant.output(t, x),
-            jnp.linalg.solve(scale, unknown(t, x, load) - at_rest),
-            _flow(load, plant.pose(x), resting),
-        )
-
-    outputs, loads, flow = jax.vmap(along)(times)
-
-    def look(measuring, instant):
-        t, truth = instant
-        y, measuring = loop.navigation.measure(realization.navigation_realization, measuring, t, truth)
-        position_error = coordinates.difference(y.position, truth.position)
-        errors = jnp.concatenate([position_error, y.velocity - truth.velocity])
-        return measuring, jnp.where(jnp.isfinite(errors), errors, 0.0)  # the law is given what it expects
-
-    start = loop.reference.at(zero)
-    measuring = loop.navigation.init(
-        realization.navigation_realization, plant.output(zero, plant.initial_state(start.position, start.velocity))
-    )
-    noise = jax.lax.scan(look, measuring, (times, outputs))[1]
-    if at_start is None:
-        return loads, noise, flow, None
-    # Of the law as it is linearised; what is random is the same.
-    begun = dataclasses.replace(loop, controller=parts.loop.controller).realize(key).start(*at_start)
-    return loads, noise, flow, [ravel_pytree(state)[0] for state in begun]
+_ALONG = Recursion(_prepare, _start, _step, _record)
 
 
 def _flow(load: Load, pose: Pose | None, resting: Pose | None) -> Array | None:

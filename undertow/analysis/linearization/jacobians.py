@@ -18,6 +18,7 @@ from jaxtyping import Array, PyTree
 from undertow.analysis.theory import theory_of
 from undertow.core.arrays import as_array
 from undertow.core.contracts import AbstractContinuousController, Load, Target, Water
+from undertow.core.kept_functions import for_each
 from undertow.core.kept_programs import briefly_compiled
 from undertow.core.measurement import with_outputs
 from undertow.simulation.loop.closed_loop import ClosedLoop
@@ -45,23 +46,51 @@ class Flow(NamedTuple):
     pushes: Array  # acceleration of the outputs that it causes there, m/s^2 and rad/s^2: a part of the load
 
 
-class Parts(eqx.Module):
+class VectorLoop(eqx.Module):
     """A closed loop whose states are vectors.
 
     Attributes:
         loop: the five roles.
-        target: constant reference.
         plant_state, law_state: vectors back into the states of plant and law.
         sizes: length of each of `INPUTS`.
-        flow: of the water; None for a plant that is no vehicle.
     """
 
     loop: ClosedLoop
-    target: Target
     plant_state: Any
     law_state: Any
     sizes: tuple[int, ...]
+
+
+class Parts(eqx.Module):
+    """Such a loop about a constant reference.
+
+    Attributes:
+        vector_loop: the loop.
+        target: constant reference.
+        flow: of the water; None for a plant that is no vehicle.
+    """
+
+    vector_loop: VectorLoop
+    target: Target
     flow: Flow | None = None
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The five roles."""
+        return self.vector_loop.loop
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Length of each of `INPUTS`."""
+        return self.vector_loop.sizes
+
+    def plant_state(self, vector: Array) -> Any:
+        """State of the plant from its vector."""
+        return self.vector_loop.plant_state(vector)
+
+    def law_state(self, vector: Array) -> Any:
+        """State of the law from its vector."""
+        return self.vector_loop.law_state(vector)
 
     def differentiate(self, at: dict[str, Any], dt: float) -> Local:
         """Values and slopes where the states, the input, the load and the noise are as given, arrays by name.
@@ -74,13 +103,16 @@ class Parts(eqx.Module):
         point = [
             np.asarray(at.get(name, np.zeros(size)), dtype=float) for name, size in zip(INPUTS, self.sizes, strict=True)
         ]
-        values, slopes = _evaluated(self, tuple(map(as_array, point)), as_array(dt))
+        directions = np.eye(sum(self.sizes))
+        given = jax.tree.map(np.asarray, (point, self.target, self.flow, dt))
+        at_each = jax.tree.map(lambda value: np.broadcast_to(value, (len(directions), *value.shape)), given)
+        values, slopes = for_each(_slope, self.vector_loop, (*at_each, directions))
         ends = np.cumsum([0, *self.sizes])
         columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
         slopes_by_input = {}
         for name, slope in slopes.items():
-            slopes_by_input[name] = {by: np.asarray(slope)[:, column] for by, column in columns.items()}
-        return Local({name: np.asarray(value) for name, value in values.items()}, slopes_by_input)
+            slopes_by_input[name] = {by: slope.T[:, column] for by, column in columns.items()}
+        return Local({name: value[0] for name, value in values.items()}, slopes_by_input)
 
     def pushed(self, load: Array) -> Load:
         """A load as an acceleration of the outputs (m/s^2, rad/s^2), as far as the water does not cause it."""
@@ -117,7 +149,7 @@ def take_apart(loop: ClosedLoop, position: Any, flow: Any = None) -> tuple[Parts
     at = {name: np.asarray(vector) for name, vector in vectors.items()}
     axes, inputs = position.shape[0], loop.plant.inputs()
     sizes = (at["plant"].size, at["law"].size, inputs, axes, 2 * axes)
-    return Parts(loop, target, _from_vector(x), _from_vector(z), sizes, flow_at_rest), at
+    return Parts(VectorLoop(loop, _from_vector(x), _from_vector(z), sizes), target, flow_at_rest), at
 
 
 @briefly_compiled
@@ -161,16 +193,17 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
     )
 
 
-@briefly_compiled
-def _evaluated(parts: Parts, point: tuple[Array, ...], dt: Array):
-    stacked, ends = jnp.concatenate(point), np.cumsum([0, *parts.sizes])
+def _slope(vector_loop: VectorLoop, at: tuple[Any, ...]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Values at a point, and their slopes there along one direction of all `INPUTS` together.
 
-    def both(vector):
-        values = _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
-        return values, values
-
-    slopes, values = jax.jacfwd(both, has_aux=True)(stacked)
-    return values, slopes
+    Args:
+        vector_loop: the loop.
+        at: `INPUTS`; target; flow; sampling time of the law, s; and the direction.
+    """
+    point, target, flow, dt, direction = at
+    parts, ends = Parts(vector_loop, target, flow), np.cumsum([0, *vector_loop.sizes])
+    values = lambda vector: _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
+    return jax.jvp(values, (jnp.concatenate(point),), (direction,))
 
 
 def _values(parts: Parts, flat_x, flat_z, u, load, noise, dt) -> dict[str, Array]:

@@ -13,8 +13,8 @@ import jax
 import numpy as np
 
 from undertow.core.atomic_io import write_whole
+from undertow.core.batch_compiler import Unsupported, simdjit, unavailable
 from undertow.core.errors import BadInput
-from undertow.simulation.loop.simd_batch import Unsupported, simdjit, unavailable
 from undertow.simulation.loop.stepped import CompiledStep, copy_into
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")

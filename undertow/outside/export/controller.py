@@ -8,6 +8,7 @@ import numpy as np
 
 from undertow.core import checks, runtime
 from undertow.core.arrays import in_present_precision
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.contracts import starting_at
 from undertow.core.errors import BadInput
 from undertow.outside.autopilot.clock import MISSED
@@ -17,7 +18,6 @@ from undertow.outside.autopilot.output import output_of
 from undertow.outside.export.c_program import CFunction, CProgram, Exported, System, made_from
 from undertow.physics.power.esc import ESC
 from undertow.scenario.build import Built
-from undertow.simulation.loop.simd_batch import Unsupported
 
 _ATTITUDES = {"euler": "roll, pitch, yaw, rad", "quaternion": "w, x, y, z, body to world"}
 _SPREAD = 0.2  # of the random numbers of a test, m, rad, V

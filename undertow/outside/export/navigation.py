@@ -8,12 +8,12 @@ import numpy as np
 
 from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.core import checks, runtime
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.errors import BadInput
 from undertow.outside.autopilot.filter_functions import EstimatedMotion, FilterFunctions
 from undertow.outside.export.c_program import CProgram, Exported, System, check_compiler, made_from
 from undertow.physics.sensors.received import Received
 from undertow.scenario.build import Built
-from undertow.simulation.loop.simd_batch import Unsupported
 
 _SPREAD = 0.01  # of the random readings of a test, in their units
 

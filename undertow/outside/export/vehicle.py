@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import runtime
 from undertow.core.arrays import in_present_precision
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.contracts import AbstractDisturbance, AbstractPlant, Load
 from undertow.core.errors import BadInput
 from undertow.core.numerics.integrators import COMPACT_METHODS
@@ -24,7 +25,7 @@ from undertow.scenario.build import Built
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
 from undertow.simulation.loop.outcome import status_of
 from undertow.simulation.loop.plant_step import PlantState, hold
-from undertow.simulation.loop.simd_batch import Unsupported, realized_disturbance
+from undertow.simulation.loop.simd_batch import realized_disturbance
 
 _SPREAD = 2.0  # of the random commands of a test, V
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from undertow.analysis.metrics import Gathered
 from undertow.core import runtime
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.numerics.random_keys import key_of_seed
 from undertow.scenario.build import Built, build, in_its_precision
 from undertow.scenario.consistency import record_period
@@ -108,6 +109,6 @@ def run_loop(
     if settings.backend == "simd":
         try:
             return jax.device_get(by_simd(loop, **run_options)), ""
-        except simd_batch.Unsupported as error:
+        except Unsupported as error:
             lacking = str(error)
     return jax.device_get(by_xla(loop, **run_options)), lacking

@@ -8,10 +8,11 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from undertow.core.batch_compiler import Unsupported
 from undertow.simulation.loop import simd_batch
 from undertow.simulation.loop.loop_runs import LoopRun, RunPlan
 from undertow.simulation.loop.outcome import Outcome
-from undertow.simulation.loop.simd_batch import SimdBatchRunner, Unsupported
+from undertow.simulation.loop.simd_batch import SimdBatchRunner
 from undertow.simulation.loop.vmap_batch import XlaBatchRunner
 
 

@@ -69,16 +69,3 @@ def structure(tree: Any) -> Any:
     """Everything about a tree of parts except its numbers; equal structures share a compiled program."""
     leaves, form = jax.tree.flatten(tree)
     return form, tuple((leaf.shape, leaf.dtype) if eqx.is_array(leaf) else leaf for leaf in leaves)
-
-
-def decides_structure(leaf: Any) -> bool:
-    """Whether an array of a single run is built into its program, because its values decide what is left out there.
-
-    Those are arrays of zeros and ones, and of counts and switches. All others are read by the program, so that it
-    serves every run of its kind: after a change of one number nothing is compiled again. The bits of a run are the same
-    either way, and so is its speed within a tenth.
-    """
-    values = np.asarray(leaf)
-    if values.dtype == np.uint32:  # keys of random numbers
-        return False
-    return not np.issubdtype(values.dtype, np.floating) or bool(np.isin(values, (0, 1)).all())

@@ -3,15 +3,13 @@
 Results equal those of `sampled.simulate`, or of `continuous.simulate` with fixed steps, to rounding; their bits depend
 neither on the machine nor on the other runs.
 
-This is the module that compiles by `simdjit`, which is optional (`core/kept_code` uses its cache): without it every
-program is `Unsupported`, and `unavailable` says why; `outside/export` takes its C from here. What is unsupported runs
-by XLA: `run_scenario` falls back for a run, `batch_runner` for many.
+Without the batch compiler every program is `Unsupported`. What is unsupported runs by XLA: `run_scenario` falls back
+for a run, `batch_runner` for many.
 """
 
 import math
-import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -19,43 +17,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
-from undertow.core.kept_code import kept_code
+from undertow.core.batch_compiler import Unsupported, simdjit, unavailable
+from undertow.core.kept_loops import decides_structure, kept_loop, kept_or_made
 from undertow.core.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.core.process_setup import cache_folder
-from undertow.core.program_key import kept_key, program_key
+from undertow.core.program_key import program_key
 from undertow.core.status import Status
 from undertow.core.structure_key import Constant
 from undertow.simulation.loop import continuous, sampled
 from undertow.simulation.loop.closed_loop import ClosedLoop
-from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, decides_structure, outcome_of
+from undertow.simulation.loop.loop_runs import LoopRun, RunPlan, outcome_of
 from undertow.simulation.loop.outcome import Outcome
 from undertow.simulation.loop.recording import instant
-
-if TYPE_CHECKING:
-    import simdjit
-    from simdjit import Unsupported
-else:
-    try:
-        import simdjit
-        from simdjit import Unsupported
-
-        simdjit.Loop  # noqa: B018 - loads LLVM, which may be missing
-    except ImportError as error:
-        simdjit = None
-        _REASON = (
-            f"the batch compiler cannot be imported ({error}). `pip install .` in the folder of undertow installs it"
-        )
-
-        class Unsupported(Exception):
-            """The batch compiler cannot make a program; the message says why."""
-
-    else:
-        _REASON = ""
-
-
-def unavailable() -> str:
-    """Why no run can be a SIMD batch on this machine; empty where runs can."""
-    return "" if TYPE_CHECKING else _REASON
 
 
 def gpu() -> "simdjit.Driver | None":
@@ -70,61 +43,6 @@ def simd_width(bits: int) -> int:
     if unavailable():
         return 1
     return simdjit.simd_width(bits)
-
-
-# Loops of this process by key, in the order in which they were first used.
-_LOOPS: dict[str, "simdjit.Loop"] = {}
-_LOOPS_LOCK = threading.Lock()
-_MOST_LOOPS = 64
-
-
-def _kept_loop(structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop":
-    """The loop of a structure, without tracing where this process or an earlier one has made it.
-
-    Args:
-        structure: all that its code depends on.
-        make: compiles it; whether it is to be written for later processes.
-    """
-    key = program_key(*structure)
-    if key is None:
-        return make(False)
-    with _LOOPS_LOCK:
-        if key in _LOOPS:
-            return _LOOPS[key]
-    loop = _stored(key, make, lambda written: simdjit.Loop.read(written, cache_folder() / "native"))
-    with _LOOPS_LOCK:
-        if len(_LOOPS) >= _MOST_LOOPS:
-            _LOOPS.pop(next(iter(_LOOPS)))
-        return _LOOPS.setdefault(key, loop)
-
-
-def _stored(key: str, make: Callable[[bool], Any], read: Callable[[bytes], Any]) -> Any:
-    """What `make` compiles, or what `read` makes of what an earlier process has written.
-
-    Args:
-        key: of this process.
-        make: compiles it; whether it is to be written.
-        read: from what was written.
-    """
-    kept = kept_key(key)
-    if kept is None:
-        return make(False)
-    made: list[Any] = []
-
-    def written() -> bytes:
-        made.append(make(True))
-        try:
-            return made[0].written()
-        except Unsupported:
-            return b""
-
-    contents = kept_code(kept, written)
-    if made:
-        return made[0]
-    try:
-        return read(contents)
-    except Exception:  # of one that cannot be written there is nothing; and whatever is said of code that does not fit
-        return make(False)
 
 
 # Steps of all runs together for which a program must be worth its compile time, say 100 runs of 10 000 steps. The
@@ -153,7 +71,7 @@ def kept_step(function: Callable, numbers: Any, state: Any, inputs: Any) -> Any:
     make = lambda portable: simdjit.Step(function, *example, cache, portable)
     if key is None:
         return make(False)
-    return _stored(key, make, lambda written: simdjit.Step.read(written, *example, cache))
+    return kept_or_made(key, make, lambda written: simdjit.Step.read(written, *example, cache))
 
 
 def kept_steps(
@@ -263,7 +181,7 @@ class SimdBatchRunner:
         leaves = zip(jax.tree.leaves(numbers), constant, strict=True)
         constants = Constant([leaf if same else None for leaf, same in leaves])
         structure = ("runs", run, plan._replace(steps=0), constants, width, compact, optimize)
-        self._program = make(False) if driver else _kept_loop(structure, make)
+        self._program = make(False) if driver else kept_loop(structure, make)
 
     @property
     def operations(self) -> int:

@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from undertow.core.batch_compiler import Unsupported
 from undertow.core.errors import BadInput
 from undertow.simulation.loop.closed_loop import ClosedLoop, Realization
-from undertow.simulation.loop.simd_batch import Unsupported, kept_step, realized_disturbance
+from undertow.simulation.loop.simd_batch import kept_step, realized_disturbance
 
 
 class Uncopied:

@@ -7,7 +7,8 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from undertow.simulation.loop.simd_batch import Unsupported, kept_steps, starter
+from undertow.core.batch_compiler import Unsupported
+from undertow.simulation.loop.simd_batch import kept_steps, starter
 
 
 class Starter:

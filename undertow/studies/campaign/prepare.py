@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from undertow.core import checks
+from undertow.core.batch_compiler import unavailable
 from undertow.core.errors import BadInput, did_you_mean, error_location
 from undertow.core.metric import Metric
 from undertow.scenario.build import Built
@@ -13,7 +14,6 @@ from undertow.scenario.consistency import whole_steps
 from undertow.scenario.reading import Text
 from undertow.scenario.results.run_result import law_of, rules
 from undertow.scenario.validation import check_kind
-from undertow.simulation.loop.simd_batch import unavailable
 from undertow.studies.campaign import task as tasks
 from undertow.studies.campaign.build_trials import build_trial
 from undertow.studies.campaign.campaign_schema import Campaign, read_campaign, whole

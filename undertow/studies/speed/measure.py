@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from undertow.core import runtime
+from undertow.core.batch_compiler import unavailable
 from undertow.simulation.loop import sampled, simd_batch
 from undertow.simulation.loop.vmap_batch import XlaBatchRunner
 from undertow.studies.speed import plain_numpy, workload
@@ -36,7 +37,7 @@ def measure(watch: Watch) -> dict[str, Any]:
     """
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     figures: dict[str, Any] = {"threads": threads, "simd_width": simd_batch.simd_width(64)}
-    why_no_simd = simd_batch.unavailable()
+    why_no_simd = unavailable()
     if why_no_simd:
         figures["simd_unavailable"] = why_no_simd
     watch("first results", 0.0)
