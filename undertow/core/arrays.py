@@ -1,6 +1,8 @@
 """Cache of small constant arrays: equal values in many parts share one JAX array."""
 
 import functools
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import jax
@@ -12,6 +14,7 @@ from undertow.core.runtime import double_outside_runs
 
 _MOST_BYTES = 4096  # of a cached array; larger ones are seldom equal
 _MOST = 4096  # cached arrays
+_ZERO = np.zeros(())
 
 
 @double_outside_runs
@@ -34,6 +37,17 @@ def as_array(value: Any) -> Any:
 def _made(content: bytes, shape: tuple[int, ...], settings: tuple[Any, ...]) -> jax.Array:
     with jax.ensure_compile_time_eval():  # an array made during tracing would belong to that trace
         return jax.device_put(np.frombuffer(content).reshape(shape))  # `asarray` would compile a program for each shape
+
+
+@contextmanager
+def in_numbers() -> Iterator[None]:
+    """Context in which operations on numbers give numbers, also where JAX traces a function around it.
+
+    Where it does not, nothing is changed: JAX would compile every operation on constants of what is traced inside.
+    """
+    traced_around = isinstance(jax.device_put(_ZERO), Tracer)
+    with jax.ensure_compile_time_eval() if traced_around else nullcontext():
+        yield
 
 
 def library_of(*values: Any) -> Any:

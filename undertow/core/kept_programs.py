@@ -18,7 +18,7 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-from undertow.core.arrays import as_array
+from undertow.core.arrays import as_array, in_numbers
 from undertow.core.installation import may_keep
 from undertow.core.kept_code import KEEPS, kept_code
 from undertow.core.program_key import KeptKey, kept_key, program_key
@@ -89,7 +89,7 @@ def kept_values(function: Callable[..., Any]) -> Callable[..., Any]:
             made.append(None)
             return function(*arguments)
 
-        with jax.ensure_compile_time_eval():  # an array made during tracing would belong to that trace
+        with in_numbers():  # an array made during tracing would belong to that trace
             return kept_result(name, Constant(arguments), compute)
 
     return run

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -17,7 +16,7 @@ from undertow.analysis.temporal.requirements import Requirement, requirements_of
 from undertow.control.navigation.from_sensors import SensorNavigation
 from undertow.control.supervision.supervised_controller import unsupervised
 from undertow.core import checks, runtime
-from undertow.core.arrays import as_array, in_present_precision
+from undertow.core.arrays import as_array, in_numbers, in_present_precision
 from undertow.core.authority import authority_of
 from undertow.core.catalogue import KIND_OF, is_user_code
 from undertow.core.contracts import (
@@ -305,7 +304,7 @@ def _authority(plant: AbstractPlant, model: Model) -> Any:
     It is zero where it is unknown, and has three digits, so that a finished run states the same number in either
     precision; None for what is no vehicle.
     """
-    with jax.ensure_compile_time_eval():  # a number even where a scenario is built inside a compiled function
+    with in_numbers():  # a number even where a scenario is built inside a compiled function
         acceleration = _largest_acceleration(plant, model)
     if not len(acceleration):
         return None

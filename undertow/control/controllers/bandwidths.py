@@ -13,7 +13,6 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -21,7 +20,7 @@ from jaxtyping import Array, Float
 from undertow.control.controllers.options import DesignConditions
 from undertow.core import checks
 from undertow.core.actuator_model import AbstractActuatorModel
-from undertow.core.arrays import as_array
+from undertow.core.arrays import as_array, in_numbers
 from undertow.core.contracts import Model
 from undertow.core.kept_programs import kept_program, kept_values
 from undertow.core.numerics.linear_algebra import matvec
@@ -124,7 +123,7 @@ def axes_of(model: Model, conditions: DesignConditions) -> list[Axis]:
     axes = len(model.coordinates.angles)
     checks.per_axis("velocity_noise", velocity_noise, axes)
     checks.per_axis("load_rate", load_rate, axes)
-    with jax.ensure_compile_time_eval():  # bandwidths are numbers even where a law is made inside a compiled function
+    with in_numbers():  # bandwidths are numbers even where a law is made inside a compiled function
         still = as_array(np.zeros(axes))
         lag, max_bandwidth, forces = _actuation(model, still, as_array(_FASTEST / sampling_time))
         dead_zone = float(model.actuators.dead_zone())

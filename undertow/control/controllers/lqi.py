@@ -20,6 +20,7 @@ from undertow.control.controllers.bandwidths import (
 from undertow.control.controllers.law_signals import ATTAINED_SHARE, ESTIMATE
 from undertow.control.controllers.options import ActuationOptions, DesignConditions
 from undertow.core import checks
+from undertow.core.arrays import in_numbers
 from undertow.core.contracts import Measurement, Model, Target, TrackingError
 from undertow.core.kept_programs import kept_program
 from undertow.core.numerics.riccati import regulator_gain
@@ -128,7 +129,7 @@ def _gains_of_axes(frequency, integral_weight, rate_weight, lag, dt) -> Float[Ar
 def lqi_frequency(axis: Axis, integral_weight: float, rate_weight: float, lag: float) -> float:
     """Frequency w of the law with these weights, designed for this lag (s), by the rule of `bandwidths.py`, rad/s."""
     dt = axis.sampling_time
-    with jax.ensure_compile_time_eval():
+    with in_numbers():
         numbers = (jnp.asarray(value, dtype=float) for value in (integral_weight, rate_weight, lag, dt))
         gains = np.asarray(_gains_of_axes(jnp.asarray(bandwidth_grid(axis), dtype=float), *numbers))
 
