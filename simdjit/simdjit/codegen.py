@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from simdjit.calls import ARGUMENT, FORMULAS
-from simdjit.graph import Graph, Node, Operation
+from simdjit.graph import Graph, Node
 from simdjit.instructions import SLOT, Emitter
 from simdjit.packing import Packs, find_packs, width_of
 from simdjit.scalar import Scalar
@@ -157,34 +157,42 @@ def _function(name: str, dtype: str, width: int, emitter: Emitter) -> str:
     return "\n".join(lines)
 
 
-def operations(graph: Graph, sections: Sections, written: bool = False) -> int:
+class Counts(NamedTuple):
     """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one.
 
-    Args:
-        graph: of the program.
-        sections: of it.
-        written: only those that are written out; a product of large matrices is a loop.
+    Attributes:
+        all: all.
+        written: those that are written out; a product of large matrices is a loop.
     """
+
+    all: int
+    written: int
+
+
+def operations(graph: Graph, sections: Sections) -> Counts:
+    """Operations of one step of a program."""
     fixed, needed = _fixed(graph), graph.needed(sections.step)
     # What happens inside a region is done in every step where the region is, though its own inputs are no carry.
     outermost = {detail: node for node, (name, _, detail) in enumerate(graph.operations) if name == "region"}
     same = lambda node: fixed[node if graph.homes[node] is None else outermost[graph.around(graph.homes[node])]]
-    done = (graph.operations[node] for node, is_needed in enumerate(needed) if is_needed and not same(node))
-    return sum(_work(operation, written) for operation in done)
+    done = [graph.operations[node] for node, is_needed in enumerate(needed) if is_needed and not same(node)]
+    written = sum(operation.name not in _NO_WORK for operation in done)
+    return Counts(written + sum(one.detail.operations for one in done if one.name == "product"), written)
 
 
-def _work(operation: Operation, written: bool) -> int:
-    if operation.name == "product":
-        return 0 if written else operation.detail.operations
-    return operation.name not in ("constant", "input", "region", "result", "part")
+_NO_WORK = ("constant", "input", "region", "result", "part", "product")
 
 
 def _fixed(graph: Graph) -> list[bool]:
     """Which nodes are the same in every step."""
     fixed: list[bool] = []
-    for node, (name, _, detail) in enumerate(graph.operations):
+    for node, (name, operands, detail) in enumerate(graph.operations):
+        same = True
         if name == "input":
-            fixed.append(detail != STEP and detail[0] != "carry")
-        else:
-            fixed.append(all(fixed[used] for used in graph.uses(node)))
+            same = detail != STEP and detail[0] != "carry"
+        for used in graph.uses(node) if name == "region" else operands:
+            if not fixed[used]:
+                same = False
+                break
+        fixed.append(same)
     return fixed

@@ -18,10 +18,15 @@ def _entrywise(name: str, formula: Callable[..., Scalar], reads: str = "", idle:
 
     @rule(name, reads=reads, idle=idle)
     def entries(equation: Equation, *operands: Nodes) -> Nodes:
+        graph, shape = equation.graph, equation.shape
+        spread = (nodes if nodes.shape == shape else np.broadcast_to(nodes, shape) for nodes in operands)
+        rows = zip(*(nodes.ravel().tolist() for nodes in spread), strict=True)
+        if name in _OPERATIONS and equation.dtype != BOOL:  # nearly all: without a `Scalar` for each operand
+            operation = _OPERATIONS[name]
+            return filled(shape, [graph.apply(operation, *row) for row in rows])
         chosen = partial(formula, **{key: equation.params[key] for key in reads.split()})
-        rows = zip(*(np.broadcast_to(nodes, equation.shape).ravel().tolist() for nodes in operands), strict=True)
-        scalars = ((Scalar(equation.graph, node) for node in row) for row in rows)
-        return filled(equation.shape, [chosen(*row).node for row in scalars])
+        scalars = ((Scalar(graph, node) for node in row) for row in rows)
+        return filled(shape, [chosen(*row).node for row in scalars])
 
 
 def on(graph: Graph, name: str) -> Callable[..., Node]:
@@ -148,10 +153,13 @@ def _integer_power(x: Scalar, y: int) -> Scalar:
     return 1.0 / result if y < 0 else result
 
 
+# Primitives of numbers that are one operation of the graph each.
+_ARITHMETIC = {"add": "add", "sub": "sub", "mul": "mul", "neg": "neg", "add_any": "add"}
+_OPERATIONS = _ARITHMETIC | {name: name for name in ("sqrt", "floor", "ceil")}
+
 FORMULAS: dict[str, Callable[..., Scalar]] = {
-    **{name: _arithmetic(name) for name in "add sub mul neg".split()},
+    **{name: _arithmetic(operation) for name, operation in _ARITHMETIC.items()},
     **{name: _operation(name) for name in "sqrt floor ceil lt le gt ge eq ne and or xor".split()},
-    "add_any": _arithmetic("add"),
     "div": _quotient,
     "rem": _remainder,
     "abs": _absolute,

@@ -24,7 +24,7 @@ BOOL, F64, F32, I64, U64, U32 = "bool", "float64", "float32", "int64", "uint64",
 TYPES = (BOOL, F64, F32, I64, "int32", U64, U32)
 
 # Operations whose two operands may change places.
-COMMUTATIVE = ("add", "mul", "and", "or", "xor", "eq", "ne")
+COMMUTATIVE = frozenset(("add", "mul", "and", "or", "xor", "eq", "ne"))
 
 
 class Operation(NamedTuple):
@@ -84,6 +84,7 @@ class Graph:
         self.endless = 0
         self.memory: dict[Any, Node] = {}
         self._known: dict[Any, Node] = {}
+        self._applied: dict[tuple[str, tuple[Node, ...], str], Node] = {}  # what has been asked for
         self._values: list[Any] = []  # numbers of the constants
         self._plain: dict[Any, Node] = {}  # constants by Python's numbers
 
@@ -118,13 +119,20 @@ class Graph:
             nodes: operands.
             dtype: type of the result where the operation changes it.
         """
+        if name in COMMUTATIVE and nodes[0] > nodes[1]:
+            nodes = nodes[::-1]
+        asked = (name, nodes, dtype)
+        result = self._applied.get(asked)
+        if result is None:
+            result = self._applied[asked] = self._result(name, nodes, dtype)
+        return result
+
+    def _result(self, name: str, nodes: tuple[Node, ...], dtype: str) -> Node:
         types, numbers = self.types, self._values
         kind = types[nodes[-1]]
         for node in nodes[name == "select" :]:
             assert types[node] == kind, (name, dtype)
         dtype = dtype or (BOOL if name in COMPARISONS else kind)
-        if name in COMMUTATIVE and nodes[0] > nodes[1]:
-            nodes = nodes[::-1]
         values = [numbers[node] for node in nodes]
         for value in values:
             if value is None:
@@ -153,13 +161,17 @@ class Graph:
             self.types.append(dtype)
             self._values.append(operation.detail if operation.name == "constant" else None)
             inner = self.innermost(*operation.operands)
-            self.homes.append(max(home, inner, key=self._depth))
+            self.homes.append(inner if home is None else max(home, inner, key=self._depth))
         return number
 
     def innermost(self, *nodes: Node) -> int | None:
         """The home of what is made of some nodes."""
-        homes = {self.homes[node] for node in nodes}
-        return max(homes, key=self._depth, default=None)
+        homes, innermost = self.homes, None
+        for node in nodes:
+            home = homes[node]
+            if home is not None and home != innermost:
+                innermost = home if innermost is None else max(home, innermost, key=self._depth)
+        return innermost
 
     def around(self, region: int) -> int:
         """The outermost region around a region."""

@@ -284,7 +284,7 @@ def _lowered(
         seconds = estimate.compiled_here(_MOST).compiling
         raise Unsupported(f"{error}, which would take more than {seconds:.0f} s to compile") from error
     sections = Sections(*map(flat, (first, stepped, recorded)))
-    written = operations(graph, sections, written=True)
-    if planned and (why := estimate.reason_for_xla(written, step.closed, planned)):
+    counts = operations(graph, sections)
+    if planned and (why := estimate.reason_for_xla(counts.written, step.closed, planned)):
         raise Unsupported(why)
-    return Program(assembly(graph, sections, lanes, head, beside), operations(graph, sections), prologue.lacking)
+    return Program(assembly(graph, sections, lanes, head, beside), counts.all, prologue.lacking)

@@ -39,6 +39,11 @@ class Equation(NamedTuple):
         """Of the nodes of the only result."""
         return _kind(self.out)[0]
 
+    @property
+    def dtype(self) -> str:
+        """Of the only result."""
+        return _kind(self.out)[1]
+
     def constant(self, value: Any) -> Node:
         """A number of the type of the only result."""
         return self.graph.constant(value, _kind(self.out)[1])

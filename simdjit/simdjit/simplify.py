@@ -71,7 +71,7 @@ RESULTS: dict[str, Callable[..., Any]] = {
     "convert": lambda a, dtype: a.astype(dtype) if dtype.startswith("float") else _whole(a, dtype),
     "bits": lambda a, dtype: a.view(dtype),
 }
-COMPARISONS = ("lt", "le", "gt", "ge", "eq", "ne")
+COMPARISONS = frozenset(("lt", "le", "gt", "ge", "eq", "ne"))
 
 
 def simpler(graph: Any, name: str, nodes: tuple[int, ...], values: list[Any]) -> int | None:
@@ -96,7 +96,7 @@ def _negated(graph, node) -> int | None:
 
 
 def _add(graph, nodes, values):
-    for value, operand, other in zip(values, nodes, reversed(nodes), strict=True):
+    for value, operand, other in ((values[0], *nodes), (values[1], *nodes[::-1])):
         if _is(value, 0):
             return other
         if (minus := _negated(graph, operand)) is not None:
@@ -113,7 +113,9 @@ def _sub(graph, nodes, values):
 
 
 def _mul(graph, nodes, values):
-    for value, operand, other in zip(values, nodes, reversed(nodes), strict=True):
+    for value, operand, other in ((values[0], *nodes), (values[1], *nodes[::-1])):
+        if value is None:
+            continue
         if _is(value, 0):
             return operand
         if _is(value, 1):
