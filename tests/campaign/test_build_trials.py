@@ -12,7 +12,7 @@ from undertow.scenario.prepare import loop_run
 from undertow.scenario.reading import from_data, read
 from undertow.simulation.loop.loop_runs import numbers_of
 from undertow.studies.campaign import build_trials as building
-from undertow.studies.campaign.build_trials import build_trials, valid_trials
+from undertow.studies.campaign.build_trials import TraceableKinds, build_trials, valid_trials
 from undertow.studies.campaign.campaign_schema import validate
 from undertow.studies.campaign.trials import trials
 
@@ -34,7 +34,7 @@ def built_both_ways(several):
     part_cache, rows = PartCache(), np.arange(several.number)
     with runtime.on_processor():
         alone = dict(valid_trials(several, part_cache, rows.tolist()))
-        together = list(build_trials(several, part_cache, rows, several.sampled(rows), {}))
+        together = list(build_trials(several, part_cache, rows, several.sampled(rows), TraceableKinds()))
     return alone, together
 
 

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from undertow.core import checks
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_result
 from undertow.core.signals import Signal
 from undertow.physics.power import ledger as diagnostics
 from undertow.physics.power.battery import Battery
@@ -130,4 +131,5 @@ class HybridPower(eqx.Module):
 
 def has_motor(thruster: AbstractThruster) -> bool:
     """Whether the thruster models its motor, so that a ledger can be kept; traced, not computed."""
-    return jax.eval_shape(lambda: thruster.powers(thruster.initial_state(1), jnp.zeros(1))) is not None
+    powers = lambda: jax.eval_shape(lambda: thruster.powers(thruster.initial_state(1), jnp.zeros(1)))
+    return kept_result("has_motor", thruster, lambda: powers() is not None)

@@ -8,7 +8,9 @@ breaks a condition of a constructor: these are built one by one.
 
 import contextlib
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -45,6 +47,21 @@ class TrialSignature(NamedTuple):
 
     combination: int  # of `cross`
     others: str  # values that are no fractions
+
+
+class TraceableKinds:
+    """Which kinds of trials have numbers that can be traced; the thread that needs one first finds it out."""
+
+    def __init__(self) -> None:
+        self._known: dict[TrialSignature, bool] = {}
+        self._finding = threading.Lock()
+
+    def __call__(self, kind: TrialSignature, find: Callable[[], bool]) -> bool:
+        """What is known of a kind, or what `find` gives."""
+        with self._finding:
+            if kind not in self._known:
+                self._known[kind] = find()
+            return self._known[kind]
 
 
 class TrialBatch(NamedTuple):
@@ -86,7 +103,7 @@ def build_trials(
     part_cache: PartCache,
     trials: np.ndarray,
     sampled: Mapping[str, list[Any]],
-    traceable: dict[TrialSignature, bool],
+    traceable: TraceableKinds,
 ) -> Iterator[TrialBatch]:
     """The valid trials among some: those whose numbers can be traced together, the others each by itself.
 
@@ -95,14 +112,14 @@ def build_trials(
         part_cache: parts that they share.
         trials: their numbers in the campaign.
         sampled: their sampled values, by key path.
-        traceable: which kinds of trials can be traced, as far as known, completed here; a matter of the campaign only.
+        traceable: which kinds of trials can be traced, a matter of the campaign only.
     """
     varied = _fractions(campaign_trials)
     for kind, places in _by_kind(campaign_trials, trials, sampled, varied).items():
-        if kind not in traceable:
-            traceable[kind] = _traceable(campaign_trials, part_cache, kind, varied)
-        numbers = {key: np.array(sampled[key])[places] for key in varied}
-        traced_batch = _together(campaign_trials, part_cache, trials[places], numbers) if traceable[kind] else None
+        traced_batch = None
+        if traceable(kind, partial(_traceable, campaign_trials, part_cache, kind, varied)):
+            numbers = {key: np.array(sampled[key])[places] for key in varied}
+            traced_batch = _together(campaign_trials, part_cache, trials[places], numbers)
         if traced_batch is not None:
             yield traced_batch._replace(places=places[traced_batch.places])
             places = np.delete(places, traced_batch.places)

@@ -17,7 +17,7 @@ from undertow.scenario.build import Built
 from undertow.scenario.part_cache import PartCache
 from undertow.simulation.prepared_run import RunBatch
 from undertow.simulation.programs import ProgramCache
-from undertow.studies.campaign.build_trials import TrialSignature, build_data, build_trial, build_trials, valid_trials
+from undertow.studies.campaign.build_trials import TraceableKinds, build_data, build_trial, build_trials, valid_trials
 from undertow.studies.campaign.campaign_schema import read_text
 from undertow.studies.campaign.requirements import formula_metrics, recorded, robustness
 from undertow.studies.campaign.store_layout import StoreLayout
@@ -37,7 +37,7 @@ class TaskContext(NamedTuple):
     trials: Trials
     part_cache: PartCache
     programs: ProgramCache
-    traceable: dict[TrialSignature, bool]  # see `build_trials`
+    traceable: TraceableKinds  # see `build_trials`
     representative_trials: Callable[[], dict[int, Built]]  # the valid ones among the first trials of every combination
     alternatives: Callable[[], list[Built]]  # the first trial with each entry of every choice, where valid
 
@@ -60,7 +60,7 @@ def task_context(text: str, folder: str) -> TaskContext:
     )
     alternatives = functools.cache(lambda: list(_alternatives(campaign_trials, part_cache)))
     programs = ProgramCache(lambda: [prepare_trial(built, None) for built in probes().values()], gpu=True)
-    return TaskContext(campaign_trials, part_cache, programs, {}, probes, alternatives)
+    return TaskContext(campaign_trials, part_cache, programs, TraceableKinds(), probes, alternatives)
 
 
 def run_block(text: str, folder: str, layout: StoreLayout, task: int) -> dict[str, np.ndarray]:
