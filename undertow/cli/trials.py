@@ -123,12 +123,13 @@ def run_trials(
         folder: that of the results.
         replaced: files and folders of an earlier campaign there, to be removed first; None to continue it.
         where: cluster, or None for this machine.
-        workers: number of worker processes.
+        workers: number of threads, or of worker processes of the cluster.
     """
     if replaced is not None:
         _clear(folder, replaced)
     with make_executor(where, workers) as executor, _live(console, replaced is None) as watch:
-        interruptible(lambda: run_campaign(prepared, folder, executor, watch))
+        threads = workers if where is None else None
+        interruptible(lambda: run_campaign(prepared, folder, executor, watch, threads))
 
 
 def _clear(folder: Path, names: Sequence[str]) -> None:

@@ -22,8 +22,8 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-# Tasks of a campaign, and trials of the smallest and the largest task, unless `chunk` is given.
-_TASKS, _SMALL, _LARGE = 100, 256, 4096
+# Trials of the smallest and the largest task, unless `chunk` is given.
+_SMALL, _LARGE = 256, 4096
 
 VARIANT = "variant"  # the axis of `variants`, beside those of `cross`
 
@@ -135,10 +135,7 @@ class Campaign(Strict):
     series: RecordedSignals | None = Field(None, description="signals to record; none by default")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of all samples and of the seeds of the trials")
     chunk: int | None = Field(
-        None,
-        ge=1,
-        le=100_000,
-        description="trials per task, which does not affect the results; default: a hundredth, from 256 to 4096",
+        None, ge=1, le=100_000, description="trials per task, which does not affect the results; default: 256 to 4096"
     )
 
     @field_validator("scenario", mode="before")
@@ -174,10 +171,9 @@ class Campaign(Strict):
         """Every key path whose value is not that of the scenario in all trials."""
         return [*self.vary, *self.cross, *(key for variant in self.variants.values() for key in variant)]
 
-    @property
-    def trials_per_task(self) -> int:
-        """Trials per task: so many that what is done once per task takes little time, so few that progress is seen."""
-        return self.chunk or min(max(self.number // _TASKS, _SMALL), _LARGE)
+    def trials_per_task(self, tasks: int) -> int:
+        """Trials per task, where there are to be so many tasks."""
+        return self.chunk or min(max(self.number // tasks, _SMALL), _LARGE)
 
     @property
     def number(self) -> int:

@@ -15,6 +15,7 @@ from jaxtyping import PRNGKeyArray, PyTree
 
 from undertow.core import runtime
 from undertow.core.errors import BadInput
+from undertow.core.kept_programs import kept_program
 from undertow.scenario.build import Built, in_its_precision
 from undertow.scenario.part_cache import PartCache
 from undertow.scenario.prepare import loop_run
@@ -106,7 +107,7 @@ def _start(loop: ClosedLoop, start: tuple[Any, Any], key: PRNGKeyArray) -> dict[
     return {"disturbance": realization.disturbance_realization, "navigation": navigation, "faults": faults}
 
 
-_compiled = eqx.filter_jit(_start)
+_compiled = kept_program(_start)
 
 
 def _name(path: tuple[Any, ...]) -> str:

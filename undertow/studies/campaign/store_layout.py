@@ -10,6 +10,9 @@ from undertow.studies.campaign.campaign_schema import Campaign
 
 SAMPLES = "sample"
 
+# Tasks, where nothing is known of who runs them.
+TASKS = 100
+
 
 class StoreLayout(NamedTuple):
     """Axes of the store, cut into blocks."""
@@ -60,10 +63,15 @@ class StoreLayout(NamedTuple):
         return range(self.samples // self.chunk[-1] * beside, self.tasks)
 
 
-def layout(campaign: Campaign) -> StoreLayout:
-    """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples."""
+def layout(campaign: Campaign, tasks: int = TASKS) -> StoreLayout:
+    """Layout of a new store: about so many trials per task as the campaign asks, preferably along the samples.
+
+    Args:
+        campaign: whose trials it holds.
+        tasks: how many of them, where the campaign does not say how many trials each has.
+    """
     swept = tuple(len(entries) for entries in campaign.axes.values())
-    most = campaign.trials_per_task
+    most = campaign.trials_per_task(tasks)
     chunk = [min(most, max(campaign.trials, most // math.prod(swept)))]
     for count in reversed(swept):
         chunk.insert(0, min(count, most // math.prod(chunk)) or 1)

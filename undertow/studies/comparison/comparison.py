@@ -82,6 +82,7 @@ def run_comparison(
         ready = prepare_comparison(sources, controllers, trials, allow_code, tuner)
     for sentence in ready.advice:
         warnings.warn(sentence, stacklevel=3)
-    with tempfile.TemporaryDirectory() as folder, make_executor(None, workers or os.cpu_count() or 1) as executor:
-        run_campaign(ready.prepared, Path(folder), executor, lambda tally: None)
+    threads = workers or os.cpu_count() or 1
+    with tempfile.TemporaryDirectory() as folder, make_executor(None, threads) as executor:
+        run_campaign(ready.prepared, Path(folder), executor, lambda tally: None, threads)
         return read_comparison(Path(folder), load(Path(folder)), ready)
