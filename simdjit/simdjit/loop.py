@@ -46,6 +46,7 @@ class Loop:
         optimize: whether the machine code is to be as fast as it can be. Without, it is made in a third of the time and
             takes half as long again: worth it for some ten thousand steps. A thread makes the fast one where it is run
             often after all. No result depends on it.
+        most: operations of start, step and record together, in all of the program.
 
     Raises:
         Unsupported: a function needs something that the compiler has no rule for, or XLA would take less time for the
@@ -67,6 +68,7 @@ class Loop:
         planned: int = 0,
         portable: bool = False,
         optimize: bool = True,
+        most: int = _MOST,
     ):
         prepared = Traced(prepare, numbers)
         constant = [False] * len(jax.tree.leaves(numbers)) if constant is None else constant
@@ -84,7 +86,7 @@ class Loop:
         head = nvidia.THREADS if driver else VECTORS
         traced = (prepared, begun, stepped, recorded)
         beside = simd_width(64) if lanes == 1 and not driver else 1
-        made = lambda: _lowered(prologue, traced, number.dtype, lanes, head, beside, planned)
+        made = lambda: _lowered(prologue, traced, number.dtype, lanes, head, beside, planned, most)
         name = fingerprint(
             [function.closed for function in traced], prologue.constants, lanes, beside, bool(driver), planned
         )
@@ -106,13 +108,14 @@ class Loop:
         cache: Path | None = None,
         portable: bool = False,
         optimize: bool = True,
+        most: int = _MOST,
     ) -> "Loop":
         """A loop that carries nothing from step to step and records what a function gives for its numbers.
 
         Args:
             function: of as many trees of arrays as `example` has.
             example: its arguments for one run.
-            constant, lanes, driver, cache, portable, optimize: as of a loop.
+            constant, lanes, driver, cache, portable, optimize, most: as of a loop.
 
         Raises:
             Unsupported, OSError: as of a loop.
@@ -120,7 +123,7 @@ class Loop:
         nothing = np.zeros(())
         record = lambda arguments, carry, k: function(*arguments)
         functions = lambda arguments: arguments, lambda arguments: nothing, lambda arguments, carry, k: carry, record
-        return cls(*functions, example, constant, lanes, driver, cache, portable=portable, optimize=optimize)
+        return cls(*functions, example, constant, lanes, driver, cache, portable=portable, optimize=optimize, most=most)
 
     def _load(self, parts: "_Parts", driver: Driver | None, cache: Path | None) -> None:
         self._parts, self.operations = parts, parts.program.operations
@@ -270,18 +273,19 @@ def _lowered(
     head: Head,
     beside: int,
     planned: int,
+    most: int,
 ) -> Program:
     """The program of traced functions: prepare, start, step and record."""
     _, begun, step, record = traced
     graph, prepared = prologue.lowered()
     try:
-        first = evaluate(graph, begun.closed, prepared, _MOST)
+        first = evaluate(graph, begun.closed, prepared, most)
         k = graph.input(STEP, I64)
         k = k if number == I64 else graph.apply("convert", k, dtype=str(number))
         arguments = [*prepared, *inputs(graph, "carry", begun.leaves), np.array(k)]
-        stepped, recorded = (evaluate(graph, function.closed, arguments, _MOST) for function in (step, record))
+        stepped, recorded = (evaluate(graph, function.closed, arguments, most) for function in (step, record))
     except TooLong as error:
-        seconds = estimate.compiled_here(_MOST).compiling
+        seconds = estimate.compiled_here(most).compiling
         raise Unsupported(f"{error}, which would take more than {seconds:.0f} s to compile") from error
     sections = Sections(*map(flat, (first, stepped, recorded)))
     counts = operations(graph, sections)

@@ -24,15 +24,14 @@ class Oscillator(eqx.Module):
 
 
 @of_undertow
-def slope(oscillator, at):
-    point, direction = at
-    energy = lambda x: {"energy": (oscillator.stiffness @ x**2).sum(), "moves": x[0] > 0.0}
-    return jax.jvp(lambda x: energy(x)["energy"], (point,), (direction,))
+def slope(oscillator, point, direction):
+    """A sum of squares, and its slope along one direction."""
+    return jax.jvp(lambda x: (oscillator.stiffness @ x**2).sum(), (point,), (direction,))
 
 
 @of_undertow
-def eigenvalues(oscillator, at):
-    return jnp.linalg.eigvalsh(oscillator.stiffness @ oscillator.stiffness.T + jnp.diag(at))
+def eigenvalues(oscillator, shift, diagonal):
+    return shift + jnp.linalg.eigvalsh(oscillator.stiffness @ oscillator.stiffness.T + jnp.diag(diagonal))
 
 
 @of_undertow
@@ -79,9 +78,8 @@ def oscillator(matrix=MATRIX):
     return Oscillator(jnp.asarray(matrix), jax.random.PRNGKey(3))
 
 
-def rows(count=5):
-    chance = np.random.default_rng(1)
-    return chance.normal(size=(count, 2)), np.tile(np.eye(2), (3, 1))[:count]
+POINT = np.array([0.7, -1.2])
+DIRECTIONS = np.random.default_rng(1).normal(size=(5, 2))
 
 
 def without_simd(monkeypatch):
@@ -94,14 +92,13 @@ def untraced(monkeypatch):
 
 @pytest.mark.parametrize("compiler", ["simd", "xla"])
 def test_each_row(folder, monkeypatch, compiler):
-    """A sum of squares, and its slope 2 x . (column sums of the matrix) along one axis."""
+    """The slope of a sum of squares is 2 x . (column sums of the matrix)."""
     if compiler == "xla":
         without_simd(monkeypatch)
-    points, directions = rows()
-    energy, slopes = for_each(slope, oscillator(), (points, directions))
+    energy, slopes = for_each(slope, oscillator(), POINT, DIRECTIONS)
     weights = MATRIX.sum(axis=0)
-    np.testing.assert_allclose(energy, points**2 @ weights, rtol=1e-14)
-    np.testing.assert_allclose(slopes, (2 * points * weights * directions).sum(axis=1), rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(energy, np.full(5, POINT**2 @ weights), rtol=1e-14)
+    np.testing.assert_allclose(slopes, DIRECTIONS @ (2 * POINT * weights), rtol=1e-13, atol=1e-15)
     assert isinstance(energy, np.ndarray) and slopes.shape == (5,)
 
 
@@ -128,39 +125,37 @@ def test_one_instant_is_the_start(folder):
 
 
 def test_a_later_process_traces_nothing_for_other_numbers(folder, monkeypatch):
-    """Zeros among the rows are numbers as others are."""
-    points, directions = rows()
-    for_each(slope, oscillator(), (points, directions))
+    """Zeros are numbers as others are."""
+    for_each(slope, oscillator(), POINT, DIRECTIONS)
     along_steps(OSCILLATION, oscillator(), 6)
     forget(monkeypatch)
     untraced(monkeypatch)
-    energy, slopes = for_each(slope, oscillator(2 * MATRIX), (0 * points, directions))
+    energy, slopes = for_each(slope, oscillator(2 * MATRIX), 0 * POINT, DIRECTIONS)
     assert not energy.any() and not slopes.any()
-    assert for_each(slope, oscillator(), (points[:1], directions[:1]))[0].shape == (1,)
+    assert for_each(slope, oscillator(), POINT, np.eye(2))[0].shape == (2,)
     assert along_steps(OSCILLATION, oscillator(2 * MATRIX), 9)[1]["energy"].shape == (9,)
 
 
 def test_what_has_no_rule_is_left_to_xla_by_later_processes_at_once(folder, monkeypatch):
-    points, _ = rows()
-    first = for_each(eigenvalues, oscillator(), points)
-    expected = [np.linalg.eigvalsh(MATRIX @ MATRIX.T + np.diag(point)) for point in points]
+    first = for_each(eigenvalues, oscillator(), np.asarray(0.5), DIRECTIONS)
+    expected = [0.5 + np.linalg.eigvalsh(MATRIX @ MATRIX.T + np.diag(row)) for row in DIRECTIONS]
     np.testing.assert_allclose(first, expected, rtol=1e-12)
     forget(monkeypatch)
     untraced(monkeypatch)
-    np.testing.assert_array_equal(for_each(eigenvalues, oscillator(), points), first)
+    np.testing.assert_array_equal(for_each(eigenvalues, oscillator(), np.asarray(0.5), DIRECTIONS), first)
 
 
 def test_code_of_others_is_left_to_xla(folder, monkeypatch):
     untraced(monkeypatch)
-    scaled = lambda oscillator, row: 2.0 * row
-    np.testing.assert_array_equal(for_each(scaled, oscillator(), rows()[0]), 2 * rows()[0])
+    scaled = lambda oscillator, factor, row: factor * row
+    np.testing.assert_array_equal(for_each(scaled, oscillator(), np.asarray(2.0), DIRECTIONS), 2 * DIRECTIONS)
 
 
 def test_a_program_is_looked_for_once_for_a_subject_that_lives(folder, monkeypatch):
-    one, (points, directions) = oscillator(), rows()
-    for_each(slope, one, (points, directions))
+    one = oscillator()
+    for_each(slope, one, POINT, DIRECTIONS)
     assert len(kept_functions._EACH) == 1
     monkeypatch.setattr(kept_functions, "program_key", lambda *_: pytest.fail("looked for again"))
-    for_each(slope, one, (points, directions))
+    for_each(slope, one, POINT, DIRECTIONS)
     del one
     assert not kept_functions._EACH

@@ -24,6 +24,10 @@ from undertow.core.process_setup import cache_folder
 from undertow.core.program_key import program_key
 from undertow.core.structure_key import Constant
 
+# Operations in all. Functions of a large vehicle and its law have 30 000; of many more, as of a law that solves for its
+# command, XLA makes a program more quickly.
+_MOST = 80_000
+
 
 class Recursion(NamedTuple):
     """What goes on from step to step; functions of a module, because what they close over is part of the program.
@@ -59,7 +63,15 @@ def along_steps(recursion: Recursion, subject: Any, instants: int) -> tuple[Any,
         prepare = lambda arrays: recursion.prepare(parts.whole(arrays))
         cache = cache_folder() / "native"
         return simdjit.Loop(
-            prepare, *recursion[1:], parts.arrays, parts.constant, 1, cache=cache, portable=portable, optimize=False
+            prepare,
+            *recursion[1:],
+            parts.arrays,
+            parts.constant,
+            1,
+            cache=cache,
+            portable=portable,
+            optimize=False,
+            most=_MOST,
         )
 
     loop = parts.loop(("steps", Constant(tuple(recursion))), make)
@@ -69,48 +81,54 @@ def along_steps(recursion: Recursion, subject: Any, instants: int) -> tuple[Any,
     return jax.tree.map(lambda leaf: leaf[0], alone)
 
 
-def for_each(function: Callable[[Any, Any], Any], subject: Any, rows: Any) -> Any:
+def for_each(function: Callable[[Any, Any, Any], Any], subject: Any, given: Any, rows: np.ndarray) -> Any:
     """What a function gives for each of several rows.
 
     Args:
-        function: subject, row -> tree of arrays; one of a module, as those of a `Recursion`.
+        function: subject, given, row -> tree of arrays; one of a module, as those of a `Recursion`.
         subject: a part. As long as it lives, the program is looked for once.
-        rows: a tree of arrays of NumPy with a leading axis over rows; whatever numbers they hold, the program is one.
+        given: a tree of arrays, the same for all rows; whatever numbers they hold, the program is one.
+        rows: arrays, with a leading axis over rows; likewise.
 
     Returns:
         The tree, each of its arrays with a leading axis over the rows. Rounding depends on who compiles it.
     """
-    leaves, form = jax.tree.flatten(rows)
-    forms = form, tuple((leaf.shape[1:], str(leaf.dtype)) for leaf in leaves)
+    given = jax.tree.map(np.asarray, given)
+    leaves, form = jax.tree.flatten((given, rows[0]))
+    forms = form, tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
     known = id(subject), function, forms
     if known not in _EACH:
-        _EACH[known] = _each(function, subject, forms, jax.tree.map(lambda leaf: leaf[0], rows))
+        _EACH[known] = _each(function, subject, forms, given, rows[0])
         weakref.finalize(subject, _EACH.pop, known, None).atexit = False
-    return _EACH[known](rows)
+    return _EACH[known](given, rows)
 
 
 # What functions give for rows, by the identity of a subject that lives.
-_EACH: dict[tuple[Any, ...], Callable[[Any], Any]] = {}
+_EACH: dict[tuple[Any, ...], Callable[[Any, np.ndarray], Any]] = {}
 
 
-def _each(function: Callable[[Any, Any], Any], subject: Any, forms: tuple[Any, ...], row: Any) -> Callable[[Any], Any]:
+def _each(
+    function: Callable[[Any, Any, Any], Any], subject: Any, forms: tuple[Any, ...], given: Any, row: np.ndarray
+) -> Callable[[Any, np.ndarray], Any]:
     parts = _Parts.of(subject)
 
     def make(portable: bool) -> "simdjit.Loop":
-        of_arrays = lambda arrays, row: function(parts.whole(arrays), row)
-        constant, cache = [*parts.constant, *(False for _ in jax.tree.leaves(row))], cache_folder() / "native"
+        of_arrays = lambda arrays, given, row: function(parts.whole(arrays), given, row)
+        example = parts.arrays, given, row
+        constant = [*parts.constant, *(False for _ in jax.tree.leaves((given, row)))]
+        cache = cache_folder() / "native"
         return simdjit.Loop.recording(
-            of_arrays, (parts.arrays, row), constant, cache=cache, portable=portable, optimize=False
+            of_arrays, example, constant, cache=cache, portable=portable, optimize=False, most=_MOST
         )
 
     loop = parts.loop(("each", Constant(function), *forms), make)
     if loop is None:
-        return lambda rows: jax.device_get(_by_vmap(function)(parts.whole(parts.arrays), rows))
+        return lambda given, rows: jax.device_get(_by_vmap(function)(parts.whole(parts.arrays), given, rows))
 
-    def run(rows: Any) -> Any:
-        count = len(jax.tree.leaves(rows)[0])
-        repeated = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (count, *leaf.shape)), parts.arrays)
-        _, recorded = loop.run((repeated, rows), 0, 1)
+    def run(given: Any, rows: np.ndarray) -> Any:
+        shared = parts.arrays, given
+        repeated = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(rows), *leaf.shape)), shared)
+        _, recorded = loop.run((*repeated, rows), 0, 1)
         return jax.tree.map(lambda leaf: leaf[:, 0], recorded)
 
     return run
@@ -158,9 +176,9 @@ def _by_scan(recursion: Recursion) -> Callable[[Any, int], Any]:
 
 
 @functools.cache
-def _by_vmap(function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def _by_vmap(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
     @briefly_compiled
-    def mapped(subject: Any, rows: Any) -> Any:
-        return jax.vmap(lambda row: function(subject, row))(rows)
+    def mapped(subject: Any, given: Any, rows: Any) -> Any:
+        return jax.vmap(lambda row: function(subject, given, row))(rows)
 
     return mapped

@@ -103,10 +103,8 @@ class Parts(eqx.Module):
         point = [
             np.asarray(at.get(name, np.zeros(size)), dtype=float) for name, size in zip(INPUTS, self.sizes, strict=True)
         ]
-        directions = np.eye(sum(self.sizes))
-        given = jax.tree.map(np.asarray, (point, self.target, self.flow, dt))
-        at_each = jax.tree.map(lambda value: np.broadcast_to(value, (len(directions), *value.shape)), given)
-        values, slopes = for_each(_slope, self.vector_loop, (*at_each, directions))
+        given = point, self.target, self.flow, dt
+        values, slopes = for_each(_slope, self.vector_loop, given, np.eye(sum(self.sizes)))
         ends = np.cumsum([0, *self.sizes])
         columns = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(INPUTS)}
         slopes_by_input = {}
@@ -193,14 +191,15 @@ def without(part: Part, parameters: tuple[str, ...]) -> Part:
     )
 
 
-def _slope(vector_loop: VectorLoop, at: tuple[Any, ...]) -> tuple[dict[str, Array], dict[str, Array]]:
+def _slope(vector_loop: VectorLoop, at: tuple[Any, ...], direction: Array) -> tuple[dict[str, Array], dict[str, Array]]:
     """Values at a point, and their slopes there along one direction of all `INPUTS` together.
 
     Args:
         vector_loop: the loop.
-        at: `INPUTS`; target; flow; sampling time of the law, s; and the direction.
+        at: `INPUTS`; target; flow; sampling time of the law, s.
+        direction: a vector.
     """
-    point, target, flow, dt, direction = at
+    point, target, flow, dt = at
     parts, ends = Parts(vector_loop, target, flow), np.cumsum([0, *vector_loop.sizes])
     values = lambda vector: _values(parts, *(vector[ends[i] : ends[i + 1]] for i in range(len(INPUTS))), dt=dt)
     return jax.jvp(values, (jnp.concatenate(point),), (direction,))

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from PIL import Image
@@ -79,6 +78,8 @@ def small_png(figure: Figure) -> bytes:
 
 def pdf(figure: Figure, width: str) -> bytes:
     """The figure as PDF, without date, with text as TrueType fonts. That of one column is rearranged itself."""
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
     figure = one_column(figure) if width == "one-column" else figure
     data = io.BytesIO()
     with _WRITING, matplotlib.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType] - keys of Matplotlib
