@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from llvmlite import binding
@@ -16,6 +16,9 @@ from simdjit.graph import Unsupported
 
 # Arguments of a program: numbers, carry, series; steps, steps between records.
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
+
+# Whether code is compiled thoroughly; "later" where it turns out to be run often.
+Optimize = bool | Literal["later"]
 
 # Seconds that briefly compiled code has run, after which a thread compiles it thoroughly as soon as it is called again.
 # Where a command calls it once or twice nothing is gained; somebody who moves a slider calls it hundreds of times.
@@ -32,12 +35,12 @@ class Code:
         optimize: see `loop.Loop`.
     """
 
-    def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False, optimize: bool = True):
+    def __init__(self, assembly: str, cache: Path | None = None, sparing: bool = False, optimize: Optimize = True):
         may_optimize = os.environ.get("SIMDJIT_OPTIMIZATION") != "0"
         self._compile = lambda level: self._load(_object(assembly, cache, sparing, level), level)
-        self._brief, self._spent = may_optimize and not optimize, 0.0
+        self._brief, self._spent = may_optimize and optimize == "later", 0.0
         self._engines: list[Any] = []  # another thread may still run the code of an earlier one
-        self._compile(_THOROUGH if may_optimize and optimize else _BRIEF)
+        self._compile(_THOROUGH if may_optimize and optimize is True else _BRIEF)
 
     def _load(self, code: bytes, level: int) -> None:
         engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target(level))

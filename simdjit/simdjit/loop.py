@@ -15,7 +15,7 @@ import numpy as np
 from simdjit import estimate, nvidia
 from simdjit.cache import cached
 from simdjit.codegen import STEP, VECTORS, Head, Sections, assembly, operations
-from simdjit.cpu import Code, simd_width
+from simdjit.cpu import Code, Optimize, simd_width
 from simdjit.cuda import Driver
 from simdjit.fingerprint import fingerprint
 from simdjit.graph import I64, Unsupported, flat
@@ -44,8 +44,8 @@ class Loop:
         planned: steps of all runs together for which the program is made; 0 where it is wanted whatever it costs.
         portable: whether it will be `written`.
         optimize: whether the machine code is to be as fast as it can be. Without, it is made in a third of the time and
-            takes half as long again: worth it for some ten thousand steps. A thread makes the fast one where it is run
-            often after all. No result depends on it.
+            takes half as long again: worth it for some ten thousand steps. "later": a thread makes the fast one where
+            it is run often after all. No result depends on it.
         most: operations of start, step and record together, in all of the program.
 
     Raises:
@@ -67,7 +67,7 @@ class Loop:
         cache: Path | None = None,
         planned: int = 0,
         portable: bool = False,
-        optimize: bool = True,
+        optimize: Optimize = True,
         most: int = _MOST,
     ):
         prepared = Traced(prepare, numbers)
@@ -107,7 +107,7 @@ class Loop:
         driver: Driver | None = None,
         cache: Path | None = None,
         portable: bool = False,
-        optimize: bool = True,
+        optimize: Optimize = True,
         most: int = _MOST,
     ) -> "Loop":
         """A loop that carries nothing from step to step and records what a function gives for its numbers.
@@ -262,7 +262,7 @@ class _Parts(NamedTuple):
     record: Layout
     carry_form: Form
     record_form: Form
-    optimize: bool
+    optimize: Optimize
 
 
 def _lowered(

@@ -89,7 +89,7 @@ def test_a_loop_that_is_run_often_is_compiled_thoroughly(tmp_path, monkeypatch):
     known = lambda numbers: numbers
     step = lambda rates, angles, k: angles + 0.1 * jnp.sin(rates * angles)
     functions = known, lambda rates: 2 * rates, step, lambda rates, angles, k: angles
-    loop = simdjit.Loop(*functions, np.zeros(5), lanes=1, cache=tmp_path, optimize=False)
+    loop = simdjit.Loop(*functions, np.zeros(5), lanes=1, cache=tmp_path, optimize="later")
     made = lambda: len(list(tmp_path.rglob("*.o")))
     finals, before = [], threading.active_count()
     for _ in range(7):

@@ -147,7 +147,7 @@ class SimdBatchRunner:
         self._plan = plan
         # With its stages in a loop a program compiles in nine tenths of the time, and takes up to half as long again.
         compact = driver is None and runs * plan.steps < _FEW
-        optimize = runs * plan.steps >= _SOME
+        optimize = True if runs * plan.steps >= _SOME else "later"
         integrate = (COMPACT_METHODS if compact else METHODS)[plan.method]
         dt = plan.dt
 
