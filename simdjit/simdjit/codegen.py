@@ -157,7 +157,7 @@ def _function(name: str, dtype: str, width: int, emitter: Emitter) -> str:
     return "\n".join(lines)
 
 
-class Counts(NamedTuple):
+class OperationCounts(NamedTuple):
     """Operations of one step of one run, those inside a loop counted once; an elementary function counts as one.
 
     Attributes:
@@ -169,7 +169,7 @@ class Counts(NamedTuple):
     written: int
 
 
-def operations(graph: Graph, sections: Sections) -> Counts:
+def operations(graph: Graph, sections: Sections) -> OperationCounts:
     """Operations of one step of a program."""
     fixed, needed = _fixed(graph), graph.needed(sections.step)
     # What happens inside a region is done in every step where the region is, though its own inputs are no carry.
@@ -177,7 +177,7 @@ def operations(graph: Graph, sections: Sections) -> Counts:
     same = lambda node: fixed[node if graph.homes[node] is None else outermost[graph.around(graph.homes[node])]]
     done = [graph.operations[node] for node, is_needed in enumerate(needed) if is_needed and not same(node)]
     written = sum(operation.name not in _NO_WORK for operation in done)
-    return Counts(written + sum(one.detail.operations for one in done if one.name == "product"), written)
+    return OperationCounts(written + sum(one.detail.operations for one in done if one.name == "product"), written)
 
 
 _NO_WORK = ("constant", "input", "region", "result", "part", "product")
