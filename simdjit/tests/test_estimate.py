@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from simdjit import Loop, Unsupported, estimate, loop
+from simdjit import Loop, Unsupported, estimate
 
 pytestmark = pytest.mark.compiler
 
@@ -18,9 +18,9 @@ def functions(n, carry, k):
     return jnp.sin(carry * n) + 0.1 * jnp.exp(-carry * carry) * n
 
 
-def program(size, planned):
+def program(size, **limits):
     numbers = np.linspace(0.1, 1.0, size)
-    return Loop(lambda n: n, lambda n: n * 1.0, functions, lambda n, c, k: c[0], numbers, planned=planned)
+    return Loop(lambda n: n, lambda n: n * 1.0, functions, lambda n, c, k: c[0], numbers, **limits)
 
 
 def test_equations_numbers_functions_and_products_are_counted():
@@ -69,7 +69,6 @@ def test_products_in_loops_are_not_written_out():
     assert Loop(lambda n: n, lambda n: n, step, lambda n, c, k: c[0, 0], numbers).operations > 4 * 2 * 48**3
 
 
-def test_a_program_that_would_take_minutes_says_so(monkeypatch):
-    monkeypatch.setattr(loop, "_MOST", 1_000)
+def test_a_program_that_would_take_minutes_says_so():
     with pytest.raises(Unsupported, match=r"^more than 1 000 operations, which would take more than 0 s to compile$"):
-        program(200, planned=0)
+        program(200, most=1_000)
