@@ -88,7 +88,7 @@ class Loop:
         beside = simd_width(64) if lanes == 1 and not driver else 1
         made = lambda: _lowered(prologue, traced, number.dtype, lanes, head, beside, planned, most)
         name = fingerprint(
-            [function.closed for function in traced], prologue.constants, lanes, beside, bool(driver), planned
+            [function.closed for function in traced], prologue.constants, lanes, beside, bool(driver), planned, most
         )
         program = Program.read(cached(name, ".ll", lambda: made().written(), cache)) if name else made()
         if program.prologue_lacks and not prologue.lacking:

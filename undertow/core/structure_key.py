@@ -100,13 +100,14 @@ class _Description:
         self.parts.append(f"{kind} {len(text)} {text}\n")
 
     def _array(self, array: Any, static: bool) -> None:
-        if jnp.issubdtype(array.dtype, jax.dtypes.extended):
+        is_extended, dtype = _type(array.dtype)
+        if is_extended:
             if static:
-                raise NoKey(f"a static array of type {array.dtype}")
-            self._text("array", f"{array.dtype} {array.shape}")
+                raise NoKey(f"a static array of type {dtype}")
+            self._text("array", f"{dtype} {array.shape}")
             return
         weak = getattr(array, "weak_type", False)
-        self._text("array", f"{array.dtype} {array.shape} {weak} {type(array).__name__ if static else ''}")
+        self._text("array", f"{dtype} {array.shape} {weak} {type(array).__name__ if static else ''}")
         if static:
             self._text("numbers", np.asarray(array).tobytes().hex())
 
@@ -184,6 +185,12 @@ class _Description:
         if not isinstance(name, str) or getattr(module, name, None) is not value:
             raise NoKey(f"an object of type {type(value).__qualname__}")
         self._text("named", f"{_known(value)}.{name}")
+
+
+@functools.cache
+def _type(dtype: Any) -> tuple[bool, str]:
+    """Whether a type of numbers is one of JAX's own, as that of random keys; and its name."""
+    return jnp.issubdtype(dtype, jax.dtypes.extended), str(dtype)
 
 
 @functools.cache
