@@ -39,6 +39,13 @@ def _made(content: bytes, shape: tuple[int, ...], settings: tuple[Any, ...]) -> 
         return jax.device_put(np.frombuffer(content).reshape(shape))  # `asarray` would compile a program for each shape
 
 
+def with_arrays(tree: Any) -> Any:
+    """The tree with arrays of JAX for those of NumPy."""
+    if not any(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves(tree)):
+        return tree
+    return jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, tree)
+
+
 @contextmanager
 def in_numbers() -> Iterator[None]:
     """Context in which operations on numbers give numbers, also where JAX traces a function around it.

@@ -16,9 +16,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from undertow.core.arrays import as_array
+from undertow.core.arrays import with_arrays
 from undertow.core.batch_compiler import Unsupported, simdjit, unavailable
-from undertow.core.kept_loops import decides_structure, loop_of_key
+from undertow.core.kept_loops import decides_structure, loop_of_key, numbers_contained
 from undertow.core.kept_programs import briefly_compiled
 from undertow.core.process_setup import cache_folder
 from undertow.core.program_key import program_key
@@ -143,8 +143,7 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of(cls, subject: Any) -> "_Parts":
-        subject = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, subject)
-        arrays, rest = eqx.partition(subject, eqx.is_array)
+        arrays, rest = eqx.partition(with_arrays(subject), eqx.is_array)
         return cls(arrays, rest, [decides_structure(leaf) for leaf in jax.tree.leaves(arrays)])
 
     def whole(self, arrays: Any) -> Any:
@@ -153,9 +152,8 @@ class _Parts(NamedTuple):
 
     def loop(self, structure: tuple[Any, ...], make: Callable[[bool], "simdjit.Loop"]) -> "simdjit.Loop | None":
         """The loop of a structure and these parts; None where XLA is to compile it."""
-        leaves = zip(jax.tree.leaves(self.arrays), self.constant, strict=True)
-        constants = Constant([leaf if same else None for leaf, same in leaves])
-        key = None if unavailable() else program_key(*structure, self.whole(self.arrays), constants)
+        contained = numbers_contained(self.arrays, self.constant)
+        key = None if unavailable() else program_key(*structure, self.whole(self.arrays), contained)
         try:
             return None if key is None else loop_of_key(key, make)
         except Unsupported:

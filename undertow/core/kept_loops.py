@@ -1,15 +1,17 @@
 """Loops of the batch compiler that are kept from one process to the next, and found again without tracing."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import jax
 import numpy as np
 
 from undertow.core.batch_compiler import Unsupported, simdjit
 from undertow.core.kept_code import kept_code
 from undertow.core.process_setup import cache_folder
 from undertow.core.program_key import kept_key, program_key
+from undertow.core.structure_key import Constant
 
 # Loops of this process by key, in the order in which they were first used; or why there is none.
 _LOOPS: dict[str, "simdjit.Loop | str"] = {}
@@ -87,6 +89,17 @@ def kept_or_made(key: str, make: Callable[[bool], Any], read: Callable[[bytes], 
         return read(contents)
     except Exception:  # of one that cannot be written there is nothing; and whatever is said of code that does not fit
         return make(False)
+
+
+def numbers_contained(arrays: Any, constant: Sequence[bool]) -> Constant:
+    """Numbers that a program contains, for its structure.
+
+    Args:
+        arrays: of its arguments; a tree.
+        constant: which of them it contains.
+    """
+    leaves = zip(jax.tree.leaves(arrays), constant, strict=True)
+    return Constant([leaf if same else None for leaf, same in leaves])
 
 
 def decides_structure(leaf: Any) -> bool:

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import equinox as eqx
 import jax
-import numpy as np
 from jax.core import Tracer
 
-from undertow.core.arrays import as_array, in_numbers
+from undertow.core.arrays import in_numbers, with_arrays
 from undertow.core.installation import may_keep
 from undertow.core.kept_code import KEEPS, kept_code
 from undertow.core.program_key import KeptKey, kept_key, program_key
@@ -46,8 +45,7 @@ def kept_program(function: Callable[..., Any], optimize: bool = True) -> Callabl
     @functools.wraps(function)
     def run(*arguments: Any) -> Any:
         # In a key the numbers of arrays of NumPy count, and no other run would find the program.
-        if any(isinstance(leaf, np.ndarray) for leaf in jax.tree.leaves(arguments)):
-            arguments = jax.tree.map(lambda leaf: as_array(leaf) if isinstance(leaf, np.ndarray) else leaf, arguments)
+        arguments = with_arrays(arguments)
         key = program_key(Constant(function), arguments) if KEEPS and may_keep() else None
         if key is None:
             return compiled(*arguments)

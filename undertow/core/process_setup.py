@@ -68,6 +68,14 @@ def prepare(keep_programs: bool = False) -> None:
     atexit.register(gc.freeze)  # or Python looks through everything once more before it goes: half a second
 
 
+def python_command(code: str) -> list[str]:
+    """Command of another Python that runs some code, with the imports that this one has.
+
+    It has the same search path, but not the current folder in front, where a file may have the name of a module.
+    """
+    return [sys.executable, "-c", f"import sys; sys.path[:] = {sys.path!r}; {code}"]
+
+
 def _set_xla_flags() -> None:
     flags = os.environ.get("XLA_FLAGS", "")
     ours: dict[str, object] = {"xla_backend_extra_options": _ONE_FUNCTION_PER_LOOP}

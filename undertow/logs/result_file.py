@@ -1,12 +1,13 @@
 """Opening the result file of a run, which may be damaged or hostile."""
 
 import contextlib
+import functools
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from undertow.core.process_setup import python_command
 from undertow.core.unpacked_size import size_complaint
 
 if TYPE_CHECKING:
@@ -32,9 +33,10 @@ def opened_result(path: Path) -> Iterator["xr.Dataset"]:
 
     if not path.exists():
         raise UnreadableResult("missing")
-    if path.stat().st_size == 0:
+    status = path.stat()
+    if status.st_size == 0:
         raise UnreadableResult("empty (0 bytes)")
-    if not _opens(path):
+    if not _opens(path.absolute(), status.st_size, status.st_mtime_ns):
         raise UnreadableResult("damaged: the netCDF library does not finish opening it")
     try:
         with xr.open_dataset(path, engine="netcdf4") as dataset:
@@ -47,13 +49,16 @@ def opened_result(path: Path) -> Iterator["xr.Dataset"]:
         raise UnreadableResult("damaged, incomplete, or not a netCDF file") from error
 
 
-def _opens(path: Path) -> bool:
-    """Whether another process comes to an end, well or with an error, when it opens a netCDF file."""
-    command = f"import sys; sys.path[:] = {sys.path!r}; from netCDF4 import Dataset; Dataset(sys.argv[1]).close()"
+@functools.lru_cache(64)
+def _opens(path: Path, size: int, modified: int) -> bool:
+    """Whether another process comes to an end, well or with an error, when it opens a netCDF file.
+
+    A repetition opens the same file several times: it is tried once for its size (bytes) and time of change (ns).
+    """
+    command = [*python_command("from netCDF4 import Dataset; Dataset(sys.argv[1]).close()"), str(path)]
     quiet = subprocess.DEVNULL
     try:
-        opening = [sys.executable, "-c", command, str(path.absolute())]
-        return subprocess.run(opening, stdout=quiet, stderr=quiet, timeout=_LONGEST, check=False).returncode >= 0
+        return subprocess.run(command, stdout=quiet, stderr=quiet, timeout=_LONGEST, check=False).returncode >= 0
     except subprocess.TimeoutExpired:
         return False
     except OSError:  # no process can be started: opened here, as it is

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+from undertow.core.process_setup import python_command
 from undertow.report import figures
 from undertow.report.plotted import Plotted
 
@@ -60,12 +61,12 @@ def plotting_process() -> Iterator[PlottingProcess]:
     if "matplotlib" in sys.modules or not sys.executable:
         yield PlottingProcess(None)
         return
-    # The same search path, but without the current folder in front, where a file may have the name of a module. Ctrl-C
-    # ends this process, which ends the other one. It lives for seconds: looking for garbage would be a fifth of them.
-    command = f"import gc, sys; gc.disable(); sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
+    # It lives for seconds, of which looking for garbage would be a fifth.
+    command = python_command(f"import gc; gc.disable(); from {__name__} import serve; serve()")
     pipe = subprocess.PIPE
     try:
-        process = subprocess.Popen([sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True)
+        # Ctrl-C ends this process, which ends the other one.
+        process = subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True)
     except OSError:
         yield PlottingProcess(None)
         return

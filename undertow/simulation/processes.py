@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from typing import Any
 
-from undertow.core.process_setup import prepare
+from undertow.core.process_setup import prepare, python_command
 
 # More processes would wait for each other: the longest tasks take a quarter of the time of all.
 _MOST = 4
@@ -34,14 +34,10 @@ class _Process:
     """A process that computes one task after another."""
 
     def __init__(self, preload: str):
-        # The same search path, but without the current folder in front, where a file may have the name of a module.
-        # Ctrl-C ends this process, which ends the other one.
         self._ended = False
-        command = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve({preload!r})"
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", command], stdin=pipe, stdout=pipe, start_new_session=True
-        )
+        command, pipe = python_command(f"from {__name__} import serve; serve({preload!r})"), subprocess.PIPE
+        # Ctrl-C ends this process, which ends the other one.
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True)
 
     def result(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Result of a function there; its exception is raised here."""

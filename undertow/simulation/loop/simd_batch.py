@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import PRNGKeyArray
 
 from undertow.core.batch_compiler import Unsupported, simdjit, unavailable
-from undertow.core.kept_loops import decides_structure, kept_loop, kept_or_made
+from undertow.core.kept_loops import decides_structure, kept_loop, kept_or_made, numbers_contained
 from undertow.core.numerics.integrators import COMPACT_METHODS, METHODS
 from undertow.core.process_setup import cache_folder
 from undertow.core.program_key import program_key
@@ -178,9 +178,8 @@ class SimdBatchRunner:
         def make(portable: bool) -> simdjit.Loop:
             return simdjit.Loop(*functions, numbers, constant, width, driver, cache, _PLANNED, portable, optimize)
 
-        leaves = zip(jax.tree.leaves(numbers), constant, strict=True)
-        constants = Constant([leaf if same else None for leaf, same in leaves])
-        structure = ("runs", run, plan._replace(steps=0), constants, width, compact, optimize)
+        contained = numbers_contained(numbers, constant)
+        structure = ("runs", run, plan._replace(steps=0), contained, width, compact, optimize)
         self._program = make(False) if driver else kept_loop(structure, make)
 
     @property
